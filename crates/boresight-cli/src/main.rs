@@ -1,0 +1,3 @@
+//! The command `boresight`.
+#![forbid(unsafe_code)]
+fn main() {}

@@ -1,0 +1,2 @@
+//! High spatial frequency error and the centroids of pixel windows.
+#![forbid(unsafe_code)]

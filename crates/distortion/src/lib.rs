@@ -1,0 +1,2 @@
+//! Low spatial frequency error: distortion residual polynomials.
+#![forbid(unsafe_code)]

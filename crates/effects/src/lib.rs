@@ -1,0 +1,2 @@
+//! The catalogue of effects: forward action and regressors together.
+#![forbid(unsafe_code)]

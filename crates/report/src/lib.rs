@@ -1,0 +1,2 @@
+//! Text from finished results; computes nothing.
+#![forbid(unsafe_code)]

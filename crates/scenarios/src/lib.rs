@@ -1,0 +1,2 @@
+//! Motions and skies: bundles simulated from a scenario.
+#![forbid(unsafe_code)]

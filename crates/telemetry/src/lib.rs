@@ -1,0 +1,2 @@
+//! Bundles, models and results on disk.
+#![forbid(unsafe_code)]
