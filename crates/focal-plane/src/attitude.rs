@@ -1,0 +1,145 @@
+//! Attitude: rotation vectors, and anything that knows where the tracker points.
+//!
+//! ```text
+//! v_tracker = q v_inertial
+//! theta = log(q_meas q_ref^-1)                 error, tracker axes, rad
+//! d exp(phi)/dt = (J_l(phi) phi')^x exp(phi)   J_l: left Jacobian of the rotation group
+//! omega = -J_l(phi) phi'                       with q(t) = exp(phi(t)) q0
+//! ```
+//!
+//! The last line follows from dv/dt = -omega x v for a star fixed in inertial space.
+//!
+//! Source: Sola, A micro Lie theory for state estimation in robotics (arXiv:1812.01537), Eqs. 133
+//! and 143 to 146 (exponential, left Jacobian and inverse).
+
+mod jacobian;
+mod rotate;
+mod series;
+mod uniform;
+
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+
+use crate::QuaternionsMut;
+
+pub use jacobian::{so3_left_jacobian, so3_left_jacobian_inverse};
+pub use rotate::{rotate_each_into, rotate_into};
+pub(crate) use series::locate;
+pub use series::{AttitudeCursor, AttitudeError, AttitudeSeries};
+pub use uniform::UniformRotation;
+
+/// Something that knows the attitude (inertial to tracker) and the rate over a span of time.
+///
+/// Never extrapolates: outside [`span_s`](Self::span_s), and inside holes, the answer is `None`.
+pub trait AttitudeSource: Send + Sync {
+    /// Attitude at a time, s: `v_tracker = q * v_inertial`.
+    fn attitude(&self, t_s: f64) -> Option<UnitQuaternion<f64>>;
+
+    /// Rate at a time, s: of the tracker relative to inertial, tracker axes, rad/s, so that
+    /// `dv/dt = -omega x v` for a fixed star.
+    fn rate_rad_s(&self, t_s: f64) -> Option<Vector3<f64>>;
+
+    /// First and last time with an attitude, s.
+    fn span_s(&self) -> [f64; 2];
+
+    /// [`attitude`](Self::attitude) for many times, all four components NaN where it gives `None`.
+    ///
+    /// # Panics
+    ///
+    /// If the slices differ in length.
+    fn attitude_into(&self, t_s: &[f64], out: QuaternionsMut<'_>) {
+        fill_attitudes(t_s, out, |t| self.attitude(t));
+    }
+}
+
+impl<S: AttitudeSource + ?Sized> AttitudeSource for &S {
+    fn attitude(&self, t_s: f64) -> Option<UnitQuaternion<f64>> {
+        (**self).attitude(t_s)
+    }
+    fn rate_rad_s(&self, t_s: f64) -> Option<Vector3<f64>> {
+        (**self).rate_rad_s(t_s)
+    }
+    fn span_s(&self) -> [f64; 2] {
+        (**self).span_s()
+    }
+    fn attitude_into(&self, t_s: &[f64], out: QuaternionsMut<'_>) {
+        (**self).attitude_into(t_s, out);
+    }
+}
+
+impl<S: AttitudeSource + ?Sized> AttitudeSource for Box<S> {
+    fn attitude(&self, t_s: f64) -> Option<UnitQuaternion<f64>> {
+        (**self).attitude(t_s)
+    }
+    fn rate_rad_s(&self, t_s: f64) -> Option<Vector3<f64>> {
+        (**self).rate_rad_s(t_s)
+    }
+    fn span_s(&self) -> [f64; 2] {
+        (**self).span_s()
+    }
+    fn attitude_into(&self, t_s: &[f64], out: QuaternionsMut<'_>) {
+        (**self).attitude_into(t_s, out);
+    }
+}
+
+fn fill_attitudes(
+    t_s: &[f64],
+    out: QuaternionsMut<'_>,
+    mut attitude: impl FnMut(f64) -> Option<UnitQuaternion<f64>>,
+) {
+    assert_eq!(t_s.len(), out.len(), "one attitude for each time");
+    for (i, &t) in t_s.iter().enumerate() {
+        let [x, y, z, w] = attitude(t).map_or([f64::NAN; 4], |q| [q.i, q.j, q.k, q.w]);
+        out.x[i] = x;
+        out.y[i] = y;
+        out.z[i] = z;
+        out.w[i] = w;
+    }
+}
+
+/// Small or large rotation from `reference` to `meas`: `log(meas * reference^-1)`, tracker axes,
+/// rad, at most pi long. The signs of the quaternions do not matter.
+///
+/// Accurate to the rounding of the quaternions themselves (a few 1e-16 rad) at every angle: the
+/// half angle is `atan2` of vector and scalar part, which an arc cosine would lose near zero and
+/// an arc sine near 180 deg.
+///
+/// ```
+/// use focal_plane::{rotation_from_vector, rotation_vector};
+/// use nalgebra::{UnitQuaternion, Vector3};
+/// let reference = rotation_from_vector(&Vector3::new(0.3, -0.2, 0.9));
+/// let theta = Vector3::new(1e-9, -2e-9, 3e-9);
+/// let meas = rotation_from_vector(&theta) * reference;
+/// assert!((rotation_vector(&meas, &reference) - theta).norm() < 1e-15);
+/// ```
+#[must_use]
+pub fn rotation_vector(
+    meas: &UnitQuaternion<f64>,
+    reference: &UnitQuaternion<f64>,
+) -> Vector3<f64> {
+    let q = meas.quaternion() * reference.quaternion().conjugate();
+    // q and -q are one rotation: take the one with the smaller angle
+    let sign = if q.w < 0.0 { -1.0 } else { 1.0 };
+    let (v, w) = (q.imag() * sign, q.w * sign);
+    let n = v.norm();
+    // below 1e-8, atan2(n, w)/n is 1/w to 1e-16, and n may have underflowed
+    let scale = if n < 1e-8 {
+        2.0 / w
+    } else {
+        2.0 * n.atan2(w) / n
+    };
+    v * scale
+}
+
+/// The rotation `exp(theta)`, theta in rad: `v' = v + theta x v + ...`. Inverse of
+/// [`rotation_vector`]; exact to rounding for the smallest angles.
+#[must_use]
+pub fn rotation_from_vector(theta: &Vector3<f64>) -> UnitQuaternion<f64> {
+    let half = 0.5 * theta.norm();
+    let scale = if half < 1e-8 {
+        0.5
+    } else {
+        0.5 * half.sin() / half
+    };
+    let v = theta * scale;
+    UnitQuaternion::new_unchecked(Quaternion::new(half.cos(), v.x, v.y, v.z))
+}
