@@ -1,3 +1,207 @@
-//! Chores.
+//! Chores of the workspace: `cargo xtask TASK`.
+//!
+//! It launches cargo and reads files, with the standard library alone, so that
+//! it builds in a second on a machine that has nothing yet.
 #![forbid(unsafe_code)]
-fn main() {}
+#![expect(
+    clippy::print_stdout,
+    clippy::print_stderr,
+    reason = "a chore tells the person who started it what it found"
+)]
+
+mod launch;
+mod tidy;
+
+use std::env;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use launch::{Step, run_all};
+
+/// One word after `cargo xtask`.
+struct Task {
+    name: &'static str,
+    what: &'static str,
+    run: fn(&Path) -> Result<(), String>,
+}
+
+const TASKS: &[Task] = &[
+    Task {
+        name: "ci",
+        what: "check, then test: all that must hold before a change goes in",
+        run: ci,
+    },
+    Task {
+        name: "check",
+        what: "format, lints, documentation and tidy",
+        run: check,
+    },
+    Task {
+        name: "test",
+        what: "cargo test --workspace",
+        run: test,
+    },
+    Task {
+        name: "tidy",
+        what: "what the compiler cannot see: layers, sources, provenance, the tables in docs/",
+        run: tidy,
+    },
+    Task {
+        name: "fixtures",
+        what: "make the project's own fixtures again",
+        run: fixtures,
+    },
+];
+
+const FORMAT: Step = Step {
+    name: "fmt",
+    args: &["fmt", "--all", "--check"],
+    env: &[],
+};
+const LINTS: Step = Step {
+    name: "clippy",
+    args: &[
+        "clippy",
+        "--workspace",
+        "--all-targets",
+        "--",
+        "-D",
+        "warnings",
+    ],
+    env: &[],
+};
+const DOCUMENTATION: Step = Step {
+    name: "doc",
+    args: &["doc", "--workspace", "--no-deps"],
+    env: &[("RUSTDOCFLAGS", "-D warnings")],
+};
+const TESTS: Step = Step {
+    name: "test",
+    args: &["test", "--workspace"],
+    env: &[],
+};
+
+/// What `cargo xtask fixtures` makes, in this order; each has its row in
+/// `fixtures/PROVENANCE.md`.
+const FIXTURES: &[Step] = &[Step {
+    name: "fixtures/example",
+    args: &[
+        "run",
+        "--release",
+        "--package",
+        "boresight-cli",
+        "--",
+        "simulate",
+        "fixtures/scenarios/example.toml",
+        "--out",
+        "fixtures/example",
+    ],
+    env: &[],
+}];
+
+fn ci(root: &Path) -> Result<(), String> {
+    // Tests last: the output then ends with cargo's own account of them. A
+    // failing check does not keep them from running.
+    let checked = check(root);
+    let tested = test(root);
+    checked.and(tested)
+}
+
+fn check(root: &Path) -> Result<(), String> {
+    let launched = run_all(root, &[FORMAT, LINTS, DOCUMENTATION]);
+    let tidied = tidy(root);
+    launched.and(tidied)
+}
+
+fn test(root: &Path) -> Result<(), String> {
+    run_all(root, &[TESTS])
+}
+
+fn tidy(root: &Path) -> Result<(), String> {
+    let tree = tidy::Tree::load(root).map_err(|e| format!("tidy: {e}"))?;
+    let findings = tidy::findings(&tree);
+    for finding in &findings {
+        println!("{finding}");
+    }
+    if findings.is_empty() {
+        println!("tidy: nothing found in {} files", tree.len());
+        Ok(())
+    } else {
+        Err(format!("tidy: {} findings", findings.len()))
+    }
+}
+
+fn fixtures(root: &Path) -> Result<(), String> {
+    run_all(root, FIXTURES)
+}
+
+/// The workspace: the folder above this crate.
+fn root() -> PathBuf {
+    let here = env::var_os("CARGO_MANIFEST_DIR")
+        .map_or_else(|| PathBuf::from(env!("CARGO_MANIFEST_DIR")), PathBuf::from);
+    here.parent().map_or(here.clone(), Path::to_path_buf)
+}
+
+/// The task that the arguments ask for; anything but one known word is none.
+fn task(args: &[String]) -> Option<&'static Task> {
+    match args {
+        [name] => TASKS.iter().find(|task| task.name == name),
+        _ => None,
+    }
+}
+
+fn usage() -> String {
+    let mut text = String::from("usage: cargo xtask TASK\n\n");
+    for task in TASKS {
+        text.push_str(&format!("  {:<10}{}\n", task.name, task.what));
+    }
+    text
+}
+
+fn main() -> ExitCode {
+    let args: Vec<String> = env::args().skip(1).collect();
+    let Some(task) = task(&args) else {
+        if !args.is_empty() {
+            eprintln!("error: no task `{}`\n", args.join(" "));
+        }
+        eprint!("{}", usage());
+        return ExitCode::from(2);
+    };
+    match (task.run)(&root()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(message) => {
+            eprintln!("error: {message}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn words(text: &str) -> Vec<String> {
+        text.split_whitespace().map(str::to_owned).collect()
+    }
+
+    #[test]
+    fn only_one_known_word_is_a_task() {
+        assert_eq!(task(&words("tidy")).map(|t| t.name), Some("tidy"));
+        for wrong in ["", "tidi", "tidy now", "--help"] {
+            assert!(task(&words(wrong)).is_none(), "`{wrong}`");
+        }
+    }
+
+    #[test]
+    fn usage_lists_every_task() {
+        let usage = usage();
+        for task in TASKS {
+            assert!(usage.contains(task.name) && usage.contains(task.what));
+        }
+    }
+
+    #[test]
+    fn root_is_the_workspace() {
+        assert!(root().join("xtask/src/main.rs").is_file());
+    }
+}
