@@ -2,5 +2,15 @@
 #![forbid(unsafe_code)]
 
 mod disturbance;
+mod error;
+mod noise;
+mod quadrature;
+pub mod sigma;
+mod star_field;
+mod streams;
 
 pub use disturbance::{Disturbance, Stages, StarView};
+pub use error::TrackerError;
+pub use noise::TemporalNoise;
+pub use star_field::{CatalogueTracking, FieldStar, StarField, replacement_box};
+pub use streams::{NoiseStreams, Purpose, stream};
