@@ -1,2 +1,31 @@
 //! Bundles, models and results on disk.
+//!
+//! The formats are the contract with users: `docs/formats/` has a page for each. What is read is
+//! checked, and one clear error names file, line and column; what is written appears whole or not
+//! at all.
 #![forbid(unsafe_code)]
+
+mod bundle;
+mod error;
+mod extra;
+mod files;
+mod metadata;
+mod model;
+mod pixel_name;
+pub mod report;
+mod tables;
+mod time;
+
+pub use bundle::{Bundle, TableFormat};
+pub use error::{CellError, Place, TelemetryError, TomlError};
+pub use extra::{ExtraCells, ExtraColumn, ExtraColumns, TextCells};
+pub use files::{Files, Folder, MemoryFiles, Source};
+pub use metadata::{
+    BUNDLE_FORMAT, Frames, ImagesMeta, Metadata, QuaternionSigns, TrackerMeta, VectorFrame,
+};
+pub use model::{
+    EffectEntry, EffectPlace, EffectValue, HemAxes, HemAxis, MODEL_FORMAT, Model, ModelKind,
+    ModelNoise, ModelTracker,
+};
+pub use tables::{AttitudeTable, Housekeeping, RateTable, ReferenceTable, WindowTable};
+pub use time::{Epoch, TimeScale};

@@ -1,0 +1,208 @@
+//! `report.json` and the machine-readable results of the other commands.
+//!
+//! A key that the data cannot give is `null` in the file and `None` (or NaN inside an array) here.
+//!
+//! Source: report format (docs/formats/report.md).
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Deserializer, Serialize};
+
+/// The value of `format` in `report.json`.
+pub const REPORT_FORMAT: &str = "boresight-report/1";
+
+/// What a run of the closed loop found.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Report {
+    /// [`REPORT_FORMAT`].
+    pub format: String,
+    /// The finding in one word.
+    pub verdict: Verdict,
+    /// Number of blocks of time for out-of-fold prediction.
+    pub folds: usize,
+    /// Rows used and left out.
+    pub rows: Rows,
+    /// The declared model at its best.
+    pub before: Errors,
+    /// With the effects listed.
+    pub after: Errors,
+    /// What was added, in order.
+    pub effects: Vec<FoundEffect>,
+    /// What was not added.
+    pub considered: Vec<ConsideredEffect>,
+    /// What is left.
+    pub unattributed: Unattributed,
+}
+
+/// The finding in one word.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Verdict {
+    /// Nothing added, nothing left.
+    Consistent,
+    /// At least one catalogue effect, and nothing left.
+    Explained,
+    /// At least one catalogue effect, and something left.
+    PartlyExplained,
+    /// No catalogue effect, and something left.
+    Unexplained,
+}
+
+/// Rows used and left out.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Rows {
+    /// Rows in the figures.
+    pub used: usize,
+    /// Rows beyond 8 robust sigma of the before residual.
+    pub outliers: usize,
+    /// Rows outside the span of the reference.
+    pub outside_reference: usize,
+}
+
+/// Size of the residuals under a model.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Errors {
+    /// Star residual along x and y, rms over all stars and rows, arcsec.
+    #[serde(deserialize_with = "nan_pair")]
+    pub star_rms_arcsec: Option<[f64; 2]>,
+    /// Attitude residual about x, y, z, rms, arcsec.
+    #[serde(deserialize_with = "nan_triple")]
+    pub attitude_rms_arcsec: Option<[f64; 3]>,
+    /// [M23] Eq. 19 between measured and model PSD of the attitude residual, per degree of freedom.
+    #[serde(deserialize_with = "nan_triple")]
+    pub log_psd_cost: Option<[f64; 3]>,
+    /// Chi-squared per degree of freedom.
+    pub chi2_per_dof: Option<f64>,
+    /// Out-of-fold log-likelihood per frame, nats.
+    pub loglik_per_frame: Option<f64>,
+}
+
+/// An estimated parameter.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Estimate {
+    /// Value.
+    #[serde(deserialize_with = "nan")]
+    pub value: f64,
+    /// 1 sigma.
+    pub sigma: Option<f64>,
+    /// Unit.
+    pub unit: String,
+    /// Where the error is not Gaussian (an instant): bounds that hold the truth with 95 %.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub interval: Option<[f64; 2]>,
+}
+
+/// An effect that was added.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FoundEffect {
+    /// Name in the catalogue, or `empirical`.
+    pub id: String,
+    /// What is not a number to estimate: `star_id`, `channel`, `slot`.
+    pub selectors: BTreeMap<String, Selector>,
+    /// Parameters by name, estimated jointly with all others.
+    pub parameters: BTreeMap<String, Estimate>,
+    /// Gain in out-of-fold log-likelihood, nats.
+    #[serde(deserialize_with = "nan")]
+    pub delta_loglik: f64,
+    /// Chance of such a gain without the effect, the whole search paid for.
+    #[serde(deserialize_with = "nan")]
+    pub p_value: f64,
+    /// Share of the before variance, out of fold.
+    pub variance_explained: Option<f64>,
+    /// Effects that this data can hardly tell from it.
+    pub confusable_with: Vec<Confusable>,
+}
+
+/// The value of a selector.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum Selector {
+    /// A whole number: a star or a slot.
+    Integer(i64),
+    /// A name: a channel or a file.
+    Text(String),
+}
+
+impl From<&str> for Selector {
+    /// Whole numbers become numbers.
+    fn from(text: &str) -> Self {
+        text.parse()
+            .map_or_else(|_| Self::Text(text.into()), Self::Integer)
+    }
+}
+
+/// An effect that looks alike in this data.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Confusable {
+    /// Name in the catalogue.
+    pub id: String,
+    /// Largest correlation of the two estimates.
+    #[serde(deserialize_with = "nan")]
+    pub correlation: f64,
+}
+
+/// An effect that was not added.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ConsideredEffect {
+    /// Name in the catalogue.
+    pub id: String,
+    /// Gain in out-of-fold log-likelihood, nats.
+    pub delta_loglik: Option<f64>,
+    /// Chance of such a gain without the effect.
+    pub p_value: Option<f64>,
+    /// Whether this motion can show it at all.
+    pub observable: bool,
+    /// Size that this data would have shown at 5 sigma, in `unit`.
+    pub detectable: Option<f64>,
+    /// Size at which it would explain the residual by itself, in `unit`.
+    pub needed: Option<f64>,
+    /// The parameter whose size is meant.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub parameter: Option<String>,
+    /// Its unit.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub unit: Option<String>,
+}
+
+/// What no effect explains.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Unattributed {
+    /// Whether something is left.
+    pub present: bool,
+    /// Its share of the before variance.
+    pub variance_fraction: Option<f64>,
+    /// What it follows, largest first.
+    pub depends_on: Vec<Dependence>,
+    /// Frequencies of lines, Hz.
+    pub lines_hz: Vec<f64>,
+    /// Times of jumps, s.
+    pub jumps_s: Vec<f64>,
+}
+
+/// A variable that the leftover follows.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Dependence {
+    /// Name from the list in the format, or two joined by `*`.
+    pub variable: String,
+    /// Share of the leftover's variance.
+    #[serde(deserialize_with = "nan")]
+    pub variance_explained: f64,
+    /// Chance without dependence.
+    #[serde(deserialize_with = "nan")]
+    pub p_value: f64,
+}
+
+/// Reads `null` as NaN: JSON has no other way to say it.
+fn nan<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
+    Ok(Option::deserialize(from)?.unwrap_or(f64::NAN))
+}
+
+fn nan_pair<'de, D: Deserializer<'de>>(from: D) -> Result<Option<[f64; 2]>, D::Error> {
+    let read: Option<[Option<f64>; 2]> = Option::deserialize(from)?;
+    Ok(read.map(|pair| pair.map(|x| x.unwrap_or(f64::NAN))))
+}
+
+fn nan_triple<'de, D: Deserializer<'de>>(from: D) -> Result<Option<[f64; 3]>, D::Error> {
+    let read: Option<[Option<f64>; 3]> = Option::deserialize(from)?;
+    Ok(read.map(|triple| triple.map(|x| x.unwrap_or(f64::NAN))))
+}
