@@ -16,7 +16,7 @@
 //!
 //! which is d(X/Z), d(Y/Z) with (dX, dY, dZ) = theta x (x, y, 1).
 //!
-//! Source: [M23] Eq. 1 (pinhole), Eq. 9 (pixel phase).
+//! Source: \[M23\] Eq. 1 (pinhole), Eq. 9 (pixel phase).
 
 use std::f64::consts::TAU;
 
@@ -248,7 +248,7 @@ impl Camera {
         }
     }
 
-    /// Where a direction in tracker axes falls ([M23] Eq. 1); `None` unless Z > 0. The vector need
+    /// Where a direction in tracker axes falls (\[M23\] Eq. 1); `None` unless Z > 0. The vector need
     /// not be of unit length, and the point need not lie on the detector.
     #[must_use]
     pub fn project(&self, v: &Vector3<f64>) -> Option<Pixel> {

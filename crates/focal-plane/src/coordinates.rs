@@ -9,7 +9,7 @@
 //! x runs along the columns (tracker X), y along the rows (tracker Y). [`Camera`](crate::Camera)
 //! turns one into another; nothing else does.
 //!
-//! Source: [M23] Eq. 1 (pinhole) and Eq. 4 (polynomials over the normalised field).
+//! Source: \[M23\] Eq. 1 (pinhole) and Eq. 4 (polynomials over the normalised field).
 
 /// A point in the tangent plane: `x = X/Z`, `y = Y/Z`, no unit.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -42,9 +42,9 @@
 //! # Ok::<(), focal_plane::CameraError>(())
 //! ```
 //!
-//! [M23]: Miller et al. 2023, star-tracker error models validated on DART and PSP data.
+//! \[M23\]: Miller et al. 2023, star-tracker error models validated on DART and PSP data.
 //!
-//! Source: [M23] Eq. 1 and Section 2 for the pinhole and frames; each module names its own.
+//! Source: \[M23\] Eq. 1 and Section 2 for the pinhole and frames; each module names its own.
 #![forbid(unsafe_code)]
 
 mod attitude;
