@@ -1,0 +1,128 @@
+//! Covariance of the attitude error of a QUEST solution.
+//!
+//! ```text
+//! P = s^2 [I - s^2 sum s_i^-2 w_i w_i^T]^-1,   s^-2 = sum s_i^-2
+//! ```
+//!
+//! in rad^2, for the small rotation theta in tracker axes with `v_meas = v + theta x v`. `s_i` is
+//! the error of star i in rad, per axis across the line of sight, measurement and catalogue together.
+//!
+//! Source: [M23] Eq. 14, with its sum normalised (erratum E4): the printed form lacks the `s^2`
+//! before the sum, and is negative for any real tracker.
+
+use nalgebra::{Matrix3, Vector3};
+
+use crate::QuestError;
+
+/// Covariance of the attitude error, rad^2, tracker axes; `sigma_rad[i]` per axis of star i.
+///
+/// # Errors
+///
+/// As [`quest`](crate::quest) for `measured`, with `sigma_rad` in place of weights.
+///
+/// ```
+/// use nalgebra::Vector3;
+/// // two stars at right angles: each pins two axes, their common normal both of them
+/// let p = quest::covariance(&[Vector3::x(), Vector3::y()], &[1e-5, 1e-5])?;
+/// assert!((p[(2, 2)] / 0.5e-10 - 1.0).abs() < 1e-14);
+/// assert!((p[(0, 0)] / 1e-10 - 1.0).abs() < 1e-14);
+/// # Ok::<(), quest::QuestError>(())
+/// ```
+pub fn covariance(
+    measured: &[Vector3<f64>],
+    sigma_rad: &[f64],
+) -> Result<Matrix3<f64>, QuestError> {
+    let weights = weights_of(measured, sigma_rad)?;
+    crate::single::check("measured", measured)?;
+    let information = information(measured, &weights);
+    let total: f64 = weights.iter().sum();
+    spread_checked(&information, total)?;
+    inverse(&information).ok_or(QuestError::Parallel {
+        set: "measured",
+        spread_rad: 0.0,
+    })
+}
+
+/// [M23] Eq. 14 as printed, `s^2 [I - sum s_i^-2 w_i w_i^T]^-1`: not a covariance (erratum E4), kept
+/// to compare with numbers made by it.
+///
+/// # Errors
+///
+/// As [`covariance`], except that parallel vectors pass.
+pub fn covariance_as_printed(
+    measured: &[Vector3<f64>],
+    sigma_rad: &[f64],
+) -> Result<Matrix3<f64>, QuestError> {
+    let weights = weights_of(measured, sigma_rad)?;
+    crate::single::check("measured", measured)?;
+    let total: f64 = weights.iter().sum();
+    let mut m = Matrix3::identity();
+    for (w, a) in measured.iter().zip(&weights) {
+        m -= w * w.transpose() * *a;
+    }
+    Ok(m.try_inverse().unwrap_or_else(Matrix3::zeros) / total)
+}
+
+fn weights_of(measured: &[Vector3<f64>], sigma_rad: &[f64]) -> Result<Vec<f64>, QuestError> {
+    if measured.len() != sigma_rad.len() {
+        return Err(QuestError::LengthMismatch {
+            measured: measured.len(),
+            reference: measured.len(),
+            weights: sigma_rad.len(),
+        });
+    }
+    if measured.len() < 2 {
+        return Err(QuestError::TooFewStars {
+            got: measured.len(),
+        });
+    }
+    let weight = |(index, &sigma): (usize, &f64)| {
+        let weight = 1.0 / (sigma * sigma);
+        if sigma > 0.0 && weight.is_normal() {
+            Ok(weight)
+        } else {
+            Err(QuestError::NotPositive {
+                name: "sigma_rad",
+                index,
+                value: sigma,
+            })
+        }
+    };
+    sigma_rad.iter().enumerate().map(weight).collect()
+}
+
+/// `sum a (I - w w^T)`, summed as `y^2 + z^2` and the like: near the boresight `1 - z^2` would
+/// cancel, and that is the weak axis.
+pub(crate) fn information(measured: &[Vector3<f64>], weights: &[f64]) -> [f64; 6] {
+    let mut m = [0.0; 6];
+    for (w, &a) in measured.iter().zip(weights) {
+        let a = a / w.norm_squared();
+        m[0] += a * (w.y * w.y + w.z * w.z);
+        m[1] += a * (w.x * w.x + w.z * w.z);
+        m[2] += a * (w.x * w.x + w.y * w.y);
+        m[3] -= a * w.x * w.y;
+        m[4] -= a * w.x * w.z;
+        m[5] -= a * w.y * w.z;
+    }
+    m
+}
+
+/// Error if all vectors lie on one line: the mean square distance from it is the least eigenvalue
+/// of the information at unit weight, and half the gap of exact data.
+fn spread_checked(information: &[f64; 6], total: f64) -> Result<(), QuestError> {
+    let spread = crate::polish::least_eigenvalue(information.map(|x| x / total));
+    if 2.0 * spread >= crate::MIN_GAP {
+        return Ok(());
+    }
+    Err(QuestError::Parallel {
+        set: "measured",
+        spread_rad: spread.max(0.0).sqrt(),
+    })
+}
+
+/// Inverse of a positive definite symmetric matrix, if it is one.
+pub(crate) fn inverse(m: &[f64; 6]) -> Option<Matrix3<f64>> {
+    let [xx, yy, zz, xy, xz, yz] = *m;
+    let full = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
+    full.cholesky().map(|c| c.inverse())
+}
