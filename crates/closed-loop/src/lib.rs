@@ -1,2 +1,36 @@
-//! Residual, cause, better model: the loop from telemetry back to the model.
+//! The loop from telemetry back to the model: what is left, what causes it, and
+//! how much better the model is with it.
+//!
+//! [`close`] takes a declared model and a bundle. It estimates everything that the
+//! model declares unknown, looks among the effects of the catalogue for those
+//! that the residual supports out of fold, and reports the error before and
+//! after on data that took no part in the fit.
 #![forbid(unsafe_code)]
+
+mod attitude_data;
+mod attitude_loop;
+mod close;
+mod coloured;
+mod declared;
+mod directions;
+mod empirical;
+mod error;
+mod evidence;
+mod figures;
+mod fit;
+mod folds;
+mod gram;
+mod image_level;
+mod images;
+mod nuisance;
+mod robust;
+mod search;
+mod selection;
+mod situation;
+mod star_data;
+mod star_design;
+mod star_loop;
+
+pub use close::{AttitudeResiduals, Closed, Rival, StarResiduals, close};
+pub use error::CloseError;
+pub use images::{DarkMap, DarkPixel};

@@ -1,0 +1,207 @@
+//! Attitude measurements against a reference: the residual rotation per axis.
+//!
+//! ```text
+//! theta = log(q_measured q_reference^-1)       rad, tracker axes; arcsec here
+//! ```
+//!
+//! Each axis is whitened by its own noise, so that a noisy boresight axis does not
+//! drown the others and a slow error of the reference is no trend.
+//!
+//! Source: [M23] Section 4 (residuals by differencing quaternions).
+
+use std::ops::Range;
+
+use effects::{AttitudeRows, Candidate};
+use focal_plane::{ARCSEC_PER_RAD, AttitudeSeries, AttitudeSource, VectorsMut, rotation_vector};
+use nalgebra::{DMatrix, UnitQuaternion};
+
+use crate::coloured::Coloured;
+use crate::evidence::{Amplitudes, Evidence, Residuals};
+use crate::folds::Folds;
+use crate::gram::Design;
+
+/// Rows of attitude residuals, structure of arrays.
+#[derive(Clone, Debug)]
+pub(crate) struct AttitudeData {
+    pub(crate) t_s: Vec<f64>,
+    /// Residual per axis, arcsec.
+    pub(crate) theta: [Vec<f64>; 3],
+    /// Rate per axis, rad/s; zero where unknown.
+    pub(crate) rate: [Vec<f64>; 3],
+    /// Rows left out, per axis.
+    pub(crate) outlier: [Vec<bool>; 3],
+    /// Rows set aside because the reference does not cover them.
+    pub(crate) outside_reference: usize,
+}
+
+impl AttitudeData {
+    /// Differences `q` (at `t_s`) against the reference.
+    pub(crate) fn against(t_s: &[f64], q: &[UnitQuaternion<f64>], reference: &AttitudeSeries) -> Self {
+        let mut data = Self {
+            t_s: Vec::new(),
+            theta: Default::default(),
+            rate: Default::default(),
+            outlier: Default::default(),
+            outside_reference: 0,
+        };
+        for (&t, q) in t_s.iter().zip(q) {
+            let Some(true_attitude) = reference.attitude(t) else {
+                data.outside_reference += 1;
+                continue;
+            };
+            let theta = rotation_vector(q, &true_attitude) * ARCSEC_PER_RAD;
+            let rate = reference.rate_rad_s(t).unwrap_or_default();
+            data.t_s.push(t);
+            for axis in 0..3 {
+                data.theta[axis].push(theta[axis]);
+                data.rate[axis].push(rate[axis]);
+                data.outlier[axis].push(false);
+            }
+        }
+        data
+    }
+
+    /// Rows as effects see them.
+    pub(crate) fn rows<'a>(&'a self, rows: Range<usize>, attitude: Option<&'a dyn AttitudeSource>) -> AttitudeRows<'a> {
+        AttitudeRows {
+            t_s: &self.t_s[rows.clone()],
+            wx_rad_s: &self.rate[0][rows.clone()],
+            wy_rad_s: &self.rate[1][rows.clone()],
+            wz_rad_s: &self.rate[2][rows],
+            attitude,
+        }
+    }
+}
+
+/// Attitude residuals as evidence: a constant an axis, coloured noise an axis.
+pub(crate) struct AttitudeEvidence<'a> {
+    pub(crate) data: &'a AttitudeData,
+    /// 1 sigma of each constant, arcsec; infinite = free.
+    pub(crate) constant_sigma: [f64; 3],
+    /// Noise of each axis: rows are whitened with it.
+    pub(crate) noise: [Coloured; 3],
+    pub(crate) motion: Option<&'a dyn AttitudeSource>,
+}
+
+impl AttitudeEvidence<'_> {
+    /// Constants and candidates of `rows`, arcsec, x then y then z of every row.
+    fn raw(&self, rows: Range<usize>, candidates: &[&dyn Candidate]) -> DMatrix<f64> {
+        let n = rows.len();
+        let width = 3 + candidates.iter().map(|c| c.coefficients().len()).sum::<usize>();
+        let mut out = DMatrix::zeros(3 * n, width);
+        let seen = self.data.rows(rows, self.motion);
+        let mut columns: [Vec<f64>; 3] = Default::default();
+        for axis in 0..3 {
+            out.view_mut((axis * n, axis), (n, 1)).fill(1.0);
+        }
+        let mut column = 3;
+        for candidate in candidates {
+            let p = candidate.coefficients().len();
+            for axis in &mut columns {
+                axis.clear();
+                axis.resize(p * n, 0.0);
+            }
+            let [x, y, z] = &mut columns;
+            if candidate.attitude_columns(&seen, VectorsMut { x, y, z }) {
+                for (axis, values) in columns.iter().enumerate() {
+                    for j in 0..p {
+                        for i in 0..n {
+                            out[(axis * n + i, column + j)] = values[j * n + i] * ARCSEC_PER_RAD;
+                        }
+                    }
+                }
+            }
+            column += p;
+        }
+        out
+    }
+}
+
+/// Whitened columns of the whole series, handed out by rows.
+struct WhitenedDesign<'a> {
+    data: &'a AttitudeData,
+    columns: DMatrix<f64>,
+}
+
+impl Design for WhitenedDesign<'_> {
+    fn width(&self) -> usize {
+        self.columns.ncols()
+    }
+
+    fn fill(&self, rows: Range<usize>, out: &mut DMatrix<f64>) -> usize {
+        let (n, all) = (rows.len(), self.data.t_s.len());
+        *out = DMatrix::zeros(3 * n, self.width());
+        let mut scalars = 0;
+        for axis in 0..3 {
+            out.rows_mut(axis * n, n).copy_from(&self.columns.rows(axis * all + rows.start, n));
+            scalars += rows.clone().filter(|&k| !self.data.outlier[axis][k]).count();
+        }
+        scalars
+    }
+}
+
+impl Evidence for AttitudeEvidence<'_> {
+    fn frames(&self) -> usize {
+        self.data.t_s.len()
+    }
+
+    fn precision(&self) -> Vec<f64> {
+        self.constant_sigma.iter().map(|s| if s.is_finite() { 1.0 / (s * s) } else { 0.0 }).collect()
+    }
+
+    fn residual_columns(&self) -> usize {
+        1
+    }
+
+    fn variance_guess(&self) -> f64 {
+        1.0
+    }
+
+    fn design<'a>(&'a self, candidates: &'a [&'a dyn Candidate]) -> Box<dyn Design + 'a> {
+        let n = self.data.t_s.len();
+        let mut columns = self.raw(0..n, candidates);
+        let width = columns.ncols();
+        columns = columns.insert_column(width, 0.0);
+        for axis in 0..3 {
+            for k in 0..n {
+                columns[(axis * n + k, width)] = self.data.theta[axis][k];
+            }
+            for mut column in columns.column_iter_mut() {
+                let slice = &mut column.as_mut_slice()[axis * n..(axis + 1) * n];
+                self.noise[axis].whiten(&self.data.t_s, &self.data.outlier[axis], &mut [slice]);
+            }
+        }
+        Box::new(WhitenedDesign { data: self.data, columns })
+    }
+
+    /// The constants of the figures are plain means over the other folds: those
+    /// of a generalised fit would carry the slow noise of a distant fold along.
+    fn residuals(&self, folds: &Folds, candidates: &[&dyn Candidate], amplitudes: &Amplitudes) -> Residuals {
+        let n = self.data.t_s.len();
+        let raw = self.raw(0..n, candidates);
+        let fold = folds.fold_of_frame();
+        let mut out = Residuals { axes: vec![vec![0.0; n]; 3], modelled: vec![vec![0.0; n]; 3] };
+        for f in 0..folds.count {
+            let shift = raw.columns_range(3..) * &amplitudes.candidates[f];
+            for axis in 0..3 {
+                let left = |k: usize| self.data.theta[axis][k] - shift[axis * n + k];
+                let train: Vec<f64> = (0..n)
+                    .filter(|&k| fold[k] != f && !self.data.outlier[axis][k])
+                    .map(left)
+                    .collect();
+                let count = train.len().max(1) as f64;
+                let free = train.iter().sum::<f64>() / count;
+                // A declared spread pulls the mean toward zero as far as the data is poor.
+                let noise = self.noise[axis];
+                let variance = (noise.white.powi(2) + noise.slow.powi(2)) / count;
+                let prior = self.constant_sigma[axis].powi(2);
+                let constant = if prior.is_finite() { free * prior / (prior + variance) } else { free };
+                for k in (0..n).filter(|&k| fold[k] == f) {
+                    out.axes[axis][k] = left(k) - constant;
+                    out.modelled[axis][k] = shift[axis * n + k] + constant;
+                }
+            }
+        }
+        out
+    }
+}

@@ -1,0 +1,250 @@
+//! The loop at attitude level: the tracker's own attitude against a reference.
+//!
+//! The noise of each axis is fitted twice: on the before residual, which lets a
+//! slow effect pass for noise and is the cautious start, and again with the
+//! found effects taken out.
+//!
+//! Not physics: the order of the steps.
+
+use effects::{Candidate, Scene};
+
+use crate::attitude_data::{AttitudeData, AttitudeEvidence};
+use crate::close::{AttitudeResiduals, Closed, catalogue_candidates};
+use crate::coloured::Coloured;
+use crate::empirical::{EMPIRICAL, Empirical, Variable};
+use crate::error::CloseError;
+use crate::evidence::{Evidence, Residuals};
+use crate::figures;
+use crate::fit::Fits;
+use crate::folds::Folds;
+use crate::robust;
+use crate::search::{Found, amplitudes, borrowed, fit, search};
+use crate::situation::Situation;
+use crate::star_data::median_step;
+use focal_plane::{AttitudeSource, Series};
+use telemetry::report::{Errors, Report, Rows};
+
+/// Fewest frames from which an effect and its noise can both be had.
+const MIN_FRAMES: usize = 20;
+/// Searches with ever better noise.
+const NOISE_ROUNDS: usize = 2;
+
+pub(crate) fn run(situation: &Situation<'_>, progress: &dyn Fn(&str)) -> Result<Closed, CloseError> {
+    let table = situation.bundle.attitude.as_ref().ok_or(CloseError::NothingToCompare("no attitude"))?;
+    let reference = situation.reference.as_ref().ok_or(CloseError::NothingToCompare(
+        "the bundle has an attitude but no reference to hold it against",
+    ))?;
+    let mut data = AttitudeData::against(&table.t_s, &table.q, reference);
+    if data.t_s.len() < MIN_FRAMES {
+        return Err(CloseError::TooFewFrames {
+            frames: data.t_s.len(),
+            need: MIN_FRAMES,
+            why: "the others lie outside the reference or in its gaps",
+        });
+    }
+    let folds = Folds::cut(data.t_s.len());
+    let motion: &dyn AttitudeSource = reference;
+    progress("residuals of the declared model");
+    let before = settle(&mut data, situation, &folds, motion)?;
+
+    let scene = scene(situation, &data);
+    let mut noise = fit_noise(&data, &before);
+    let mut outcome = None;
+    for _ in 0..NOISE_ROUNDS {
+        progress("searching for causes");
+        let evidence = evidence(&data, situation, noise, motion);
+        let mut candidates = catalogue_candidates(&scene);
+        candidates.retain(|c| c.acts_on_attitude());
+        candidates.extend(leftover_terms(situation, &data));
+        let found = search(&evidence, &folds, candidates, &|c| c.id() != EMPIRICAL)?;
+        let after = residuals(&evidence, &folds, &found, &found.selection.chosen)?;
+        noise = fit_noise(&data, &after);
+        let settled = found.selection.chosen.is_empty();
+        outcome = Some((found, after));
+        if settled {
+            break;
+        }
+    }
+    let (found, after) = outcome.ok_or(CloseError::Singular)?;
+    progress("figures");
+    finish(situation, &data, &folds, noise, motion, &found, before, after)
+}
+
+/// The before residual, with outliers marked per axis.
+fn settle(
+    data: &mut AttitudeData,
+    situation: &Situation<'_>,
+    folds: &Folds,
+    motion: &dyn AttitudeSource,
+) -> Result<Residuals, CloseError> {
+    let white = [Coloured::WHITE; 3];
+    loop {
+        let evidence = evidence(data, situation, white, motion);
+        let fitted = fit(&evidence, folds, &[])?;
+        let amplitudes = amplitudes(&fitted, folds, &[], 0).ok_or(CloseError::Singular)?;
+        let before = evidence.residuals(folds, &[], &amplitudes);
+        let group = vec![0; data.t_s.len()];
+        let added: usize = (0..3)
+            .map(|axis| robust::mark_outliers(&before.axes[axis], &group, 1, &mut data.outlier[axis]))
+            .sum();
+        if added == 0 {
+            return Ok(before);
+        }
+    }
+}
+
+fn evidence<'a>(
+    data: &'a AttitudeData,
+    situation: &Situation<'_>,
+    noise: [Coloured; 3],
+    motion: &'a dyn AttitudeSource,
+) -> AttitudeEvidence<'a> {
+    AttitudeEvidence {
+        data,
+        constant_sigma: situation
+            .model
+            .noise
+            .bias_arcsec
+            .map_or([f64::INFINITY; 3], |b| b.map(|s| if s > 0.0 { s } else { f64::INFINITY })),
+        noise,
+        motion: Some(motion),
+    }
+}
+
+fn fit_noise(data: &AttitudeData, residual: &Residuals) -> [Coloured; 3] {
+    std::array::from_fn(|axis| Coloured::fit(&data.t_s, &residual.axes[axis], &data.outlier[axis]))
+}
+
+fn residuals(
+    evidence: &AttitudeEvidence<'_>,
+    folds: &Folds,
+    found: &Found,
+    chosen: &[usize],
+) -> Result<Residuals, CloseError> {
+    let columns = found.candidates.iter().map(|c| c.coefficients().len()).sum();
+    let amplitudes =
+        amplitudes(&found.fitted, folds, chosen, columns).ok_or(CloseError::Singular)?;
+    Ok(evidence.residuals(folds, &borrowed(&found.candidates), &amplitudes))
+}
+
+fn scene<'a>(situation: &'a Situation<'_>, data: &AttitudeData) -> Scene<'a> {
+    Scene {
+        surroundings: situation.surroundings(),
+        has_stars: false,
+        has_catalogue: false,
+        has_reference: true,
+        has_attitude: true,
+        stars: &[],
+        exposure_s: situation.exposure_s(),
+        step_s: median_step(&data.t_s).unwrap_or(f64::INFINITY),
+        rows: None,
+    }
+}
+
+/// Time and every housekeeping channel but velocities, which belong to
+/// aberration alone.
+fn leftover_terms(situation: &Situation<'_>, data: &AttitudeData) -> Vec<Box<dyn Candidate>> {
+    let range = |values: &mut dyn Iterator<Item = f64>| {
+        values.filter(|v| v.is_finite()).fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| {
+            [low.min(v), high.max(v)]
+        })
+    };
+    let mut terms: Vec<Box<dyn Candidate>> = Vec::new();
+    let mut add = |variable: Variable, range: [f64; 2]| {
+        if let Some(term) = Empirical::new(variable, range, false) {
+            terms.push(Box::new(term));
+        }
+    };
+    add(Variable::Time, range(&mut data.t_s.iter().copied()));
+    for (name, series) in channels_of_interest(&situation.channels) {
+        add(Variable::Housekeeping(name, series.clone()), range(&mut series.value().iter().copied()));
+    }
+    terms
+}
+
+/// Channels that an empirical term may follow.
+pub(crate) fn channels_of_interest(
+    channels: &std::collections::BTreeMap<String, Series>,
+) -> impl Iterator<Item = (String, &Series)> {
+    channels
+        .iter()
+        .filter(|(name, _)| !["vx_", "vy_", "vz_"].iter().any(|v| name.starts_with(v)))
+        .map(|(name, series)| (name.clone(), series))
+}
+
+fn finish(
+    situation: &Situation<'_>,
+    data: &AttitudeData,
+    folds: &Folds,
+    noise: [Coloured; 3],
+    motion: &dyn AttitudeSource,
+    found: &Found,
+    before: Residuals,
+    after: Residuals,
+) -> Result<Closed, CloseError> {
+    let chosen = &found.selection.chosen;
+    let evidence = evidence(data, situation, noise, motion);
+    let power = |r: &Residuals| -> f64 {
+        (0..3).filter_map(|a| figures::rms(&r.axes[a], &data.outlier[a])).map(|v| v * v).sum()
+    };
+    let whole = power(&before);
+    let mut explained = Vec::new();
+    let mut last = whole;
+    for k in 0..chosen.len() {
+        let now = power(&residuals(&evidence, folds, found, &chosen[..=k])?);
+        explained.push((last - now) / whole);
+        last = now;
+    }
+    let (effects, entries) = figures::effects_found(found, &explained, &situation.surroundings())?;
+    let mut model = situation.model.clone();
+    model.effects.extend(entries);
+    let unattributed = figures::unattributed(found, last / whole);
+    let errors = |r: &Residuals, set: &[usize]| Errors {
+        star_rms_arcsec: None,
+        attitude_rms_arcsec: Some(std::array::from_fn(|a| {
+            figures::rms(&r.axes[a], &data.outlier[a]).unwrap_or(f64::NAN)
+        })),
+        log_psd_cost: None,
+        chi2_per_dof: None,
+        loglik_per_frame: loglik_per_frame(&found.fitted.fits, found, set, data.t_s.len()),
+    };
+    let outliers: Vec<bool> =
+        (0..data.t_s.len()).map(|k| (0..3).any(|a| data.outlier[a][k])).collect();
+    let count = outliers.iter().filter(|o| **o).count();
+    let report = Report {
+        format: telemetry::report::REPORT_FORMAT.to_owned(),
+        verdict: figures::verdict(!effects.is_empty(), unattributed.present),
+        folds: folds.count,
+        rows: Rows {
+            used: data.t_s.len() - count,
+            outliers: count,
+            outside_reference: data.outside_reference,
+        },
+        before: errors(&before, &[]),
+        after: errors(&after, chosen),
+        effects,
+        considered: figures::considered(found, 0.0),
+        unattributed,
+    };
+    let [bx, by, bz]: [Vec<f64>; 3] = before.axes.try_into().unwrap_or_default();
+    let [ax, ay, az]: [Vec<f64>; 3] = after.axes.try_into().unwrap_or_default();
+    Ok(Closed {
+        report,
+        model,
+        stars: None,
+        attitude: Some(AttitudeResiduals {
+            t_s: data.t_s.clone(),
+            before_arcsec: [bx, by, bz],
+            after_arcsec: [ax, ay, az],
+            fold: folds.fold_of_frame(),
+            outlier: outliers,
+        }),
+        dark_map: None,
+        rivals: Vec::new(),
+    })
+}
+
+fn loglik_per_frame(fits: &Fits, found: &Found, chosen: &[usize], frames: usize) -> Option<f64> {
+    let set = crate::selection::columns_of(&found.fitted.groups, chosen);
+    fits.out_of_fold(&set).map(|o| o.total_loglik() / frames as f64)
+}

@@ -1,0 +1,107 @@
+//! The loop: residual, cause, better model, residual again.
+//!
+//! One pipeline for every kind of bundle. Stars are the measurement where there
+//! are any, the attitude otherwise; a reference, a catalogue and raw images are
+//! each optional and only change what is unknown.
+//!
+//! ```text
+//! measurement -> before residual -> outliers -> candidates -> search -> after residual -> leftover
+//! ```
+//!
+//! Source: formats.md of the design notes (`close` writes) for what *before*,
+//! *after*, the folds and the figures mean.
+
+use effects::Candidate;
+use telemetry::report::Report;
+use telemetry::{Bundle, Model};
+
+use crate::attitude_loop;
+use crate::error::CloseError;
+use crate::situation::Situation;
+use crate::star_loop;
+
+/// Everything a run of the loop finds.
+#[derive(Clone, Debug)]
+pub struct Closed {
+    /// The finished report.
+    pub report: Report,
+    /// The model with what was added.
+    pub model: Model,
+    /// Star residuals before and after, a row each.
+    pub stars: Option<StarResiduals>,
+    /// Attitude residuals before and after, a row each.
+    pub attitude: Option<AttitudeResiduals>,
+    /// The dark map, where one was estimated and adopted.
+    pub dark_map: Option<crate::images::DarkMap>,
+    /// How rival explanations at image level compare, where there are images.
+    pub rivals: Vec<Rival>,
+}
+
+/// One explanation of an image-level leftover beside others.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Rival {
+    /// What was tried: one effect, or several joined by `+`.
+    pub what: String,
+    /// Out-of-fold star rms along x and y, arcsec.
+    pub star_rms_arcsec: [f64; 2],
+    /// Gain in out-of-fold log-likelihood over the declared model, nats.
+    pub delta_loglik: f64,
+}
+
+/// Star residuals as columns, one entry a row of the `stars` table that was used.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct StarResiduals {
+    /// Time of the frame, s.
+    pub t_s: Vec<f64>,
+    /// Slot.
+    pub slot: Vec<i32>,
+    /// Star.
+    pub star_id: Vec<i64>,
+    /// Measured position, centred px.
+    pub x_px: Vec<f64>,
+    /// Measured position, centred px.
+    pub y_px: Vec<f64>,
+    /// Residual under the declared model at its best, x and y, arcsec, out of fold.
+    pub before_arcsec: [Vec<f64>; 2],
+    /// Residual with the added effects.
+    pub after_arcsec: [Vec<f64>; 2],
+    /// Fold of the row.
+    pub fold: Vec<usize>,
+    /// Left out of the figures.
+    pub outlier: Vec<bool>,
+}
+
+/// Attitude residuals as columns, one entry an attitude that the reference covers.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct AttitudeResiduals {
+    /// Time, s.
+    pub t_s: Vec<f64>,
+    /// Rotation left under the declared model at its best, x, y, z, arcsec, out of fold.
+    pub before_arcsec: [Vec<f64>; 3],
+    /// With the added effects.
+    pub after_arcsec: [Vec<f64>; 3],
+    /// Fold of the row.
+    pub fold: Vec<usize>,
+    /// Left out of the figures of at least one axis.
+    pub outlier: Vec<bool>,
+}
+
+/// Closes the loop between `model` and `bundle`. `progress` hears what is being
+/// done, in words.
+///
+/// # Errors
+/// When model and bundle do not fit together, nothing can be compared, or too
+/// little data is left; see [`CloseError`].
+pub fn close(model: &Model, bundle: &Bundle, progress: &dyn Fn(&str)) -> Result<Closed, CloseError> {
+    let situation = Situation::join(model, bundle)?;
+    if bundle.stars.is_some() {
+        star_loop::run(&situation, progress)
+    } else {
+        attitude_loop::run(&situation, progress)
+    }
+}
+
+/// Candidates of every effect of the catalogue that the scene allows.
+pub(crate) fn catalogue_candidates(scene: &effects::Scene<'_>) -> Vec<Box<dyn Candidate>> {
+    effects::catalogue().iter().flat_map(|kind| kind.candidates(scene)).collect()
+}

@@ -1,0 +1,92 @@
+//! Star directions and frame attitudes from the centroids alone.
+//!
+//! Without a reference every frame's attitude is a free unknown, and without a
+//! catalogue every star's direction is an unknown constant. Both follow from the
+//! centroids by alternation, started in the tracker axes of the fullest frame:
+//!
+//! ```text
+//! q_k = QUEST( camera(x_ik, y_ik), u_i )          u_i = mean_k q_k^-1 camera(x_ik, y_ik)
+//! ```
+//!
+//! The frame is fixed up to one common rotation, which no residual sees. The
+//! alternation only has to bring the directions within the linear range: what is
+//! left is solved exactly, with everything else, in the normal equations.
+//!
+//! Source: [M23] Eq. 12 for the attitude; the mean direction is the
+//! least-squares one for small errors.
+
+use focal_plane::{Camera, Pixel, StarFrames};
+use nalgebra::{UnitQuaternion, Vector3};
+
+/// Alternations; each shrinks the error of a star that joins late by about the
+/// share of its frames among all.
+const ALTERNATIONS: usize = 12;
+
+/// Attitude of each frame and direction of each star.
+#[derive(Clone, Debug)]
+pub(crate) struct Solved {
+    /// Inertial to tracker, `None` where a frame has fewer than two usable stars.
+    pub(crate) attitude: Vec<Option<UnitQuaternion<f64>>>,
+    /// One unit vector a star.
+    pub(crate) direction: Vec<Vector3<f64>>,
+}
+
+/// Attitudes of frames whose stars' directions are known.
+pub(crate) fn attitudes(
+    camera: &Camera,
+    frames: &StarFrames,
+    star: &[usize],
+    direction: &[Option<Vector3<f64>>],
+) -> Vec<Option<UnitQuaternion<f64>>> {
+    let (mut w, mut v, mut weights) = (Vec::new(), Vec::new(), Vec::new());
+    (0..frames.frames())
+        .map(|k| {
+            w.clear();
+            v.clear();
+            for row in frames.rows_of(k) {
+                if let Some(u) = direction[star[row]] {
+                    w.push(camera.direction(Pixel { x: frames.x_px[row], y: frames.y_px[row] }));
+                    v.push(u);
+                }
+            }
+            weights.clear();
+            weights.resize(w.len(), 1.0);
+            quest::quest(&w, &v, &weights).ok().map(|s| s.q)
+        })
+        .collect()
+}
+
+/// Directions and attitudes when neither is given. `star[row] < stars`.
+pub(crate) fn solve(camera: &Camera, frames: &StarFrames, star: &[usize], stars: usize) -> Solved {
+    let seen: Vec<Vector3<f64>> = (0..frames.rows())
+        .map(|r| camera.direction(Pixel { x: frames.x_px[r], y: frames.y_px[r] }))
+        .collect();
+    let mut direction: Vec<Option<Vector3<f64>>> = vec![None; stars];
+    let fullest = (0..frames.frames()).max_by_key(|&k| (frames.rows_of(k).len(), std::cmp::Reverse(k)));
+    if let Some(k) = fullest {
+        for row in frames.rows_of(k) {
+            direction[star[row]] = Some(seen[row]);
+        }
+    }
+    let mut attitude = attitudes(camera, frames, star, &direction);
+    for _ in 0..ALTERNATIONS {
+        let mut sum = vec![Vector3::zeros(); stars];
+        for (k, q) in attitude.iter().enumerate() {
+            if let Some(q) = q {
+                for row in frames.rows_of(k) {
+                    sum[star[row]] += q.inverse() * seen[row];
+                }
+            }
+        }
+        for (u, s) in direction.iter_mut().zip(&sum) {
+            if s.norm_squared() > 0.0 {
+                *u = Some(s.normalize());
+            }
+        }
+        attitude = attitudes(camera, frames, star, &direction);
+    }
+    Solved {
+        attitude,
+        direction: direction.into_iter().map(|u| u.unwrap_or_else(Vector3::z)).collect(),
+    }
+}

@@ -1,0 +1,44 @@
+//! What can go wrong between a bundle and its report.
+
+use thiserror::Error;
+
+/// Why the loop cannot be closed on this input.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum CloseError {
+    /// The files themselves are bad.
+    #[error(transparent)]
+    Telemetry(#[from] telemetry::TelemetryError),
+    /// A declared effect cannot be built.
+    #[error(transparent)]
+    Effect(#[from] effects::EffectError),
+    /// Model and bundle describe different cameras.
+    #[error("the model's tracker and the bundle's differ: {what} is {model} in the model, {bundle} in the bundle")]
+    TrackersDiffer {
+        /// The quantity.
+        what: &'static str,
+        /// As the model has it.
+        model: f64,
+        /// As the bundle has it.
+        bundle: f64,
+    },
+    /// Neither model nor bundle says what the camera is.
+    #[error("neither the model nor the bundle gives the tracker's pixels and focal length (or field of view)")]
+    NoCamera,
+    /// Nothing can be compared with anything.
+    #[error("nothing to compare: {0}")]
+    NothingToCompare(&'static str),
+    /// Too little is left after rows were set aside.
+    #[error("{frames} usable frames of at least {need} needed ({why})")]
+    TooFewFrames {
+        /// Frames that remain.
+        frames: usize,
+        /// The least that is needed.
+        need: usize,
+        /// Where the others went.
+        why: &'static str,
+    },
+    /// The declared unknowns cannot be solved for.
+    #[error("the declared unknowns cannot be estimated from this data: the normal equations are singular")]
+    Singular,
+}

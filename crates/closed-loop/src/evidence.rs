@@ -1,0 +1,47 @@
+//! What the loop asks of a kind of measurement.
+//!
+//! Stars and attitudes differ in what a row is, in what the declared model
+//! leaves unknown, and in how a residual is weighed. Everything else (folds,
+//! candidates, selection, refinement, figures) is one pipeline over this trait.
+//!
+//! Not physics: an interface.
+
+use effects::Candidate;
+use nalgebra::DVector;
+
+use crate::folds::Folds;
+use crate::gram::Design;
+
+/// Amplitudes to predict with: of each fold from the others.
+#[derive(Clone, Debug)]
+pub(crate) struct Amplitudes {
+    /// Nuisance amplitudes, a fold each.
+    pub(crate) nuisance: Vec<DVector<f64>>,
+    /// Amplitudes of all candidate columns (zero where not chosen), a fold each.
+    pub(crate) candidates: Vec<DVector<f64>>,
+}
+
+/// Residuals of every row, arcsec, in the measurement's own axes.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Residuals {
+    /// One series an axis: two for stars, three for attitudes.
+    pub(crate) axes: Vec<Vec<f64>>,
+    /// What the fitted unknowns and candidates shift each row by, arcsec.
+    pub(crate) modelled: Vec<Vec<f64>>,
+}
+
+/// A kind of measurement.
+pub(crate) trait Evidence: Sync {
+    /// Instants of measurement.
+    fn frames(&self) -> usize;
+    /// Prior precision of each nuisance column, 1/arcsec^2 (or free: 0).
+    fn precision(&self) -> Vec<f64>;
+    /// Residual columns (see [`crate::fit::Layout`]).
+    fn residual_columns(&self) -> usize;
+    /// First guess of the noise variance of a scalar of the design.
+    fn variance_guess(&self) -> f64;
+    /// The columns with `candidates` in them.
+    fn design<'a>(&'a self, candidates: &'a [&'a dyn Candidate]) -> Box<dyn Design + 'a>;
+    /// Out-of-fold residuals of every row, outliers included.
+    fn residuals(&self, folds: &Folds, candidates: &[&dyn Candidate], amplitudes: &Amplitudes) -> Residuals;
+}

@@ -1,0 +1,231 @@
+//! Findings turned into the report: effects with their sigmas, what was
+//! considered, what is left.
+//!
+//! ```text
+//! variance explained   share of the before mean square that goes, out of fold
+//! detectable           5 sigma of the amplitude that was not added
+//! needed               amplitude whose mean square equals what is left over noise
+//! ```
+//!
+//! Source: formats.md of the design notes (report.json).
+
+use std::collections::BTreeMap;
+
+use effects::Surroundings;
+use nalgebra::DMatrix;
+use telemetry::report::{
+    Confusable, ConsideredEffect, Dependence, Estimate, FoundEffect, Selector, Unattributed, Verdict,
+};
+use telemetry::{EffectEntry, EffectValue};
+
+use crate::empirical::EMPIRICAL;
+use crate::error::CloseError;
+use crate::evidence::Residuals;
+use crate::search::Found;
+use crate::selection::{FAMILY_ALPHA, columns_of};
+use crate::star_data::StarData;
+
+/// Correlations below this are not worth a reader's time.
+const CONFUSABLE: f64 = 0.3;
+
+/// The added effects, in the order added, with joint estimates from all data.
+/// `explained` is the share of the before variance of each.
+pub(crate) fn effects_found(
+    found: &Found,
+    explained: &[f64],
+    surroundings: &Surroundings<'_>,
+) -> Result<(Vec<FoundEffect>, Vec<EffectEntry>), CloseError> {
+    let chosen = &found.selection.chosen;
+    let set = columns_of(&found.fitted.groups, chosen);
+    let mut effects = Vec::new();
+    let mut entries = Vec::new();
+    let Some(estimate) = found.fitted.fits.estimate(&set) else { return Ok((effects, entries)) };
+    for (k, &g) in chosen.iter().enumerate() {
+        let candidate = found.candidates[g].as_ref();
+        let (values, covariance) = amplitudes_of(found, g, &set, &estimate);
+        let reported = effects::reported(candidate, &values, covariance.as_view(), surroundings)?;
+        let judged = &found.selection.judged[g];
+        let selectors = candidate.selectors();
+        let mut parameters = BTreeMap::new();
+        let mut written = BTreeMap::new();
+        for (parameter, sigma) in reported {
+            written.insert(parameter.name.clone(), EffectValue::Number(parameter.value));
+            parameters.insert(
+                parameter.name,
+                Estimate {
+                    value: parameter.value,
+                    sigma: (sigma > 0.0).then_some(sigma),
+                    unit: parameter.unit.to_owned(),
+                    interval: None,
+                },
+            );
+        }
+        for (key, value) in &selectors {
+            written.insert(key.clone(), EffectValue::Text(value.clone()));
+        }
+        effects.push(FoundEffect {
+            id: candidate.id().to_owned(),
+            selectors: selectors.iter().map(|(k, v)| (k.clone(), Selector::from(v.as_str()))).collect(),
+            parameters,
+            delta_loglik: judged.delta_loglik,
+            p_value: judged.p_value,
+            variance_explained: explained.get(k).copied(),
+            confusable_with: confusable(found, g),
+        });
+        entries.push(EffectEntry::new(candidate.id(), written));
+    }
+    Ok((effects, entries))
+}
+
+/// Amplitudes of candidate `g` (zero for columns that the data cannot show) and
+/// their covariance, out of a joint estimate on `set`.
+fn amplitudes_of(
+    found: &Found,
+    g: usize,
+    set: &[usize],
+    estimate: &crate::fit::Estimate,
+) -> (Vec<f64>, DMatrix<f64>) {
+    let first: usize = found.candidates[..g].iter().map(|c| c.coefficients().len()).sum();
+    let p = found.candidates[g].coefficients().len();
+    let at: Vec<Option<usize>> = (0..p).map(|j| set.iter().position(|&c| c == first + j)).collect();
+    let values = at.iter().map(|a| a.map_or(0.0, |i| estimate.value[i])).collect();
+    let covariance = DMatrix::from_fn(p, p, |i, j| match (at[i], at[j]) {
+        (Some(i), Some(j)) => estimate.covariance[(i, j)],
+        _ => 0.0,
+    });
+    (values, covariance)
+}
+
+/// Other catalogue effects whose columns resemble those of `g`.
+fn confusable(found: &Found, g: usize) -> Vec<Confusable> {
+    let mut best: BTreeMap<&str, f64> = BTreeMap::new();
+    for (other, group) in found.fitted.groups.iter().enumerate() {
+        let id = found.candidates[other].id();
+        if other == g || id == EMPIRICAL || id == found.candidates[g].id() {
+            continue;
+        }
+        for &a in &found.fitted.groups[g].columns {
+            for &b in &group.columns {
+                let likeness = found.fitted.fits.likeness(a, b);
+                let known = best.entry(id).or_insert(0.0);
+                if likeness.abs() > known.abs() {
+                    *known = likeness;
+                }
+            }
+        }
+    }
+    let mut list: Vec<Confusable> = best
+        .into_iter()
+        .filter(|(_, c)| c.abs() >= CONFUSABLE)
+        .map(|(id, correlation)| Confusable { id: id.to_owned(), correlation })
+        .collect();
+    list.sort_by(|a, b| b.correlation.abs().total_cmp(&a.correlation.abs()));
+    list
+}
+
+/// Every effect of the catalogue that was not added.
+pub(crate) fn considered(found: &Found, excess: f64) -> Vec<ConsideredEffect> {
+    effects::catalogue()
+        .iter()
+        .filter(|kind| !found.selection.chosen.iter().any(|&g| found.candidates[g].id() == kind.id()))
+        .map(|kind| consider(found, kind.id(), excess))
+        .collect()
+}
+
+fn consider(found: &Found, id: &str, excess: f64) -> ConsideredEffect {
+    let best = (0..found.candidates.len())
+        .filter(|&g| found.candidates[g].id() == id && found.selection.judged[g].observable)
+        .max_by(|&a, &b| {
+            found.selection.judged[a].delta_loglik.total_cmp(&found.selection.judged[b].delta_loglik)
+        });
+    let mut entry = ConsideredEffect {
+        id: id.to_owned(),
+        delta_loglik: None,
+        p_value: None,
+        observable: best.is_some(),
+        detectable: None,
+        needed: None,
+        parameter: None,
+        unit: None,
+    };
+    let Some(g) = best else { return entry };
+    let judged = &found.selection.judged[g];
+    entry.delta_loglik = Some(judged.delta_loglik);
+    entry.p_value = Some(judged.p_value);
+    let first: usize = found.candidates[..g].iter().map(|c| c.coefficients().len()).sum();
+    let mut set = columns_of(&found.fitted.groups, &found.selection.chosen);
+    let own = set.len();
+    set.extend(&found.fitted.groups[g].columns);
+    if let (Some(estimate), Some(&column)) =
+        (found.fitted.fits.estimate(&set), found.fitted.groups[g].columns.first())
+    {
+        let coefficient = &found.candidates[g].coefficients()[column - first];
+        entry.detectable = Some(5.0 * estimate.sigma(own));
+        let information = found.fitted.fits.information(column);
+        entry.needed = (excess > 0.0 && information > 0.0).then(|| (excess / information).sqrt());
+        entry.parameter = Some(coefficient.name.clone());
+        entry.unit = Some(coefficient.unit.to_owned());
+    }
+    entry
+}
+
+/// What the leftover follows, among the empirical terms that were judged beside
+/// the chosen effects. `left` is the share of the before variance that is left.
+pub(crate) fn unattributed(found: &Found, left: f64) -> Unattributed {
+    let chosen = &found.selection.chosen;
+    let set = columns_of(&found.fitted.groups, chosen);
+    let base = found.fitted.fits.out_of_fold(&set).map_or(0.0, |o| o.total_sse());
+    let mut depends_on: Vec<Dependence> = (0..found.candidates.len())
+        .filter(|&g| found.candidates[g].id() == EMPIRICAL && found.selection.judged[g].observable)
+        .filter_map(|g| {
+            let mut with = set.clone();
+            with.extend(&found.fitted.groups[g].columns);
+            let sse = found.fitted.fits.out_of_fold(&with)?.total_sse();
+            Some(Dependence {
+                variable: found.candidates[g].selectors().get("variable")?.clone(),
+                variance_explained: if base > 0.0 { 1.0 - sse / base } else { 0.0 },
+                p_value: found.selection.judged[g].p_value,
+            })
+        })
+        .collect();
+    depends_on.sort_by(|a, b| b.variance_explained.total_cmp(&a.variance_explained));
+    let share = depends_on
+        .iter()
+        .filter(|d| d.p_value < FAMILY_ALPHA && d.variance_explained > 0.0)
+        .map(|d| d.variance_explained)
+        .fold(0.0, f64::max);
+    Unattributed {
+        present: share > 0.0,
+        variance_fraction: Some(share * left),
+        depends_on,
+        lines_hz: Vec::new(),
+        jumps_s: Vec::new(),
+    }
+}
+
+/// The finding in one word.
+pub(crate) fn verdict(added: bool, left: bool) -> Verdict {
+    match (added, left) {
+        (false, false) => Verdict::Consistent,
+        (true, false) => Verdict::Explained,
+        (true, true) => Verdict::PartlyExplained,
+        (false, true) => Verdict::Unexplained,
+    }
+}
+
+/// Root mean square of the entries that count; `None` if none does.
+pub(crate) fn rms(values: &[f64], outlier: &[bool]) -> Option<f64> {
+    let (mut sum, mut count) = (0.0, 0.0);
+    for (v, out) in values.iter().zip(outlier) {
+        if !out && v.is_finite() {
+            sum += v * v;
+            count += 1.0;
+        }
+    }
+    (count > 0.0).then(|| (sum / count).sqrt())
+}
+
+/// Star residual per axis over all rows that count.
+pub(crate) fn star_rms(residual: &Residuals, data: &StarData) -> [f64; 2] {
+    std::array::from_fn(|a| rms(&residual.axes[a], &data.outlier).unwrap_or(f64::NAN))
+}

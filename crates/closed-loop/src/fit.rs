@@ -1,0 +1,316 @@
+//! Out-of-fold fits and honest variances, all from the block Grams.
+//!
+//! With nuisance columns n (prior precision L), candidate columns c and the
+//! residual r, the nuisance is eliminated exactly (Schur complement):
+//!
+//! ```text
+//! W = (G_nn + L)^-1 G_n,[c r]      T = [ -W ; I ]
+//! S = G_cc - G_cn W_c              s = G_cr - G_cn W_r        beta = S^-1 s
+//! ```
+//!
+//! G is the sum over the training blocks. A held-out block b is judged with the
+//! nuisance *and* the amplitudes of the others: its squared error is the
+//! quadratic form of `[-beta, 1]` in `T^T G_b T`. The variance of beta is
+//! cluster-robust over blocks, which stays right when the leftovers are coloured
+//! on times shorter than a block and whatever the true noise level is:
+//!
+//! ```text
+//! V = S^-1 (sum_b s_b s_b^T) S^-1,   s_b = the score of block b at beta
+//! F = (B - p) / (p (B - 1)) beta^T V^-1 beta ~ F(p, B - p)    (Hotelling)
+//! ```
+//!
+//! Source: Liang & Zeger 1986 (cluster-robust variance); Hotelling 1931.
+
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use statrs::distribution::{ContinuousCDF, FisherSnedecor};
+
+use crate::folds::Folds;
+use crate::gram::BlockGrams;
+
+/// The columns of a Gram matrix, in their order.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Layout {
+    /// Prior precision of each nuisance column, 1/variance in the unit of the
+    /// column's amplitude; zero leaves it free.
+    pub(crate) nuisance_precision: Vec<f64>,
+    /// How many candidate columns follow the nuisance.
+    pub(crate) candidates: usize,
+    /// Residual columns: one, or one per fold and a last one for all data, where
+    /// the centroids themselves depend on what was learned outside the fold.
+    pub(crate) residuals: usize,
+}
+
+impl Layout {
+    /// Columns in all.
+    pub(crate) fn width(&self) -> usize {
+        self.nuisance_precision.len() + self.candidates + self.residuals
+    }
+
+    /// The residual column that belongs to `fold` (`None`: all data).
+    pub(crate) fn residual(&self, fold: Option<usize>) -> usize {
+        let first = self.nuisance_precision.len() + self.candidates;
+        match fold {
+            _ if self.residuals == 1 => first,
+            Some(f) => first + f,
+            None => first + self.residuals - 1,
+        }
+    }
+}
+
+/// The nuisance eliminated on one training set.
+#[derive(Clone, Debug)]
+struct Eliminated {
+    /// W: nuisance amplitudes of each candidate column and of the residual, last.
+    nuisance: DMatrix<f64>,
+    /// Training Gram of the candidates and the residual (last), nuisance removed.
+    train: DMatrix<f64>,
+    /// Training scalars less the nuisance freedom.
+    freedom: f64,
+    /// Gram of each judged block in the transformed columns, and its scalars.
+    blocks: Vec<(DMatrix<f64>, f64)>,
+}
+
+impl Eliminated {
+    fn new(
+        grams: &BlockGrams,
+        layout: &Layout,
+        variance: f64,
+        fold: Option<usize>,
+        train: impl Fn(usize) -> bool,
+        judged: impl Fn(usize) -> bool,
+    ) -> Option<Self> {
+        let n = layout.nuisance_precision.len();
+        let (gram, scalars) = grams.sum(train);
+        let pick: Vec<usize> =
+            (n..n + layout.candidates).chain([layout.residual(fold)]).collect();
+        let mut normal = gram.view((0, 0), (n, n)).into_owned();
+        // A column that nothing constrains (a gauge freedom, a star never seen in
+        // training) gets a precision far below what one scalar of data brings.
+        let floor = 1e-10 * normal.diagonal().max().max(f64::MIN_POSITIVE);
+        for (k, &precision) in layout.nuisance_precision.iter().enumerate() {
+            normal[(k, k)] += precision * variance + floor;
+        }
+        let cross = DMatrix::from_fn(n, pick.len(), |i, j| gram[(i, pick[j])]);
+        let nuisance = if n == 0 { cross.clone() } else { Cholesky::new(normal)?.solve(&cross) };
+        let reduced = DMatrix::from_fn(pick.len(), pick.len(), |i, j| gram[(pick[i], pick[j])])
+            - cross.transpose() * &nuisance;
+        let blocks = (0..grams.gram.len())
+            .filter(|&b| judged(b))
+            .map(|b| (transformed(&grams.gram[b], n, &pick, &nuisance), grams.scalars[b]))
+            .collect();
+        // Columns under a tight prior cost less than one degree of freedom each;
+        // counting them whole is the cautious side.
+        let freedom = (scalars - n as f64).max(1.0);
+        Some(Self { nuisance, train: reduced, freedom, blocks })
+    }
+
+    /// Amplitudes of the candidate columns `set`, with prior precisions.
+    fn amplitudes(&self, set: &[usize]) -> Option<(DVector<f64>, Cholesky<f64, Dyn>)> {
+        let last = self.train.ncols() - 1;
+        let normal = DMatrix::from_fn(set.len(), set.len(), |i, j| self.train[(set[i], set[j])]);
+        let score = DVector::from_fn(set.len(), |i, _| self.train[(set[i], last)]);
+        // Collinear within rounding: the set cannot be told apart in this data.
+        for (i, &c) in set.iter().enumerate() {
+            if normal[(i, i)] <= 0.0 || !normal[(i, i)].is_finite() {
+                let _ = c;
+                return None;
+            }
+        }
+        let factor = Cholesky::new(normal.clone())?;
+        let pivots = factor.l_dirty();
+        for i in 0..set.len() {
+            if pivots[(i, i)] * pivots[(i, i)] < 1e-9 * normal[(i, i)] {
+                return None;
+            }
+        }
+        let beta = factor.solve(&score);
+        Some((beta, factor))
+    }
+}
+
+/// `T^T G T` for `T = [-W; I]` over the picked columns.
+fn transformed(gram: &DMatrix<f64>, n: usize, pick: &[usize], w: &DMatrix<f64>) -> DMatrix<f64> {
+    let nn = gram.view((0, 0), (n, n));
+    let np = DMatrix::from_fn(n, pick.len(), |i, j| gram[(i, pick[j])]);
+    let pp = DMatrix::from_fn(pick.len(), pick.len(), |i, j| gram[(pick[i], pick[j])]);
+    let cross = w.transpose() * &np;
+    pp - &cross - cross.transpose() + w.transpose() * (nn * w)
+}
+
+/// What a set of candidate columns does outside the folds it was fitted on.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct OutOfFold {
+    /// Squared error of each block, predicted from the other folds.
+    pub(crate) sse: Vec<f64>,
+    /// Log-likelihood of each block, nats, noise variance from the other folds.
+    pub(crate) loglik: Vec<f64>,
+}
+
+impl OutOfFold {
+    pub(crate) fn total_loglik(&self) -> f64 {
+        self.loglik.iter().sum()
+    }
+
+    pub(crate) fn total_sse(&self) -> f64 {
+        self.sse.iter().sum()
+    }
+}
+
+/// A set of amplitudes from all data with their cluster-robust covariance.
+#[derive(Clone, Debug)]
+pub(crate) struct Estimate {
+    /// One amplitude a column of the set.
+    pub(crate) value: DVector<f64>,
+    /// Its covariance.
+    pub(crate) covariance: DMatrix<f64>,
+    /// Blocks behind the covariance.
+    pub(crate) blocks: usize,
+}
+
+impl Estimate {
+    /// Probability that amplitudes `which` (positions in the set) are all zero
+    /// and yet as far from it as this.
+    pub(crate) fn p_value(&self, which: &[usize]) -> f64 {
+        let (p, b) = (which.len() as f64, self.blocks as f64);
+        if which.is_empty() || b <= p {
+            return 1.0;
+        }
+        let value = DVector::from_fn(which.len(), |i, _| self.value[which[i]]);
+        let covariance =
+            DMatrix::from_fn(which.len(), which.len(), |i, j| self.covariance[(which[i], which[j])]);
+        let Some(factor) = Cholesky::new(covariance) else { return 1.0 };
+        let t2 = value.dot(&factor.solve(&value));
+        let f = (b - p) / (p * (b - 1.0)) * t2;
+        FisherSnedecor::new(p, b - p).map_or(1.0, |law| law.sf(f))
+    }
+
+    /// Standard error of amplitude `k`.
+    pub(crate) fn sigma(&self, k: usize) -> f64 {
+        self.covariance[(k, k)].max(0.0).sqrt()
+    }
+}
+
+/// All fits that selection needs, on one set of Grams.
+#[derive(Clone, Debug)]
+pub(crate) struct Fits {
+    folds: Vec<Eliminated>,
+    fold_of_block: Vec<usize>,
+    all: Eliminated,
+    blocks: usize,
+}
+
+impl Fits {
+    /// Eliminates the nuisance in every fold and on all data. `variance` is the
+    /// noise variance of a scalar, which turns prior precisions into the unit of
+    /// the Gram. `None` if the nuisance itself is singular.
+    pub(crate) fn new(grams: &BlockGrams, folds: &Folds, layout: &Layout, variance: f64) -> Option<Self> {
+        let of = &folds.fold_of_block;
+        let by_fold = (0..folds.count)
+            .map(|f| {
+                Eliminated::new(grams, layout, variance, Some(f), |b| of[b] != f, |b| of[b] == f)
+            })
+            .collect::<Option<Vec<_>>>()?;
+        let all = Eliminated::new(grams, layout, variance, None, |_| true, |_| true)?;
+        Some(Self { folds: by_fold, fold_of_block: of.clone(), all, blocks: of.len() })
+    }
+
+    /// Out-of-fold error of the candidate columns `set`; `None` if they cannot
+    /// be told apart in some fold.
+    pub(crate) fn out_of_fold(&self, set: &[usize]) -> Option<OutOfFold> {
+        let (mut sse, mut loglik) = (Vec::new(), Vec::new());
+        for fold in &self.folds {
+            let (beta, _) = fold.amplitudes(set)?;
+            let last = fold.train.ncols() - 1;
+            let train_sse = fold.train[(last, last)]
+                - (0..set.len()).map(|i| beta[i] * fold.train[(set[i], last)]).sum::<f64>();
+            let variance =
+                (train_sse / (fold.freedom - set.len() as f64).max(1.0)).max(f64::MIN_POSITIVE);
+            for (gram, scalars) in &fold.blocks {
+                let error = quadratic(gram, set, &beta);
+                sse.push(error);
+                loglik.push(
+                    -0.5 * (scalars * (std::f64::consts::TAU * variance).ln() + error / variance),
+                );
+            }
+        }
+        Some(OutOfFold { sse, loglik })
+    }
+
+    /// Amplitudes of `set` in fold `fold`'s training data.
+    pub(crate) fn amplitudes_without(&self, fold: usize, set: &[usize]) -> Option<DVector<f64>> {
+        self.folds[fold].amplitudes(set).map(|(beta, _)| beta)
+    }
+
+    /// Nuisance amplitudes that go with `beta` on `set`, in fold `fold`'s
+    /// training data (`None`: all data).
+    pub(crate) fn nuisance(&self, fold: Option<usize>, set: &[usize], beta: &DVector<f64>) -> DVector<f64> {
+        let eliminated = fold.map_or(&self.all, |f| &self.folds[f]);
+        let mut nuisance = eliminated.nuisance.column(eliminated.nuisance.ncols() - 1).into_owned();
+        for (i, &c) in set.iter().enumerate() {
+            nuisance.axpy(-beta[i], &eliminated.nuisance.column(c), 1.0);
+        }
+        nuisance
+    }
+
+    /// Joint estimate of `set` on all data.
+    pub(crate) fn estimate(&self, set: &[usize]) -> Option<Estimate> {
+        let (value, factor) = self.all.amplitudes(set)?;
+        let last = self.all.train.ncols() - 1;
+        let p = set.len();
+        let mut spread = DMatrix::zeros(p, p);
+        for (gram, _) in &self.all.blocks {
+            let score = DVector::from_fn(p, |i, _| {
+                gram[(set[i], last)]
+                    - (0..p).map(|j| gram[(set[i], set[j])] * value[j]).sum::<f64>()
+            });
+            spread.ger(1.0, &score, &score, 1.0);
+        }
+        let b = self.blocks as f64;
+        // Small-sample factor of the cluster-robust variance.
+        spread *= b / (b - 1.0).max(1.0);
+        let inverse = factor.inverse();
+        let covariance = &inverse * spread * &inverse;
+        Some(Estimate { value, covariance, blocks: self.blocks })
+    }
+
+    /// Correlation between two columns once the nuisance is out: how alike two
+    /// one-parameter effects look in this data.
+    pub(crate) fn likeness(&self, a: usize, b: usize) -> f64 {
+        let s = &self.all.train;
+        let norm = (s[(a, a)] * s[(b, b)]).sqrt();
+        if norm > 0.0 { s[(a, b)] / norm } else { 0.0 }
+    }
+
+    /// What is left of a column's squared length once the nuisance is out, as a
+    /// share of `whole`, its squared length before: near zero, it is unobservable.
+    pub(crate) fn information(&self, c: usize) -> f64 {
+        self.all.train[(c, c)]
+    }
+
+    /// Noise variance of a scalar on all data with `set` in the model.
+    pub(crate) fn variance(&self, set: &[usize]) -> Option<f64> {
+        let (beta, _) = self.all.amplitudes(set)?;
+        let last = self.all.train.ncols() - 1;
+        let sse = self.all.train[(last, last)]
+            - (0..set.len()).map(|i| beta[i] * self.all.train[(set[i], last)]).sum::<f64>();
+        Some(sse / (self.all.freedom - set.len() as f64).max(1.0))
+    }
+
+    /// The fold of each block, in the order of [`OutOfFold::sse`].
+    pub(crate) fn fold_of_block(&self) -> &[usize] {
+        &self.fold_of_block
+    }
+}
+
+/// Squared error of a block: `[-beta, 1] G [-beta, 1]^T`.
+fn quadratic(gram: &DMatrix<f64>, set: &[usize], beta: &DVector<f64>) -> f64 {
+    let last = gram.ncols() - 1;
+    let mut error = gram[(last, last)];
+    for (i, &a) in set.iter().enumerate() {
+        error -= 2.0 * beta[i] * gram[(a, last)];
+        for (j, &b) in set.iter().enumerate() {
+            error += beta[i] * beta[j] * gram[(a, b)];
+        }
+    }
+    error.max(0.0)
+}

@@ -1,0 +1,86 @@
+//! How the data is cut in time: folds for prediction, blocks for honest variances.
+//!
+//! Five contiguous folds, each predicted with every amplitude estimated on the
+//! other four; with fewer than ten frames each frame is a fold of its own. Every
+//! fold is cut again into contiguous blocks: sums over blocks are what a
+//! cluster-robust variance needs, and a fold is a union of its blocks, so one
+//! pass over the data serves both.
+//!
+//! Not physics: bookkeeping of time.
+
+use std::ops::Range;
+
+/// Folds of a data set with enough frames ([`Folds::cut`]).
+pub(crate) const FOLDS: usize = 5;
+/// Below this number of frames one frame is left out at a time.
+const LEAVE_ONE_OUT_BELOW: usize = 10;
+/// Blocks wanted over the whole span. Hotelling's statistic on p parameters
+/// needs clearly more blocks than p; longer blocks hold longer correlations.
+const BLOCKS: usize = 60;
+/// A block shorter than this says little about correlation in time.
+const MIN_BLOCK_FRAMES: usize = 8;
+
+/// A partition of the frames `0..n` into folds of blocks, all contiguous.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Folds {
+    /// Frames of each block, in time order.
+    pub(crate) blocks: Vec<Range<usize>>,
+    /// The fold of each block.
+    pub(crate) fold_of_block: Vec<usize>,
+    /// How many folds there are.
+    pub(crate) count: usize,
+}
+
+impl Folds {
+    /// Cuts `frames` frames into folds of (nearly) equal numbers of frames.
+    pub(crate) fn cut(frames: usize) -> Self {
+        let count = if frames < LEAVE_ONE_OUT_BELOW { frames.max(1) } else { FOLDS };
+        let per_fold = (frames / count / MIN_BLOCK_FRAMES).clamp(1, BLOCKS / FOLDS);
+        let pieces = count * per_fold;
+        let edge = |k: usize| k * frames / pieces;
+        Self {
+            blocks: (0..pieces).map(|k| edge(k)..edge(k + 1)).collect(),
+            fold_of_block: (0..pieces).map(|k| k / per_fold).collect(),
+            count,
+        }
+    }
+
+    /// The fold of each frame.
+    pub(crate) fn fold_of_frame(&self) -> Vec<usize> {
+        let mut fold = Vec::new();
+        for (block, &f) in self.blocks.iter().zip(&self.fold_of_block) {
+            fold.extend(std::iter::repeat_n(f, block.len()));
+        }
+        fold
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_frame_is_in_one_block_and_folds_are_contiguous() {
+        for frames in [1, 4, 9, 10, 11, 83, 1592, 100_003] {
+            let folds = Folds::cut(frames);
+            assert_eq!(folds.blocks.first().unwrap().start, 0);
+            assert_eq!(folds.blocks.last().unwrap().end, frames);
+            assert!(folds.blocks.windows(2).all(|w| w[0].end == w[1].start));
+            let fold = folds.fold_of_frame();
+            assert_eq!(fold.len(), frames);
+            assert!(fold.windows(2).all(|w| w[0] == w[1] || w[1] == w[0] + 1));
+            assert_eq!(folds.count, if frames < 10 { frames } else { 5 });
+            assert_eq!(*fold.last().unwrap() + 1, folds.count);
+        }
+    }
+
+    #[test]
+    fn folds_differ_by_one_block_rounding_only() {
+        let folds = Folds::cut(1592);
+        let fold = folds.fold_of_frame();
+        for f in 0..5 {
+            let n = fold.iter().filter(|&&g| g == f).count();
+            assert!((318..=319).contains(&n), "fold {f} has {n} frames");
+        }
+    }
+}

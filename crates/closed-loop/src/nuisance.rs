@@ -1,0 +1,160 @@
+//! What the declared model leaves unknown, as columns with priors.
+//!
+//! ```text
+//! misalignment   dx = J(P) theta                    three angles, prior: declared bias, or free
+//! distortion     dx = sum_jk a_jk (x^j y^k - m_jk)  (j,k) != (0,0), m_jk the mean over the field,
+//!                                                   the same for y; prior N(0, s^2) each
+//! directions     dx = f/Z-projection of q (e a + n b)   two angles a star, free
+//! ```
+//!
+//! The distortion's draw is N(0,1) scaled to sigma_LSF, so the spread of its
+//! coefficients differs from draw to draw by 0.58 to 2.2 times (1 to 99 %): the
+//! prior is widened by that 2.2, or everything constant per star raises alarms
+//! when the stars hardly move.
+//!
+//! Source: [M23] Eq. 5-8 and Section 2.3.
+
+use distortion::{DistortionField, monomial_moment};
+use focal_plane::Pixel;
+use nalgebra::Vector3;
+use telemetry::Model;
+
+use crate::star_data::StarData;
+
+/// 99 % point of the ratio between the spread of one draw's coefficients and
+/// the spread over all draws.
+const PRIOR_WIDENING: f64 = 2.2;
+
+/// The unknowns of the declared model at star level.
+#[derive(Clone, Debug)]
+pub(crate) struct StarNuisance {
+    /// 1 sigma of each misalignment angle, arcsec; infinite = free. `None`:
+    /// absorbed by the free attitude of each frame.
+    misalignment: Option<[f64; 3]>,
+    /// Order of the distortion polynomials and 1 sigma of a coefficient, arcsec.
+    distortion: Option<(usize, f64)>,
+    /// Stars whose direction is unknown: all or none.
+    directions: usize,
+    moments: Vec<f64>,
+}
+
+impl StarNuisance {
+    /// What `model` declares unknown for `data`.
+    pub(crate) fn declared(model: &Model, data: &StarData) -> Self {
+        let noise = &model.noise;
+        let order = noise.distortion_order.unwrap_or(7) as usize;
+        let circular = noise.distortion_arcsec.unwrap_or(0.0);
+        let moments = moments(order);
+        let distortion = (circular > 0.0 && order > 0)
+            .then(|| (order, PRIOR_WIDENING * coefficient_sigma(order, circular)));
+        Self {
+            misalignment: (!data.free_attitude).then(|| {
+                noise.bias_arcsec.map_or([f64::INFINITY; 3], |b| {
+                    b.map(|sigma| if sigma > 0.0 { sigma } else { f64::INFINITY })
+                })
+            }),
+            distortion,
+            directions: if data.free_directions { data.stars.len() } else { 0 },
+            moments,
+        }
+    }
+
+    /// Prior precision of each column's amplitude, 1/arcsec^2.
+    pub(crate) fn precision(&self) -> Vec<f64> {
+        let mut precision = Vec::new();
+        if let Some(sigma) = self.misalignment {
+            precision.extend(sigma.map(|s| if s.is_finite() { 1.0 / (s * s) } else { 0.0 }));
+        }
+        if let Some((_, sigma)) = self.distortion {
+            precision.extend(std::iter::repeat_n(1.0 / (sigma * sigma), 2 * (self.moments.len() - 1)));
+        }
+        precision.extend(std::iter::repeat_n(0.0, 2 * self.directions));
+        precision
+    }
+
+    /// How many columns there are.
+    pub(crate) fn columns(&self) -> usize {
+        3 * usize::from(self.misalignment.is_some())
+            + self.distortion.map_or(0, |_| 2 * (self.moments.len() - 1))
+            + 2 * self.directions
+    }
+
+    /// Calls `put(column, dx, dy)` for every non-zero entry of one row, in arcsec
+    /// per arcsec.
+    pub(crate) fn row(
+        &self,
+        data: &StarData,
+        frame: usize,
+        row: usize,
+        scratch: &mut Vec<f64>,
+        put: &mut impl FnMut(usize, f64, f64),
+    ) {
+        let at = Pixel { x: data.modelled[0][row], y: data.modelled[1][row] };
+        let scale = data.camera.arcsec_per_px();
+        let per_rad = scale.map(|s| s / focal_plane::ARCSEC_PER_RAD);
+        let mut column = 0;
+        if self.misalignment.is_some() {
+            let jacobian = data.camera.rotation_jacobian(at);
+            for k in 0..3 {
+                put(column, jacobian[0][k] * per_rad[0], jacobian[1][k] * per_rad[1]);
+                column += 1;
+            }
+        }
+        if let Some((order, _)) = self.distortion {
+            let n = data.camera.normalised(at);
+            scratch.resize((order + 1) * (order + 1), 0.0);
+            DistortionField::basis_into(order, n, scratch);
+            for k in 1..self.moments.len() {
+                let value = scratch[k] - self.moments[k];
+                put(column, value, 0.0);
+                put(column + 1, 0.0, value);
+                column += 2;
+            }
+        }
+        if self.directions > 0 {
+            let u = data.stars[data.star[row]].direction;
+            let [east, north] = tangent_axes(&u);
+            let q = &data.attitude[frame];
+            let v = q * u;
+            for (k, axis) in [east, north].into_iter().enumerate() {
+                let d = q * axis;
+                // derivative of (X/Z, Y/Z)
+                let dx = (d.x - v.x / v.z * d.z) / v.z;
+                let dy = (d.y - v.y / v.z * d.z) / v.z;
+                put(column + 2 * data.star[row] + k, dx, dy);
+            }
+        }
+    }
+}
+
+/// Two unit vectors across `u`; any pair serves, the amplitudes are never read.
+fn tangent_axes(u: &Vector3<f64>) -> [Vector3<f64>; 2] {
+    let seed = if u.z.abs() < 0.9 { Vector3::z() } else { Vector3::x() };
+    let east = seed.cross(u).normalize();
+    [east, u.cross(&east)]
+}
+
+/// Mean of every monomial over the field, in the order of the basis.
+fn moments(order: usize) -> Vec<f64> {
+    let mut out = Vec::with_capacity((order + 1) * (order + 1));
+    for k in 0..=order {
+        for j in 0..=order {
+            out.push(monomial_moment(j, k));
+        }
+    }
+    out
+}
+
+/// 1 sigma of a coefficient such that the expected per-axis variance over the
+/// field is sigma_LSF^2 / 2: `sum_jk s^2 (m_2j,2k - m_jk^2) = sigma_LSF^2 / 2`.
+fn coefficient_sigma(order: usize, circular_arcsec: f64) -> f64 {
+    let mut variance = 0.0;
+    for k in 0..=order {
+        for j in 0..=order {
+            let mean = monomial_moment(j, k);
+            variance += monomial_moment(2 * j, 2 * k) - mean * mean;
+        }
+    }
+    circular_arcsec / (2.0 * variance).sqrt()
+}
+

@@ -1,0 +1,210 @@
+//! The search for causes: candidates, selection, refinement, until it stands.
+//!
+//! One round accumulates the normal equations of all candidates, selects out of
+//! fold, and then polishes what was chosen: a parameter that the columns follow
+//! non-linearly is scanned around its value on columns accumulated afresh, and a
+//! candidate whose columns are linear only near zero is linearised again at its
+//! estimate. Rounds repeat until the choice no longer changes.
+//!
+//! Source: variable projection (Golub & Pereyra 1973): linear amplitudes are
+//! solved for at every trial value of the non-linear ones.
+
+use effects::Candidate;
+use nalgebra::DVector;
+
+use crate::error::CloseError;
+use crate::evidence::{Amplitudes, Evidence};
+use crate::fit::{Fits, Layout};
+use crate::folds::Folds;
+use crate::gram::BlockGrams;
+use crate::selection::{Group, Selection, columns_of, select};
+
+/// Share of a column's squared length that must survive the nuisance for its
+/// amplitude to be called observable.
+const OBSERVABLE_SHARE: f64 = 1e-7;
+/// Values of a non-linear parameter tried at once, and how often the scan shrinks.
+const SCAN: usize = 9;
+const SCAN_ROUNDS: usize = 3;
+/// Rounds of selection and polish; the choice settles in two or three.
+const ROUNDS: usize = 4;
+
+/// Fits of one list of candidates, with the groups that selection moves.
+#[derive(Debug)]
+pub(crate) struct Fitted {
+    pub(crate) fits: Fits,
+    pub(crate) groups: Vec<Group>,
+    /// Independent scalars in the data.
+    pub(crate) scalars: f64,
+    /// Noise variance of a scalar without any candidate.
+    pub(crate) variance: f64,
+}
+
+/// Accumulates and eliminates; the noise variance that weighs the priors is
+/// estimated, never taken as declared.
+pub(crate) fn fit(
+    evidence: &dyn Evidence,
+    folds: &Folds,
+    candidates: &[&dyn Candidate],
+) -> Result<Fitted, CloseError> {
+    let design = evidence.design(candidates);
+    let grams = BlockGrams::accumulate(design.as_ref(), folds);
+    let layout = Layout {
+        nuisance_precision: evidence.precision(),
+        candidates: candidates.iter().map(|c| c.coefficients().len()).sum(),
+        residuals: evidence.residual_columns(),
+    };
+    let mut variance = evidence.variance_guess();
+    let mut fits = None;
+    for _ in 0..2 {
+        let found = Fits::new(&grams, folds, &layout, variance).ok_or(CloseError::Singular)?;
+        variance = found.variance(&[]).unwrap_or(variance).max(f64::MIN_POSITIVE);
+        fits = Some(found);
+    }
+    let fits = fits.ok_or(CloseError::Singular)?;
+    let (whole, scalars) = grams.sum(|_| true);
+    let first = layout.nuisance_precision.len();
+    let mut groups = Vec::new();
+    let mut column = 0;
+    for candidate in candidates {
+        let p = candidate.coefficients().len();
+        let columns = (column..column + p)
+            .filter(|&c| {
+                let raw = whole[(first + c, first + c)];
+                raw > 0.0 && fits.information(c) > OBSERVABLE_SHARE * raw
+            })
+            .collect();
+        groups.push(Group { columns, family: family(*candidate) });
+        column += p;
+    }
+    Ok(Fitted { fits, groups, scalars, variance })
+}
+
+/// Forms of one cause: one id with one selector of what it acts on.
+fn family(candidate: &dyn Candidate) -> String {
+    let selectors = candidate.selectors();
+    let on = ["channel", "star_id", "variable"]
+        .iter()
+        .filter_map(|key| selectors.get(*key))
+        .fold(String::new(), |all, value| all + "/" + value);
+    format!("{}{on}", candidate.id())
+}
+
+/// What a search ends with.
+#[derive(Debug)]
+pub(crate) struct Found {
+    /// All candidates, those chosen in their polished form.
+    pub(crate) candidates: Vec<Box<dyn Candidate>>,
+    /// Fits of exactly these candidates.
+    pub(crate) fitted: Fitted,
+    /// What was chosen among them.
+    pub(crate) selection: Selection,
+}
+
+/// Runs rounds of selection and polish. Candidates for which `eligible` is false
+/// are judged but never chosen.
+pub(crate) fn search(
+    evidence: &dyn Evidence,
+    folds: &Folds,
+    mut candidates: Vec<Box<dyn Candidate>>,
+    eligible: &dyn Fn(&dyn Candidate) -> bool,
+) -> Result<Found, CloseError> {
+    let mut before: Vec<usize> = Vec::new();
+    for round in 1.. {
+        let fitted = fit(evidence, folds, &borrowed(&candidates))?;
+        let may: Vec<bool> = candidates.iter().map(|c| eligible(c.as_ref())).collect();
+        let selection = select(&fitted.fits, &fitted.groups, &may, fitted.scalars);
+        let settled = selection.chosen == before || round == ROUNDS;
+        if selection.chosen.is_empty() || settled {
+            return Ok(Found { candidates, fitted, selection });
+        }
+        before.clone_from(&selection.chosen);
+        polish(evidence, folds, &mut candidates, &fitted, &selection.chosen)?;
+    }
+    Err(CloseError::Singular)
+}
+
+/// The candidates as the pipeline borrows them.
+pub(crate) fn borrowed(candidates: &[Box<dyn Candidate>]) -> Vec<&dyn Candidate> {
+    candidates.iter().map(AsRef::as_ref).collect()
+}
+
+/// Improves each chosen candidate beside the others.
+fn polish(
+    evidence: &dyn Evidence,
+    folds: &Folds,
+    candidates: &mut [Box<dyn Candidate>],
+    fitted: &Fitted,
+    chosen: &[usize],
+) -> Result<(), CloseError> {
+    let set = columns_of(&fitted.groups, chosen);
+    let Some(estimate) = fitted.fits.estimate(&set) else { return Ok(()) };
+    let mut first = 0;
+    for &g in chosen {
+        let columns = &fitted.groups[g].columns;
+        let values: Vec<f64> = estimate.value.rows(first, columns.len()).iter().copied().collect();
+        first += columns.len();
+        if columns.len() == candidates[g].coefficients().len()
+            && let Some(better) = candidates[g].refined(&values)
+        {
+            candidates[g] = better;
+        }
+        for k in 0..candidates[g].nonlinear().len() {
+            scan(evidence, folds, candidates, chosen, g, k)?;
+        }
+    }
+    Ok(())
+}
+
+/// Scans non-linear parameter `k` of candidate `g`, ever finer.
+fn scan(
+    evidence: &dyn Evidence,
+    folds: &Folds,
+    candidates: &mut [Box<dyn Candidate>],
+    chosen: &[usize],
+    g: usize,
+    k: usize,
+) -> Result<(), CloseError> {
+    let mut step = candidates[g].nonlinear()[k].step;
+    for _ in 0..SCAN_ROUNDS {
+        let now: Vec<f64> = candidates[g].nonlinear().iter().map(|n| n.value).collect();
+        let half = (SCAN / 2) as f64;
+        let mut trial: Vec<Box<dyn Candidate>> = Vec::new();
+        for i in 0..SCAN {
+            let mut value = now.clone();
+            value[k] += step * (i as f64 - half) / half;
+            trial.extend(candidates[g].with_nonlinear(&value));
+        }
+        let variants = trial.len();
+        // The others stay in the fit beside each variant.
+        let mut tried = borrowed(&trial);
+        tried.extend(chosen.iter().filter(|&&c| c != g).map(|&c| candidates[c].as_ref()));
+        let fitted = fit(evidence, folds, &tried)?;
+        let best = (0..variants)
+            .filter_map(|v| {
+                let set: Vec<usize> =
+                    std::iter::once(v).chain(variants..fitted.groups.len()).collect();
+                Some((v, fitted.fits.variance(&columns_of(&fitted.groups, &set))?))
+            })
+            .min_by(|a, b| a.1.total_cmp(&b.1));
+        let Some((v, _)) = best else { return Ok(()) };
+        candidates[g] = trial.swap_remove(v);
+        step *= 0.3;
+    }
+    Ok(())
+}
+
+/// Amplitudes of `chosen`, each fold from the others.
+pub(crate) fn amplitudes(found: &Fitted, folds: &Folds, chosen: &[usize], columns: usize) -> Option<Amplitudes> {
+    let set = columns_of(&found.groups, chosen);
+    let mut out = Amplitudes { nuisance: Vec::new(), candidates: Vec::new() };
+    for f in 0..folds.count {
+        let beta = found.fits.amplitudes_without(f, &set)?;
+        out.nuisance.push(found.fits.nuisance(Some(f), &set, &beta));
+        let mut all = DVector::zeros(columns);
+        for (i, &c) in set.iter().enumerate() {
+            all[c] = beta[i];
+        }
+        out.candidates.push(all);
+    }
+    Some(out)
+}

@@ -1,0 +1,136 @@
+//! Which effects the data supports: forward selection out of fold.
+//!
+//! Every candidate group is tried beside those already chosen. It is eligible
+//! if its out-of-fold log-likelihood gain is positive and its Hotelling p-value,
+//! times the number of groups that were tried (Bonferroni: the whole search is
+//! paid for), is below [`FAMILY_ALPHA`]. Of the eligible ones the largest gain
+//! after a price per parameter wins, so that a flexible wrong effect does not
+//! beat a stiff right one:
+//!
+//! ```text
+//! rank = delta loglik - (p/2) ln n
+//! ```
+//!
+//! After each addition all chosen groups are judged again beside the others and
+//! those that no longer stand are dropped.
+//!
+//! Source: Schwarz 1978 for the price of a parameter.
+
+use crate::fit::{Fits, OutOfFold};
+
+/// Chance that a bundle which follows its model gets any effect at all.
+pub(crate) const FAMILY_ALPHA: f64 = 0.01;
+
+/// Candidate columns that enter or leave together.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Group {
+    /// Positions among the candidate columns; those that the data cannot show are
+    /// not among them.
+    pub(crate) columns: Vec<usize>,
+    /// Groups of one family are forms of one cause: at most one is chosen.
+    pub(crate) family: String,
+}
+
+/// One group's standing beside the chosen ones.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Judgement {
+    /// Gain in out-of-fold log-likelihood, nats.
+    pub(crate) delta_loglik: f64,
+    /// Corrected for the number of groups tried, at most 1.
+    pub(crate) p_value: f64,
+    /// The columns can be told from the nuisance and from the chosen.
+    pub(crate) observable: bool,
+}
+
+/// The outcome of the search.
+#[derive(Clone, Debug)]
+pub(crate) struct Selection {
+    /// Indices of groups in the order added.
+    pub(crate) chosen: Vec<usize>,
+    /// Standing of every group beside (for a chosen one: within) the final set.
+    pub(crate) judged: Vec<Judgement>,
+}
+
+/// All candidate columns of `chosen`, in order.
+pub(crate) fn columns_of(groups: &[Group], chosen: &[usize]) -> Vec<usize> {
+    chosen.iter().flat_map(|&g| groups[g].columns.iter().copied()).collect()
+}
+
+/// Runs the search. `scalars` is the number of independent scalars in the data;
+/// only groups that `may` be chosen are, and only they are paid for.
+pub(crate) fn select(fits: &Fits, groups: &[Group], may: &[bool], scalars: f64) -> Selection {
+    let tried = may.iter().filter(|m| **m).count().max(1);
+    let mut chosen: Vec<usize> = Vec::new();
+    // Each round adds one or stops; a group dropped by the backward check may
+    // not return, so the search ends.
+    let mut banned = vec![false; groups.len()];
+    loop {
+        let base = out_of_fold(fits, groups, &chosen);
+        let best = (0..groups.len())
+            .filter(|&g| may[g] && !banned[g] && !chosen.contains(&g))
+            .filter(|&g| chosen.iter().all(|&c| groups[c].family != groups[g].family))
+            .filter_map(|g| {
+                let judgement = judge(fits, groups, &chosen, g, base.as_ref()?, tried);
+                let rank = judgement.delta_loglik
+                    - 0.5 * groups[g].columns.len() as f64 * scalars.max(2.0).ln();
+                let eligible = judgement.observable
+                    && judgement.delta_loglik > 0.0
+                    && judgement.p_value < FAMILY_ALPHA;
+                eligible.then_some((g, rank))
+            })
+            .max_by(|a, b| a.1.total_cmp(&b.1));
+        let Some((added, _)) = best else { break };
+        chosen.push(added);
+        prune(fits, groups, &mut chosen, &mut banned, tried);
+    }
+    let judged = (0..groups.len())
+        .map(|g| {
+            let others: Vec<usize> = chosen.iter().copied().filter(|&c| c != g).collect();
+            match out_of_fold(fits, groups, &others) {
+                Some(base) => judge(fits, groups, &others, g, &base, tried),
+                None => Judgement { delta_loglik: 0.0, p_value: 1.0, observable: false },
+            }
+        })
+        .collect();
+    Selection { chosen, judged }
+}
+
+/// Drops chosen groups that no longer stand beside the others.
+fn prune(fits: &Fits, groups: &[Group], chosen: &mut Vec<usize>, banned: &mut [bool], tried: usize) {
+    loop {
+        let fallen = chosen.iter().copied().find(|&g| {
+            let others: Vec<usize> = chosen.iter().copied().filter(|&c| c != g).collect();
+            out_of_fold(fits, groups, &others).is_some_and(|base| {
+                let judgement = judge(fits, groups, &others, g, &base, tried);
+                !judgement.observable
+                    || judgement.delta_loglik <= 0.0
+                    || judgement.p_value >= FAMILY_ALPHA
+            })
+        });
+        let Some(g) = fallen else { return };
+        banned[g] = true;
+        chosen.retain(|&c| c != g);
+    }
+}
+
+fn out_of_fold(fits: &Fits, groups: &[Group], chosen: &[usize]) -> Option<OutOfFold> {
+    fits.out_of_fold(&columns_of(groups, chosen))
+}
+
+fn judge(fits: &Fits, groups: &[Group], others: &[usize], g: usize, base: &OutOfFold, tried: usize) -> Judgement {
+    let mut set = columns_of(groups, others);
+    let first = set.len();
+    set.extend(&groups[g].columns);
+    if set.len() == first {
+        return Judgement { delta_loglik: 0.0, p_value: 1.0, observable: false };
+    }
+    let which: Vec<usize> = (first..set.len()).collect();
+    let (Some(with), Some(estimate)) = (fits.out_of_fold(&set), fits.estimate(&set)) else {
+        return Judgement { delta_loglik: 0.0, p_value: 1.0, observable: false };
+    };
+    Judgement {
+        delta_loglik: with.total_loglik() - base.total_loglik(),
+        p_value: (estimate.p_value(&which) * tried as f64).min(1.0),
+        observable: true,
+    }
+}

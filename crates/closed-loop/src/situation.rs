@@ -1,0 +1,142 @@
+//! Model and bundle joined: camera, channels, reference, catalogue.
+//!
+//! Not physics: bookkeeping.
+
+use std::collections::BTreeMap;
+
+use effects::{FrameGeometry, Surroundings, VectorFrame};
+use focal_plane::{AttitudeSeries, Camera, Series};
+use telemetry::{Bundle, Model};
+
+use crate::error::CloseError;
+use crate::star_data::{Star, median_step};
+
+/// A step longer than this many median steps is a gap: at least one sample is
+/// missing, and nothing is interpolated across.
+const GAP_STEPS: f64 = 1.9;
+/// Focal lengths that differ by more than this share are different trackers;
+/// rounded numbers in files differ by less.
+const FOCAL_TOLERANCE: f64 = 2e-3;
+
+/// What the loop works on.
+#[derive(Debug)]
+pub(crate) struct Situation<'a> {
+    pub(crate) model: &'a Model,
+    pub(crate) bundle: &'a Bundle,
+    pub(crate) camera: Camera,
+    pub(crate) channels: BTreeMap<String, Series>,
+    pub(crate) frames: Option<FrameGeometry>,
+    pub(crate) reference: Option<AttitudeSeries>,
+    /// Year at which catalogue directions are wanted.
+    year: f64,
+    span_s: [f64; 2],
+}
+
+impl<'a> Situation<'a> {
+    pub(crate) fn join(model: &'a Model, bundle: &'a Bundle) -> Result<Self, CloseError> {
+        let t_s = bundle
+            .stars
+            .as_ref()
+            .map(|s| &s.t_s)
+            .or(bundle.attitude.as_ref().map(|a| &a.t_s))
+            .ok_or(CloseError::NothingToCompare("the bundle has neither stars nor attitude"))?;
+        let span_s = [t_s.first().copied().unwrap_or(0.0), t_s.last().copied().unwrap_or(0.0)];
+        let mut channels = BTreeMap::new();
+        if let Some(housekeeping) = &bundle.housekeeping {
+            for (name, values) in &housekeeping.channels {
+                if let Ok(series) = Series::new(housekeeping.t_s.clone(), values.clone()) {
+                    channels.insert(name.clone(), series);
+                }
+            }
+        }
+        Ok(Self {
+            model,
+            bundle,
+            camera: camera(model, bundle)?,
+            channels,
+            frames: bundle.meta.frames.as_ref().map(|f| FrameGeometry {
+                tracker_boresight: f.tracker_boresight,
+                reference_boresight: f.reference_boresight,
+                vectors_in: match f.vectors_in {
+                    Some(telemetry::VectorFrame::Inertial) => VectorFrame::Inertial,
+                    Some(telemetry::VectorFrame::Tracker) => VectorFrame::Tracker,
+                    Some(telemetry::VectorFrame::Body) | None => VectorFrame::Body,
+                },
+                quaternion_signs: f.quaternion_signs.known(),
+            }),
+            reference: reference(bundle),
+            year: bundle.meta.julian_year(0.5 * (span_s[0] + span_s[1])).unwrap_or(2000.0),
+            span_s,
+        })
+    }
+
+    /// What effects may look at.
+    pub(crate) fn surroundings(&self) -> Surroundings<'_> {
+        Surroundings {
+            camera: &self.camera,
+            span_s: self.span_s,
+            channels: &self.channels,
+            frames: self.frames,
+        }
+    }
+
+    /// A star of the catalogue at the epoch of the data.
+    pub(crate) fn star(&self, id: i64) -> Option<Star> {
+        let catalogue = self.bundle.catalog.as_ref()?;
+        let index = catalogue.index_of(id)?;
+        let star = &catalogue.stars()[index];
+        Some(Star { id, mag: star.mag, bv: star.bv, direction: catalogue.direction_at(index, self.year) })
+    }
+
+    /// The exposure, the model's before the bundle's.
+    pub(crate) fn exposure_s(&self) -> Option<f64> {
+        self.model.tracker.exposure_s.or(self.bundle.meta.tracker.exposure_s)
+    }
+}
+
+/// The better estimate as a series; rates given with it, or the gyro's where its
+/// samples fall on the same instants, shape the path between samples.
+fn reference(bundle: &Bundle) -> Option<AttitudeSeries> {
+    let table = bundle.reference.as_ref()?;
+    let gap = GAP_STEPS * median_step(&table.t_s)?;
+    AttitudeSeries::new(table.t_s.clone(), table.q.clone(), table.rates_rad_s.clone())
+        .ok()
+        .map(|series| series.with_max_gap_s(gap))
+}
+
+fn camera(model: &Model, bundle: &Bundle) -> Result<Camera, CloseError> {
+    let declared = &model.tracker;
+    let pixels = declared.pixels.or(bundle.meta.tracker.pixels);
+    let believed = match (pixels, declared.focal_length_px, declared.fov_deg) {
+        (Some(pixels), Some(f), _) => Camera::from_focal_length_px(pixels, f).ok(),
+        (Some(pixels), None, Some(fov)) => Camera::from_fov_deg(pixels, fov).ok(),
+        _ => None,
+    };
+    let centre = declared.pixel_centre.or(bundle.meta.tracker.pixel_centre);
+    let believed = believed.and_then(|c| match centre {
+        Some(centre) => c.with_pixel_centre(centre).ok(),
+        None => Some(c),
+    });
+    match (believed, &bundle.camera) {
+        (Some(model), Some(measured)) => {
+            for axis in 0..2 {
+                let (a, b) = (model.pixels()[axis], measured.pixels()[axis]);
+                if a != b {
+                    return Err(CloseError::TrackersDiffer {
+                        what: "the number of pixels",
+                        model: f64::from(a),
+                        bundle: f64::from(b),
+                    });
+                }
+                let (a, b) = (model.focal_length_px()[axis], measured.focal_length_px()[axis]);
+                if (a / b - 1.0).abs() > FOCAL_TOLERANCE {
+                    return Err(CloseError::TrackersDiffer { what: "the focal length, px,", model: a, bundle: b });
+                }
+            }
+            Ok(model)
+        }
+        (Some(camera), None) => Ok(camera),
+        (None, Some(camera)) => Ok(camera.clone()),
+        (None, None) => Err(CloseError::NoCamera),
+    }
+}

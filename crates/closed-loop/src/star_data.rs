@@ -1,0 +1,330 @@
+//! Star measurements beside what the declared model says of them.
+//!
+//! For every row: the projected position of the star (reference attitude or the
+//! frame's own, catalogue direction or the solved one), its velocity and
+//! acceleration across the detector, and the declared pixel-phase error. The
+//! residual is
+//!
+//! ```text
+//! r = (measured - projected - declared centroid error) * arcsec per pixel
+//! ```
+//!
+//! All regressors are evaluated at the *modelled* position, projection +
+//! misalignment + distortion, never at the measured one: regressing on measured
+//! positions explains noise by shrinking everything, and the triangle evaluated
+//! at the raw projection raises false alarms. The modelled position is improved
+//! once the first fit has given misalignment and distortion.
+//!
+//! Source: [M23] Fig. 4 for the order of the terms.
+
+use std::sync::Arc;
+
+use centroid::CentroidError;
+use effects::Effect;
+use focal_plane::{
+    AttitudeSeries, AttitudeSource, Camera, Pixel, Points, PointsMut, StarFrames, Vectors,
+};
+use nalgebra::{UnitQuaternion, Vector3};
+use star_tracker::{Disturbance, Pbm, Rows, Scratch};
+
+use crate::directions;
+
+/// What is known of one star.
+#[derive(Clone, Debug)]
+pub(crate) struct Star {
+    pub(crate) id: i64,
+    /// Magnitude and colour; NaN where unknown.
+    pub(crate) mag: f64,
+    pub(crate) bv: f64,
+    /// Unit vector, inertial, at the bundle's epoch.
+    pub(crate) direction: Vector3<f64>,
+}
+
+/// Rows of star measurements, structure of arrays, frames contiguous.
+#[derive(Clone, Debug)]
+pub(crate) struct StarData {
+    pub(crate) camera: Camera,
+    /// The measurements (times, ids, slots, centroids); rows outside the
+    /// reference are already gone.
+    pub(crate) frames: StarFrames,
+    pub(crate) stars: Vec<Star>,
+    /// Index into `stars`, a row.
+    pub(crate) star: Vec<usize>,
+    /// Time of the frame, a row, s.
+    pub(crate) t_s: Vec<f64>,
+    /// Magnitude and colour, a row.
+    pub(crate) mag: Vec<f64>,
+    pub(crate) bv: Vec<f64>,
+    /// Attitude of each frame.
+    pub(crate) attitude: Vec<UnitQuaternion<f64>>,
+    /// Projected position, px.
+    pub(crate) projected: [Vec<f64>; 2],
+    /// Modelled position, px: where regressors are evaluated.
+    pub(crate) modelled: [Vec<f64>; 2],
+    /// Velocity and acceleration of the image, px/s and px/s^2; zero where the
+    /// motion is not known.
+    pub(crate) velocity: [Vec<f64>; 2],
+    pub(crate) acceleration: [Vec<f64>; 2],
+    /// Declared centroid error at the modelled position, px.
+    pub(crate) phase_error: [Vec<f64>; 2],
+    /// Rows left out of every fit and figure.
+    pub(crate) outlier: Vec<bool>,
+    /// No reference: every frame's attitude is an unknown of its own.
+    pub(crate) free_attitude: bool,
+    /// No catalogue: every star's direction is an unknown constant.
+    pub(crate) free_directions: bool,
+    /// Star rows that had to be set aside because the reference does not cover them.
+    pub(crate) outside_reference: usize,
+}
+
+/// What [`StarData::prepare`] starts from.
+pub(crate) struct Inputs<'a> {
+    pub(crate) camera: &'a Camera,
+    pub(crate) frames: &'a StarFrames,
+    pub(crate) reference: Option<&'a AttitudeSeries>,
+    /// Direction, magnitude and colour by star id, if there is a catalogue.
+    pub(crate) catalogue: Option<&'a dyn Fn(i64) -> Option<Star>>,
+    pub(crate) phase: &'a CentroidError,
+    /// Effects that the model declares: they move the projection.
+    pub(crate) effects: &'a [Arc<dyn Effect>],
+}
+
+impl StarData {
+    /// Joins measurements, reference and catalogue. Frames outside the
+    /// reference, and frames without a solvable attitude, are set aside.
+    pub(crate) fn prepare(inputs: &Inputs<'_>) -> Self {
+        let mut stars: Vec<Star> = Vec::new();
+        let mut index_of = std::collections::BTreeMap::new();
+        let mut star = Vec::with_capacity(inputs.frames.rows());
+        for (row, &id) in inputs.frames.star_id.iter().enumerate() {
+            let index = *index_of.entry(id).or_insert_with(|| {
+                let known = inputs.catalogue.and_then(|find| find(id));
+                let mag = inputs.frames.mag.as_ref().map_or(f64::NAN, |m| m[row]);
+                stars.push(known.unwrap_or(Star { id, mag, bv: f64::NAN, direction: Vector3::zeros() }));
+                stars.len() - 1
+            });
+            star.push(index);
+        }
+        let free_directions = inputs.catalogue.is_none();
+        let (attitude, free_attitude) = Self::solve(inputs, &star, &mut stars, free_directions);
+        let mut data = Self::keep(inputs, &star, stars, &attitude);
+        data.free_attitude = free_attitude;
+        data.free_directions = free_directions;
+        data.project(inputs.reference);
+        data.disturb(inputs.reference, inputs.effects);
+        data.modelled = data.projected.clone();
+        data.update_phase(inputs.phase);
+        data
+    }
+
+    /// Attitude of each frame, and directions where they are unknown.
+    fn solve(
+        inputs: &Inputs<'_>,
+        star: &[usize],
+        stars: &mut [Star],
+        free_directions: bool,
+    ) -> (Vec<Option<UnitQuaternion<f64>>>, bool) {
+        let (camera, frames) = (inputs.camera, inputs.frames);
+        let Some(reference) = inputs.reference else {
+            if free_directions {
+                let solved = directions::solve(camera, frames, star, stars.len());
+                for (s, u) in stars.iter_mut().zip(&solved.direction) {
+                    s.direction = *u;
+                }
+                return (solved.attitude, true);
+            }
+            let known: Vec<_> = stars.iter().map(|s| Some(s.direction)).collect();
+            return (directions::attitudes(camera, frames, star, &known), true);
+        };
+        let attitude: Vec<_> = frames.t_s.iter().map(|&t| reference.attitude(t)).collect();
+        if free_directions {
+            let mut sum = vec![Vector3::zeros(); stars.len()];
+            for (k, q) in attitude.iter().enumerate() {
+                if let Some(q) = q {
+                    for row in frames.rows_of(k) {
+                        let at = Pixel { x: frames.x_px[row], y: frames.y_px[row] };
+                        sum[star[row]] += q.inverse() * camera.direction(at);
+                    }
+                }
+            }
+            for (s, u) in stars.iter_mut().zip(&sum) {
+                s.direction = u.try_normalize(0.0).unwrap_or_else(Vector3::z);
+            }
+        }
+        (attitude, false)
+    }
+
+    /// The rows whose frame has an attitude.
+    fn keep(
+        inputs: &Inputs<'_>,
+        star: &[usize],
+        stars: Vec<Star>,
+        attitude: &[Option<UnitQuaternion<f64>>],
+    ) -> Self {
+        let from = inputs.frames;
+        let mut rows = Vec::new();
+        let mut frames = StarFrames::new();
+        let mut kept_attitude = Vec::new();
+        for (k, q) in attitude.iter().enumerate() {
+            if let Some(q) = q {
+                kept_attitude.push(*q);
+                frames.t_s.push(from.t_s[k]);
+                rows.extend(from.rows_of(k));
+                frames.first_row.push(rows.len());
+            }
+        }
+        let pick = |values: &[f64]| rows.iter().map(|&r| values[r]).collect::<Vec<f64>>();
+        frames.slot = rows.iter().map(|&r| from.slot[r]).collect();
+        frames.star_id = rows.iter().map(|&r| from.star_id[r]).collect();
+        frames.x_px = pick(&from.x_px);
+        frames.y_px = pick(&from.y_px);
+        frames.mag = from.mag.as_ref().map(|m| pick(m));
+        frames.flux = from.flux.as_ref().map(|m| pick(m));
+        let star: Vec<usize> = rows.iter().map(|&r| star[r]).collect();
+        let n = rows.len();
+        let t_s = (0..frames.frames())
+            .flat_map(|k| std::iter::repeat_n(frames.t_s[k], frames.rows_of(k).len()))
+            .collect();
+        let pair = || [vec![0.0; n], vec![0.0; n]];
+        Self {
+            camera: inputs.camera.clone(),
+            mag: star.iter().map(|&s| stars[s].mag).collect(),
+            bv: star.iter().map(|&s| stars[s].bv).collect(),
+            outside_reference: from.rows() - n,
+            frames,
+            stars,
+            star,
+            t_s,
+            attitude: kept_attitude,
+            projected: pair(),
+            modelled: pair(),
+            velocity: pair(),
+            acceleration: pair(),
+            phase_error: pair(),
+            outlier: vec![false; n],
+            free_attitude: false,
+            free_directions: false,
+        }
+    }
+
+    /// Projected positions, and the motion across the detector from the
+    /// attitude at three instants around each frame.
+    fn project(&mut self, reference: Option<&AttitudeSeries>) {
+        let own = self.own_motion();
+        let motion = reference.or(own.as_ref());
+        // Short against any motion that the samples resolve, long against the
+        // rounding of a difference of positions.
+        let h = 0.05 * median_step(&self.frames.t_s).unwrap_or(1.0);
+        for k in 0..self.frames.frames() {
+            let t = self.frames.t_s[k];
+            let around = motion.and_then(|m| Some([m.attitude(t - h)?, m.attitude(t + h)?]));
+            for row in self.frames.rows_of(k) {
+                let u = self.stars[self.star[row]].direction;
+                let centre = self.position(&self.attitude[k], &u);
+                self.projected[0][row] = centre[0];
+                self.projected[1][row] = centre[1];
+                let Some([before, after]) = &around else { continue };
+                let (p, q) = (self.position(before, &u), self.position(after, &u));
+                for axis in 0..2 {
+                    self.velocity[axis][row] = (q[axis] - p[axis]) / (2.0 * h);
+                    self.acceleration[axis][row] =
+                        (q[axis] - 2.0 * centre[axis] + p[axis]) / (h * h);
+                }
+            }
+        }
+    }
+
+    /// The motion that the frames' own attitudes describe.
+    pub(crate) fn own_motion(&self) -> Option<AttitudeSeries> {
+        AttitudeSeries::new(self.frames.t_s.clone(), self.attitude.clone(), None).ok()
+    }
+
+    /// Adds what the declared effects do to the projected positions. Rows whose
+    /// exposure leaves the known motion are set aside.
+    fn disturb(&mut self, reference: Option<&AttitudeSeries>, effects: &[Arc<dyn Effect>]) {
+        if effects.is_empty() {
+            return;
+        }
+        let own = self.own_motion();
+        let Some(motion) = reference.or(own.as_ref()) else { return };
+        let mut tracker = Pbm::new(self.camera.clone());
+        for effect in effects {
+            let disturbance: Arc<dyn Disturbance> = effect.clone();
+            tracker = tracker.with_disturbance(disturbance);
+        }
+        let component = |axis: usize| -> Vec<f64> {
+            self.star.iter().map(|&s| self.stars[s].direction[axis]).collect()
+        };
+        let (x, y, z) = (component(0), component(1), component(2));
+        let [px, py] = &mut self.projected;
+        tracker.positions_into(
+            motion,
+            Rows {
+                t_s: &self.frames.t_s,
+                first_row: &self.frames.first_row,
+                slot: &self.frames.slot,
+                star_id: &self.frames.star_id,
+                mag: &self.mag,
+                bv: &self.bv,
+                direction: Vectors { x: &x, y: &y, z: &z },
+            },
+            &mut Scratch::default(),
+            PointsMut { x: px, y: py },
+        );
+        for row in 0..self.t_s.len() {
+            if !self.projected[0][row].is_finite() && !self.outlier[row] {
+                self.outlier[row] = true;
+                self.outside_reference += 1;
+            }
+        }
+    }
+
+    fn position(&self, q: &UnitQuaternion<f64>, u: &Vector3<f64>) -> [f64; 2] {
+        self.camera.project(&(q * u)).map_or([f64::NAN; 2], |p| [p.x, p.y])
+    }
+
+    /// Moves the modelled positions to projection + `shift` (arcsec, the fitted
+    /// misalignment, distortion and directions) and evaluates the declared
+    /// centroid error there.
+    pub(crate) fn move_modelled(&mut self, shift_arcsec: &[Vec<f64>], phase: &CentroidError) {
+        let scale = self.camera.arcsec_per_px();
+        for axis in 0..2 {
+            for row in 0..self.t_s.len() {
+                self.modelled[axis][row] =
+                    self.projected[axis][row] + shift_arcsec[axis][row] / scale[axis];
+            }
+        }
+        self.update_phase(phase);
+    }
+
+    fn update_phase(&mut self, phase: &CentroidError) {
+        let [x, y] = &mut self.phase_error;
+        let at = Points { x: &self.modelled[0], y: &self.modelled[1] };
+        phase
+            .scaled(self.camera.arcsec_per_px().map(|s| 1.0 / s))
+            .error_into(at, self.camera.pixel_centre(), PointsMut { x, y });
+    }
+
+    /// The residual of the measured centroids, arcsec.
+    pub(crate) fn measured_residual(&self) -> [Vec<f64>; 2] {
+        self.residual_arcsec(self.frames.positions())
+    }
+
+    /// The residual of centroids `x_px, y_px` (the measured ones, or others
+    /// formed anew), arcsec.
+    pub(crate) fn residual_arcsec(&self, measured: Points<'_>) -> [Vec<f64>; 2] {
+        let scale = self.camera.arcsec_per_px();
+        let axis = |i: usize, measured: &[f64]| {
+            (0..measured.len())
+                .map(|r| (measured[r] - self.projected[i][r] - self.phase_error[i][r]) * scale[i])
+                .collect()
+        };
+        [axis(0, measured.x), axis(1, measured.y)]
+    }
+}
+
+/// Median of the steps of a time grid, s.
+pub(crate) fn median_step(t_s: &[f64]) -> Option<f64> {
+    let mut steps: Vec<f64> = t_s.windows(2).map(|w| w[1] - w[0]).collect();
+    crate::robust::median(&mut steps)
+}

@@ -1,0 +1,446 @@
+//! The loop at star level: centroids against catalogue and reference, or against
+//! themselves.
+//!
+//! Where raw windows are there, what is left is traced to the detector first:
+//! centroids are formed anew with a dark map learned outside each fold, and the
+//! rival explanation, a function of pixel phase, is tried on the same footing.
+//!
+//! Not physics: the order of the steps.
+
+use std::collections::BTreeMap;
+
+use effects::{Candidate, Scene, StarFacts, StarRows};
+use focal_plane::{AttitudeSource, Points, rotation_vector};
+use telemetry::report::{Errors, Report, Rows};
+
+use crate::attitude_loop::channels_of_interest;
+use crate::close::{AttitudeResiduals, Closed, StarResiduals, catalogue_candidates};
+use crate::declared;
+use crate::empirical::{EMPIRICAL, Empirical, Variable};
+use crate::error::CloseError;
+use crate::evidence::{Evidence, Residuals};
+use crate::figures;
+use crate::folds::Folds;
+use crate::image_level::{self, ImageLevel, Level};
+use crate::images::{self, Formed};
+use crate::nuisance::StarNuisance;
+use crate::robust;
+use crate::search::{Found, amplitudes, borrowed, fit, search};
+use crate::selection::columns_of;
+use crate::situation::Situation;
+use crate::star_data::{Inputs, Star, StarData, median_step};
+use crate::star_design::{StarEvidence, rotation_of};
+
+/// Fewest frames: every fold needs data to be predicted from.
+const MIN_FRAMES: usize = 4;
+/// Fits of the declared unknowns, each at better modelled positions.
+const SETTLING_ROUNDS: usize = 4;
+
+pub(crate) fn run(situation: &Situation<'_>, progress: &dyn Fn(&str)) -> Result<Closed, CloseError> {
+    let frames = situation.bundle.stars.as_ref().ok_or(CloseError::NothingToCompare("no stars"))?;
+    progress("joining stars, reference and catalogue");
+    let phase = declared::centroid_error(situation.model);
+    let find = |id: i64| -> Option<Star> { situation.star(id) };
+    let mut data = StarData::prepare(&Inputs {
+        camera: &situation.camera,
+        frames,
+        reference: situation.reference.as_ref(),
+        catalogue: situation.bundle.catalog.is_some().then_some(&find as &dyn Fn(i64) -> Option<Star>),
+        phase: &phase,
+        effects: &declared::effects(situation)?,
+    });
+    if data.frames.frames() < MIN_FRAMES {
+        return Err(CloseError::TooFewFrames {
+            frames: data.frames.frames(),
+            need: MIN_FRAMES,
+            why: "the others lie outside the reference, or have no two stars to solve an attitude from",
+        });
+    }
+    let folds = Folds::cut(data.frames.frames());
+    progress("residuals of the declared model");
+    let before = settle(&mut data, situation, &phase, &folds)?;
+
+    let own = data.own_motion();
+    let motion: Option<&dyn AttitudeSource> = match (&situation.reference, &own) {
+        (Some(reference), _) => Some(reference),
+        (None, Some(own)) => Some(own),
+        (None, None) => None,
+    };
+    let measured = evidence(&data, situation, vec![data.measured_residual()], motion);
+
+    let formed = match &situation.bundle.images {
+        Some(windows) => {
+            progress("dark map from the raw windows");
+            images::form(&data, windows, &folds)
+        }
+        None => None,
+    };
+    let anew = |variants: &[[Vec<f64>; 2]]| {
+        let residuals = variants
+            .iter()
+            .map(|c| data.residual_arcsec(Points { x: &c[0], y: &c[1] }))
+            .collect();
+        evidence(&data, situation, residuals, motion)
+    };
+    let levels = formed.as_ref().map(|f| [anew(&f.moments), anew(&f.fitted)]);
+
+    progress("searching for causes");
+    let facts: Vec<StarFacts> =
+        data.stars.iter().map(|s| StarFacts { star_id: s.id, mag: s.mag, bv: s.bv }).collect();
+    let rows = all_rows(&data, motion);
+    let scene = scene(situation, &data, &facts, &rows);
+    let image = match &levels {
+        Some([moments, fitted]) => {
+            let mut phase = catalogue_candidates(&scene);
+            phase.retain(|c| c.id() == "pixel_phase_harmonics");
+            let levels = [
+                Level { name: "declared model", evidence: &measured },
+                Level { name: "dark_map", evidence: moments },
+                Level { name: "dark_map + effective_psf", evidence: fitted },
+            ];
+            Some(image_level::compare(&levels, &phase, &folds, &data)?)
+        }
+        None => None,
+    };
+    let level = match (&levels, &image) {
+        (Some([_, fitted]), Some(image)) if image.effective_psf.stands => fitted,
+        (Some([moments, _]), Some(image)) if image.dark_map.stands => moments,
+        _ => &measured,
+    };
+    let candidates = || {
+        let mut list = catalogue_candidates(&scene);
+        list.retain(|c| c.acts_on_stars());
+        list.extend(leftover_terms(situation, &data));
+        list
+    };
+    let found = search(level, &folds, candidates(), &|c| c.id() != EMPIRICAL)?;
+    progress("figures");
+    finish(&Finish {
+        situation,
+        data: &data,
+        folds: &folds,
+        measured: &measured,
+        level,
+        found: &found,
+        before: &before,
+        image: image.as_ref().zip(formed.as_ref()),
+    })
+}
+
+/// Fits what the declared model leaves unknown, moves the modelled positions and
+/// marks outliers, until both stand still; returns the before residual.
+fn settle(
+    data: &mut StarData,
+    situation: &Situation<'_>,
+    phase: &centroid::CentroidError,
+    folds: &Folds,
+) -> Result<Residuals, CloseError> {
+    let mut round = 0;
+    loop {
+        let before = {
+            let evidence = evidence(data, situation, vec![data.measured_residual()], None);
+            let fitted = fit(&evidence, folds, &[])?;
+            let amplitudes = amplitudes(&fitted, folds, &[], 0).ok_or(CloseError::Singular)?;
+            evidence.residuals(folds, &[], &amplitudes)
+        };
+        let stars = data.stars.len();
+        let mut added = 0;
+        for axis in &before.axes {
+            added += robust::mark_outliers(axis, &data.star, stars, &mut data.outlier);
+        }
+        round += 1;
+        if round >= SETTLING_ROUNDS && (added == 0 || round > 3 * SETTLING_ROUNDS) {
+            return Ok(before);
+        }
+        data.move_modelled(&before.modelled, phase);
+    }
+}
+
+fn evidence<'a>(
+    data: &'a StarData,
+    situation: &Situation<'_>,
+    residuals: Vec<[Vec<f64>; 2]>,
+    motion: Option<&'a dyn AttitudeSource>,
+) -> StarEvidence<'a> {
+    let temporal = situation.model.noise.temporal_arcsec.filter(|s| *s > 0.0);
+    StarEvidence {
+        data,
+        nuisance: StarNuisance::declared(situation.model, data),
+        residuals,
+        motion,
+        // circular to per axis
+        sigma_guess_arcsec: temporal.map_or(1.0, |s| s / std::f64::consts::SQRT_2),
+    }
+}
+
+fn all_rows<'a>(data: &'a StarData, motion: Option<&'a dyn AttitudeSource>) -> StarRows<'a> {
+    StarRows {
+        t_s: &data.t_s,
+        x_px: &data.modelled[0],
+        y_px: &data.modelled[1],
+        vx_px_s: &data.velocity[0],
+        vy_px_s: &data.velocity[1],
+        ax_px_s2: &data.acceleration[0],
+        ay_px_s2: &data.acceleration[1],
+        mag: &data.mag,
+        bv: &data.bv,
+        slot: &data.frames.slot,
+        star_id: &data.frames.star_id,
+        attitude: motion,
+    }
+}
+
+fn scene<'a>(
+    situation: &'a Situation<'_>,
+    data: &StarData,
+    facts: &'a [StarFacts],
+    rows: &'a StarRows<'a>,
+) -> Scene<'a> {
+    Scene {
+        surroundings: situation.surroundings(),
+        has_stars: true,
+        has_catalogue: !data.free_directions,
+        has_reference: !data.free_attitude,
+        has_attitude: situation.bundle.attitude.is_some(),
+        stars: facts,
+        exposure_s: situation.exposure_s(),
+        step_s: median_step(&data.frames.t_s).unwrap_or(f64::INFINITY),
+        rows: Some(rows),
+    }
+}
+
+/// Every variable that the bundle gives values of.
+fn leftover_terms(situation: &Situation<'_>, data: &StarData) -> Vec<Box<dyn Candidate>> {
+    let range = |series: &[&[f64]]| {
+        series.iter().flat_map(|s| s.iter()).filter(|v| v.is_finite()).fold(
+            [f64::INFINITY, f64::NEG_INFINITY],
+            |[low, high], &v| [low.min(v), high.max(v)],
+        )
+    };
+    let largest = |series: &[Vec<f64>; 2]| {
+        let [low, high] = range(&[&series[0], &series[1]]);
+        let size = low.abs().max(high.abs());
+        [-size, size]
+    };
+    let mut terms: Vec<Box<dyn Candidate>> = Vec::new();
+    let mut add = |variable: Variable, range: [f64; 2]| {
+        if let Some(term) = Empirical::new(variable, range, true) {
+            terms.push(Box::new(term));
+        }
+    };
+    for axis in 0..2 {
+        add(Variable::Position(axis), range(&[&data.modelled[axis]]));
+        add(Variable::Phase(axis), [0.0, 1.0]);
+    }
+    add(Variable::Time, range(&[&data.t_s]));
+    add(Variable::Rate, largest(&data.velocity));
+    add(Variable::Acceleration, largest(&data.acceleration));
+    add(Variable::Magnitude, range(&[&data.mag]));
+    add(Variable::Colour, range(&[&data.bv]));
+    if !data.free_directions && data.stars.len() <= 64 {
+        add(Variable::Star(data.stars.iter().map(|s| s.id).collect()), [0.0, 1.0]);
+    }
+    for (name, series) in channels_of_interest(&situation.channels) {
+        add(Variable::Housekeeping(name, series.clone()), range(&[series.value()]));
+    }
+    terms
+}
+
+/// What the report is made of.
+struct Finish<'a> {
+    situation: &'a Situation<'a>,
+    data: &'a StarData,
+    folds: &'a Folds,
+    measured: &'a StarEvidence<'a>,
+    level: &'a StarEvidence<'a>,
+    found: &'a Found,
+    before: &'a Residuals,
+    image: Option<(&'a ImageLevel, &'a Formed)>,
+}
+
+impl Finish<'_> {
+    fn residuals(&self, chosen: &[usize]) -> Result<Residuals, CloseError> {
+        let columns = self.found.candidates.iter().map(|c| c.coefficients().len()).sum();
+        let amplitudes = amplitudes(&self.found.fitted, self.folds, chosen, columns)
+            .ok_or(CloseError::Singular)?;
+        Ok(self.level.residuals(self.folds, &borrowed(&self.found.candidates), &amplitudes))
+    }
+
+    fn power(&self, residual: &Residuals) -> f64 {
+        figures::star_rms(residual, self.data).iter().map(|v| v * v).sum()
+    }
+
+    fn errors(&self, residual: &Residuals, loglik: Option<f64>, attitude: Option<[f64; 3]>) -> Errors {
+        let declared = self.situation.model.noise.temporal_arcsec.filter(|s| *s > 0.0);
+        let rms = figures::star_rms(residual, self.data);
+        Errors {
+            star_rms_arcsec: Some(rms),
+            attitude_rms_arcsec: attitude,
+            log_psd_cost: None,
+            // with free attitudes three of each frame's numbers are spent
+            chi2_per_dof: declared.map(|circular| {
+                let n: usize = self.data.outlier.iter().filter(|o| !**o).count();
+                let dof = self.found.fitted.scalars;
+                n as f64 * (rms[0] * rms[0] + rms[1] * rms[1]) / (0.5 * circular * circular * dof)
+            }),
+            loglik_per_frame: loglik.map(|l| l / self.data.frames.frames() as f64),
+        }
+    }
+}
+
+fn finish(f: &Finish<'_>) -> Result<Closed, CloseError> {
+    let chosen = &f.found.selection.chosen;
+    let after = f.residuals(chosen)?;
+    let whole = f.power(f.before);
+    let mut explained = Vec::new();
+    let mut last = f.power(&f.residuals(&[])?);
+    for k in 0..chosen.len() {
+        let now = f.power(&f.residuals(&chosen[..=k])?);
+        explained.push((last - now) / whole);
+        last = now;
+    }
+    let surroundings = f.situation.surroundings();
+    let (mut effects, mut entries) = figures::effects_found(f.found, &explained, &surroundings)?;
+    if let Some((level, formed)) = f.image {
+        for (at, (effect, entry)) in image_level::effects(level, formed).into_iter().enumerate() {
+            effects.insert(at, effect);
+            entries.insert(at, entry);
+        }
+    }
+    let mut model = f.situation.model.clone();
+    model.effects.extend(entries);
+
+    let unattributed = figures::unattributed(f.found, last / whole);
+    let excess = excess(f, last);
+    let mut considered = figures::considered(f.found, excess);
+    if let Some((level, _)) = f.image {
+        for (id, step) in
+            [(images::DARK_MAP, &level.dark_map), (images::EFFECTIVE_PSF, &level.effective_psf)]
+        {
+            considered.retain(|c| !(step.stands && c.id == id));
+            for entry in considered.iter_mut().filter(|c| c.id == id) {
+                entry.delta_loglik = Some(step.delta_loglik);
+                entry.p_value = Some(step.p_value);
+                entry.observable = true;
+            }
+        }
+    }
+
+    let attitude = attitude_residuals(f, &after);
+    let attitude_rms = |series: &[Vec<f64>; 3], outlier: &[bool]| {
+        std::array::from_fn(|a| figures::rms(&series[a], outlier).unwrap_or(f64::NAN))
+    };
+    let before_fit = fit(f.measured, f.folds, &[])?;
+    let before_loglik = before_fit.fits.out_of_fold(&[]).map(|o| o.total_loglik());
+    let set = columns_of(&f.found.fitted.groups, chosen);
+    let after_loglik = f.found.fitted.fits.out_of_fold(&set).map(|o| o.total_loglik());
+    let outliers = f.data.outlier.iter().filter(|o| **o).count();
+    let report = Report {
+        format: telemetry::report::REPORT_FORMAT.to_owned(),
+        verdict: figures::verdict(!effects.is_empty(), unattributed.present),
+        folds: f.folds.count,
+        rows: Rows {
+            used: f.data.t_s.len() - outliers,
+            outliers,
+            outside_reference: f.data.outside_reference,
+        },
+        before: f.errors(
+            f.before,
+            before_loglik,
+            attitude.as_ref().map(|a| attitude_rms(&a.before_arcsec, &a.outlier)),
+        ),
+        after: f.errors(
+            &after,
+            after_loglik,
+            attitude.as_ref().map(|a| attitude_rms(&a.after_arcsec, &a.outlier)),
+        ),
+        effects,
+        considered,
+        unattributed,
+    };
+    let [ax, ay]: [Vec<f64>; 2] = after.axes.try_into().unwrap_or_default();
+    let [bx, by]: [Vec<f64>; 2] = f.before.axes.clone().try_into().unwrap_or_default();
+    let fold_of_frame = f.folds.fold_of_frame();
+    let frames = &f.data.frames;
+    let fold = (0..frames.frames())
+        .flat_map(|k| std::iter::repeat_n(fold_of_frame[k], frames.rows_of(k).len()))
+        .collect();
+    Ok(Closed {
+        report,
+        model,
+        stars: Some(StarResiduals {
+            t_s: f.data.t_s.clone(),
+            slot: frames.slot.clone(),
+            star_id: frames.star_id.clone(),
+            x_px: frames.x_px.clone(),
+            y_px: frames.y_px.clone(),
+            before_arcsec: [bx, by],
+            after_arcsec: [ax, ay],
+            fold,
+            outlier: f.data.outlier.clone(),
+        }),
+        attitude,
+        dark_map: f
+            .image
+            .filter(|(level, _)| level.dark_map.stands)
+            .map(|(_, formed)| formed.map.clone()),
+        rivals: f.image.map(|(level, _)| level.rivals.clone()).unwrap_or_default(),
+    })
+}
+
+/// Squared residual over what the declared noise accounts for, arcsec^2 summed
+/// over scalars; 0 where no noise is declared.
+fn excess(f: &Finish<'_>, power: f64) -> f64 {
+    let rows = f.data.outlier.iter().filter(|o| !**o).count() as f64;
+    f.situation
+        .model
+        .noise
+        .temporal_arcsec
+        .map_or(0.0, |s| (rows * power - 0.5 * s * s * f.found.fitted.scalars).max(0.0))
+}
+
+/// The tracker's own attitude beside the stars: its error against the reference,
+/// less the rotation that the modelled star shifts amount to.
+fn attitude_residuals(f: &Finish<'_>, after: &Residuals) -> Option<AttitudeResiduals> {
+    let table = f.situation.bundle.attitude.as_ref()?;
+    let data = f.data;
+    if data.free_attitude {
+        return None;
+    }
+    let scale = data.camera.arcsec_per_px();
+    let shift = |residual: &Residuals| -> Vec<Vec<f64>> {
+        (0..2)
+            .map(|a| {
+                (0..data.t_s.len())
+                    .map(|r| residual.modelled[a][r] + data.phase_error[a][r] * scale[a])
+                    .collect()
+            })
+            .collect()
+    };
+    let (shift_before, shift_after) = (shift(f.before), shift(after));
+    let fold = f.folds.fold_of_frame();
+    let own: BTreeMap<u64, usize> =
+        table.t_s.iter().enumerate().map(|(k, t)| (t.to_bits(), k)).collect();
+    let mut out = AttitudeResiduals::default();
+    for k in 0..data.frames.frames() {
+        let Some(&at) = own.get(&data.frames.t_s[k].to_bits()) else { continue };
+        let theta = rotation_vector(&table.q[at], &data.attitude[k]) * focal_plane::ARCSEC_PER_RAD;
+        let (Some(b), Some(a)) =
+            (rotation_of(data, k, &shift_before), rotation_of(data, k, &shift_after))
+        else {
+            continue;
+        };
+        out.t_s.push(data.frames.t_s[k]);
+        for axis in 0..3 {
+            out.before_arcsec[axis].push(theta[axis] - b[axis]);
+            out.after_arcsec[axis].push(theta[axis] - a[axis]);
+        }
+        out.fold.push(fold[k]);
+    }
+    out.outlier = vec![false; out.t_s.len()];
+    let group = vec![0; out.t_s.len()];
+    for axis in 0..3 {
+        robust::mark_outliers(&out.before_arcsec[axis], &group, 1, &mut out.outlier);
+    }
+    (!out.t_s.is_empty()).then_some(out)
+}
