@@ -127,7 +127,8 @@ mod tests {
         Ok(())
     }
 
-    /// Without truncation, Poisson's sum gives sum_k (-1)^k/(pi k) exp(-2 (pi k sigma)^2) sin(2 pi k d).
+    /// Without truncation, Poisson's sum gives
+    /// `sum_k (-1)^k/(pi k) exp(-2 (pi k sigma)^2) sin(2 pi k d)`.
     /// A window of 21 px leaves less than erfc(10/0.8/sqrt 2) = 1e-35 outside.
     #[test]
     fn wide_window_follows_poissons_sum() -> Result<(), CentroidFailure> {

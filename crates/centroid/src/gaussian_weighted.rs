@@ -10,8 +10,9 @@
 //! wide as the weight is reached in about one step. A spot much narrower than the weight would
 //! overshoot for ever; a step that turns back halves the factor.
 //!
-//! What bias is left comes from pixels that are missing (unread, off the window) and, for small
-//! spots, from sampling. With the width of the spot known (`psf_sigma_px`) both go: e is then
+//! What bias is left comes from pixels that are missing (unread, off the window) and from sampling:
+//! a pixel-phase wave of peak `8 pi v exp(-2 pi^2 v)` px with v half the spot's variance (1/12 of the
+//! pixel included), 2e-3 px at 0.9 px. With the width of the spot known (`psf_sigma_px`) both go: e is then
 //! `v - F m(c)`, where m is the spot integrated over pixels and F its flux from
 //! `sum w (v - F m) = 0`. Model and data meet only where pixels were read.
 //!
@@ -167,6 +168,9 @@ impl GaussianWeighted {
             ];
             if step[0] * last[0] + step[1] * last[1] < 0.0 {
                 factor = (0.5 * factor).max(0.125);
+            }
+            if !(step[0].is_finite() && step[1].is_finite()) {
+                return Err(CentroidFailure::NotDetermined);
             }
             at = [at[0] + step[0], at[1] + step[1]];
             last = step;

@@ -84,6 +84,7 @@ fn sin_quarter(t: f64) -> f64 {
 }
 
 #[cfg(test)]
+#[expect(clippy::float_cmp, reason = "compared where the result is exact")]
 mod tests {
     use super::*;
 

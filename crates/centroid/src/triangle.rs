@@ -24,7 +24,7 @@ pub struct Triangle {
 }
 
 impl Triangle {
-    /// Eq. 10 as printed: sigma_HSF is the peak, on both axes.
+    /// Eq. 10 as printed: `sigma_HSF` is the peak, on both axes.
     pub fn from_peak(peak: f64) -> Self {
         Self { peak: [peak; 2] }
     }
@@ -33,10 +33,10 @@ impl Triangle {
     ///
     /// ```
     /// let triangle = centroid::Triangle::from_per_axis_rms(1.0);
-    /// assert!((triangle.peak[0] - 3f64.sqrt()).abs() < 1e-15);
+    /// assert!((triangle.peak[0] - 3_f64.sqrt()).abs() < 1e-15);
     /// ```
     pub fn from_per_axis_rms(rms: f64) -> Self {
-        Self::from_peak(rms * 3f64.sqrt())
+        Self::from_peak(rms * 3_f64.sqrt())
     }
 
     /// The triangle whose RMS of both axes together is `rms`: Eq. 10 as its text has it.
@@ -46,12 +46,12 @@ impl Triangle {
     /// assert!((triangle.peak[0] - 1.0).abs() < 1e-14);
     /// ```
     pub fn from_circular_rms(rms: f64) -> Self {
-        Self::from_peak(rms * 1.5f64.sqrt())
+        Self::from_peak(rms * 1.5_f64.sqrt())
     }
 
     /// RMS of each axis over a uniformly distributed phase.
     pub fn per_axis_rms(&self) -> [f64; 2] {
-        self.peak.map(|peak| peak.abs() / 3f64.sqrt())
+        self.peak.map(|peak| peak.abs() / 3_f64.sqrt())
     }
 
     /// RMS of both axes together over uniformly distributed phases.

@@ -4,7 +4,7 @@
 //! A[j][k], B[j][k] ~ N(0, 1);   A[0][0] -= <F1>;   A *= (sigma_LSF / sigma_A) / sqrt(2)
 //! ```
 //!
-//! and the same for B, where sigma_A is the standard deviation of F1 over the field. Mean and
+//! and the same for B, where `sigma_A` is the standard deviation of F1 over the field. Mean and
 //! deviation are exact ([`monomial_moment`](crate::monomial_moment)). Since every draw is brought
 //! to the same size, the coefficients of different draws differ in scale.
 //!

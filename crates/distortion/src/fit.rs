@@ -89,8 +89,7 @@ impl FieldFit {
             normal.add(order, &at, &residual_arcsec, weights, rows);
         }
         let condition = normal.condition();
-        // the comparison is false for a NaN too
-        if !(condition <= MAX_CONDITION) {
+        if condition.is_nan() || condition > MAX_CONDITION {
             return Err(DistortionError::IllConditioned {
                 order,
                 condition,

@@ -98,7 +98,7 @@ mod tests {
         }
     }
 
-    /// P_l(1) = 1, so each row of shares sums to 1; P_3 is known by heart.
+    /// `P_l(1) = 1`, so each row of shares sums to 1; `P_3` is known by heart.
     #[test]
     fn known_values() {
         for row in from_monomials() {
@@ -107,6 +107,6 @@ mod tests {
         assert_eq!(to_monomials()[3][..4], [0.0, -1.5, 0.0, 2.5]);
         let mut p = [0.0; 4];
         orthonormal_into(0.5, &mut p);
-        assert!((p[3] / 7f64.sqrt() - (2.5 * 0.125 - 1.5 * 0.5)).abs() < 1e-15);
+        assert!((p[3] / 7_f64.sqrt() - (2.5 * 0.125 - 1.5 * 0.5)).abs() < 1e-15);
     }
 }

@@ -32,7 +32,7 @@ impl LsfSigma {
     /// use focal_plane::Angle;
     ///
     /// let sigma = LsfSigma::Circular(Angle::from_arcsec(2.0));
-    /// assert!((sigma.per_axis().arcsec() - 2f64.sqrt()).abs() < 1e-12);
+    /// assert!((sigma.per_axis().arcsec() - 2_f64.sqrt()).abs() < 1e-12);
     /// ```
     pub fn per_axis(self) -> Angle {
         match self {
