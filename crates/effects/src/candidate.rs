@@ -70,7 +70,9 @@ impl StarRows<'_> {
 
 impl Debug for StarRows<'_> {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.debug_struct("StarRows").field("rows", &self.len()).finish_non_exhaustive()
+        f.debug_struct("StarRows")
+            .field("rows", &self.len())
+            .finish_non_exhaustive()
     }
 }
 
@@ -103,7 +105,9 @@ impl AttitudeRows<'_> {
 
 impl Debug for AttitudeRows<'_> {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.debug_struct("AttitudeRows").field("rows", &self.len()).finish_non_exhaustive()
+        f.debug_struct("AttitudeRows")
+            .field("rows", &self.len())
+            .finish_non_exhaustive()
     }
 }
 
@@ -123,7 +127,12 @@ pub struct Coefficient {
 impl Coefficient {
     /// A coefficient of either sign.
     pub fn new(name: impl Into<String>, unit: &'static str, plausible: f64) -> Self {
-        Self { name: name.into(), unit, plausible, lower: f64::NEG_INFINITY }
+        Self {
+            name: name.into(),
+            unit,
+            plausible,
+            lower: f64::NEG_INFINITY,
+        }
     }
 
     /// The same, not below `lower`.
@@ -194,7 +203,14 @@ pub trait Candidate: Debug + Send + Sync {
     ///
     /// # Errors
     /// When a coefficient is out of its physical range.
-    fn realise(&self, values: &[f64], surroundings: &Surroundings<'_>) -> Result<Box<dyn Effect>, EffectError>;
+    ///
+    /// # Panics
+    /// When there is not one value per coefficient.
+    fn realise(
+        &self,
+        values: &[f64],
+        surroundings: &Surroundings<'_>,
+    ) -> Result<Box<dyn Effect>, EffectError>;
 }
 
 /// The parameters that an effect with these coefficients reports, with 1 sigma from the covariance of
@@ -216,8 +232,16 @@ pub fn reported(
     surroundings: &Surroundings<'_>,
 ) -> Result<Vec<(Parameter, f64)>, EffectError> {
     let n = values.len();
-    assert_eq!(n, candidate.coefficients().len(), "one value per coefficient");
-    assert_eq!(covariance.shape(), (n, n), "square covariance of the coefficients");
+    assert_eq!(
+        n,
+        candidate.coefficients().len(),
+        "one value per coefficient"
+    );
+    assert_eq!(
+        covariance.shape(),
+        (n, n),
+        "square covariance of the coefficients"
+    );
     let parameters = candidate.realise(values, surroundings)?.parameters();
     let mut jacobian = DMatrix::zeros(parameters.len(), n);
     for j in 0..n {
@@ -242,5 +266,18 @@ pub fn reported(
         }
     }
     let spread = &jacobian * covariance * jacobian.transpose();
-    Ok(parameters.into_iter().enumerate().map(|(i, p)| (p, spread[(i, i)].max(0.0).sqrt())).collect())
+    Ok(parameters
+        .into_iter()
+        .enumerate()
+        .map(|(i, p)| (p, spread[(i, i)].max(0.0).sqrt()))
+        .collect())
+}
+
+/// Panics unless a buffer holds one column of `rows` for each of `coefficients`.
+pub(crate) fn check_columns(coefficients: usize, rows: usize, got: usize) {
+    assert_eq!(
+        got,
+        coefficients * rows,
+        "one column of {rows} rows for each coefficient"
+    );
 }

@@ -59,7 +59,11 @@ pub trait EffectKind: core::fmt::Debug + Sync {
     /// # Errors
     /// A name that does not exist (with the nearest that does), a missing or impossible value, a
     /// channel that is not there, or an effect that needs raw images.
-    fn build(&self, parameters: &Parameters, surroundings: &Surroundings<'_>) -> Result<Box<dyn Effect>, EffectError>;
+    fn build(
+        &self,
+        parameters: &Parameters,
+        surroundings: &Surroundings<'_>,
+    ) -> Result<Box<dyn Effect>, EffectError>;
     /// Ways in which this effect could be in the data; empty when the data cannot show it.
     fn candidates(&self, scene: &Scene<'_>) -> Vec<Box<dyn Candidate>> {
         let _ = scene;

@@ -63,7 +63,9 @@ pub enum EffectError {
         expected: &'static str,
     },
     /// The housekeeping channel it needs is not there.
-    #[error("effect `{effect}` needs housekeeping channel `{channel}`, which this data does not have")]
+    #[error(
+        "effect `{effect}` needs housekeeping channel `{channel}`, which this data does not have"
+    )]
     NoChannel {
         /// The effect.
         effect: &'static str,

@@ -18,7 +18,11 @@ pub struct Parameter {
 impl Parameter {
     /// A parameter of the given name, value and unit.
     pub fn new(name: impl Into<String>, value: f64, unit: &'static str) -> Self {
-        Self { name: name.into(), value, unit }
+        Self {
+            name: name.into(),
+            value,
+            unit,
+        }
     }
 }
 
@@ -61,13 +65,19 @@ pub(crate) struct Reader<'a> {
 
 impl<'a> Reader<'a> {
     /// A reader that has checked every given key against `known`.
-    pub(crate) fn new(effect: &'static str, given: &'a Parameters, known: &[&str]) -> Result<Self, EffectError> {
+    pub(crate) fn new(
+        effect: &'static str,
+        given: &'a Parameters,
+        known: &[&str],
+    ) -> Result<Self, EffectError> {
         for key in given.keys() {
             if !known.contains(&key.as_str()) {
                 return Err(EffectError::UnknownParameter {
                     effect,
                     name: key.clone(),
-                    nearest: nearest(key, known.iter().copied()).unwrap_or_default().to_owned(),
+                    nearest: nearest(key, known.iter().copied())
+                        .unwrap_or_default()
+                        .to_owned(),
                 });
             }
         }
@@ -100,7 +110,10 @@ impl<'a> Reader<'a> {
 
     /// A number that must be there.
     pub(crate) fn required(&self, name: &'static str) -> Result<f64, EffectError> {
-        self.number(name)?.ok_or(EffectError::MissingParameter { effect: self.effect, name })
+        self.number(name)?.ok_or(EffectError::MissingParameter {
+            effect: self.effect,
+            name,
+        })
     }
 
     /// A number, or `default`.
@@ -119,7 +132,69 @@ impl<'a> Reader<'a> {
         if (low..=high).contains(&value) {
             return Ok(value);
         }
-        Err(EffectError::OutOfRange { effect: self.effect, name: name.to_owned(), value, expected })
+        Err(EffectError::OutOfRange {
+            effect: self.effect,
+            name: name.to_owned(),
+            value,
+            expected,
+        })
+    }
+
+    /// A whole number, given as a number or as text.
+    pub(crate) fn integer(&self, name: &'static str) -> Result<i64, EffectError> {
+        let wrong = || EffectError::WrongType {
+            effect: self.effect,
+            name: name.to_owned(),
+            expected: "a whole number",
+        };
+        match self.given.get(name) {
+            None => Err(EffectError::MissingParameter {
+                effect: self.effect,
+                name,
+            }),
+            Some(ParameterValue::Text(text)) => text.trim().parse().map_err(|_| wrong()),
+            // beyond 2^53 a double no longer tells neighbouring numbers apart
+            Some(ParameterValue::Number(value)) => {
+                #[expect(clippy::cast_possible_truncation, reason = "whole and below 2^53")]
+                let whole = *value as i64;
+                let exact = value.fract() == 0.0 && value.abs() <= 9_007_199_254_740_992.0;
+                if exact { Ok(whole) } else { Err(wrong()) }
+            }
+        }
+    }
+
+    /// Numbers of which those not given are 0, but one at least must be.
+    pub(crate) fn axes<const N: usize>(
+        &self,
+        names: [&'static str; N],
+    ) -> Result<[f64; N], EffectError> {
+        if !names.iter().any(|name| self.has(name)) {
+            return Err(EffectError::MissingParameter {
+                effect: self.effect,
+                name: names[0],
+            });
+        }
+        let mut values = [0.0; N];
+        for (value, name) in values.iter_mut().zip(names) {
+            *value = self.number_or(name, 0.0)?;
+        }
+        Ok(values)
+    }
+
+    /// Refuses every one of `others`, which belong to another form than `name`.
+    pub(crate) fn exclude<'o>(
+        &self,
+        name: &str,
+        others: impl IntoIterator<Item = &'o str>,
+    ) -> Result<(), EffectError> {
+        match others.into_iter().find(|other| self.has(other)) {
+            None => Ok(()),
+            Some(other) => Err(EffectError::Conflicting {
+                effect: self.effect,
+                name: name.to_owned(),
+                other: other.to_owned(),
+            }),
+        }
     }
 
     /// A selector, if given.
@@ -163,7 +238,8 @@ mod tests {
     #[test]
     fn a_misspelt_name_is_answered_with_the_nearest() {
         let given = Parameters::from([("line_tme_s".to_owned(), 1.0.into())]);
-        let error = Reader::new("rolling_shutter", &given, &["line_time_s", "offset_s"]).unwrap_err();
+        let error =
+            Reader::new("rolling_shutter", &given, &["line_time_s", "offset_s"]).unwrap_err();
         assert_eq!(
             error,
             EffectError::UnknownParameter {

@@ -90,3 +90,11 @@ pub struct Scene<'a> {
     /// The star rows, for effects whose candidates depend on where stars have been.
     pub rows: Option<&'a StarRows<'a>>,
 }
+
+impl Scene<'_> {
+    /// Whether a rotation of the whole tracker shows: against a reference only, because otherwise every
+    /// frame's attitude is free.
+    pub fn sees_misalignment(&self) -> bool {
+        self.has_reference && (self.has_stars || self.has_attitude)
+    }
+}

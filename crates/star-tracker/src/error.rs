@@ -32,10 +32,18 @@ pub enum TrackerError {
 
 impl TrackerError {
     pub(crate) fn check_finite(name: &'static str, value: f64) -> Result<(), Self> {
-        if value.is_finite() { Ok(()) } else { Err(Self::NotFinite { name, value }) }
+        if value.is_finite() {
+            Ok(())
+        } else {
+            Err(Self::NotFinite { name, value })
+        }
     }
 
     pub(crate) fn check_not_negative(name: &'static str, value: f64) -> Result<(), Self> {
-        if value.is_finite() && value >= 0.0 { Ok(()) } else { Err(Self::Negative { name, value }) }
+        if value.is_finite() && value >= 0.0 {
+            Ok(())
+        } else {
+            Err(Self::Negative { name, value })
+        }
     }
 }

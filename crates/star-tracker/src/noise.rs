@@ -27,8 +27,12 @@ pub struct TemporalNoise {
 
 impl TemporalNoise {
     /// No noise.
-    pub const NONE: Self =
-        Self { per_axis_arcsec: 0.0, slope: 0.0, reference_mag: 0.0, arcsec_per_deg_s: 0.0 };
+    pub const NONE: Self = Self {
+        per_axis_arcsec: 0.0,
+        slope: 0.0,
+        reference_mag: 0.0,
+        arcsec_per_deg_s: 0.0,
+    };
 
     /// Constant noise from the per-axis sigma, arcsec.
     ///
@@ -36,7 +40,10 @@ impl TemporalNoise {
     /// When it is negative or not finite.
     pub fn per_axis_arcsec(sigma: f64) -> Result<Self, TrackerError> {
         TrackerError::check_not_negative("temporal noise", sigma)?;
-        Ok(Self { per_axis_arcsec: sigma, ..Self::NONE })
+        Ok(Self {
+            per_axis_arcsec: sigma,
+            ..Self::NONE
+        })
     }
 
     /// Constant noise from the per-star circular sigma, arcsec, as [M23] Step 4 means it.
@@ -52,10 +59,18 @@ impl TemporalNoise {
     ///
     /// # Errors
     /// When a number is not finite.
-    pub fn with_magnitude_slope(self, slope: f64, reference_mag: f64) -> Result<Self, TrackerError> {
+    pub fn with_magnitude_slope(
+        self,
+        slope: f64,
+        reference_mag: f64,
+    ) -> Result<Self, TrackerError> {
         TrackerError::check_finite("magnitude slope", slope)?;
         TrackerError::check_finite("reference magnitude", reference_mag)?;
-        Ok(Self { slope, reference_mag, ..self })
+        Ok(Self {
+            slope,
+            reference_mag,
+            ..self
+        })
     }
 
     /// The same, growing with rate: `arcsec_per_deg_s` per axis, added in square.
@@ -64,7 +79,10 @@ impl TemporalNoise {
     /// When it is negative or not finite.
     pub fn with_rate(self, arcsec_per_deg_s: f64) -> Result<Self, TrackerError> {
         TrackerError::check_not_negative("rate noise", arcsec_per_deg_s)?;
-        Ok(Self { arcsec_per_deg_s, ..self })
+        Ok(Self {
+            arcsec_per_deg_s,
+            ..self
+        })
     }
 
     /// Sigma of every star while it neither moves nor differs from the reference magnitude, arcsec per
@@ -112,7 +130,10 @@ mod tests {
         let noise = TemporalNoise::per_axis_arcsec(2.0)?.with_magnitude_slope(1.0, 3.0)?;
         let at = |mag: f64| noise.sigma_arcsec(mag, 0.0);
         assert!((at(8.0) / at(3.0) - 10.0).abs() < 1e-12);
-        assert!((at(f64::NAN) - 2.0).abs() < 1e-15, "unknown magnitude keeps the constant");
+        assert!(
+            (at(f64::NAN) - 2.0).abs() < 1e-15,
+            "unknown magnitude keeps the constant"
+        );
         Ok(())
     }
 

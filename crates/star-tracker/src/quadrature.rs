@@ -26,9 +26,19 @@ mod tests {
     #[test]
     fn monomials_up_to_degree_fifteen_are_exact() {
         for degree in 0..16_i32 {
-            let got: f64 = GAUSS_LEGENDRE_8.iter().map(|(u, w)| w * u.powi(degree)).sum();
-            let exact = if degree % 2 == 0 { 2.0 / f64::from(degree + 1) } else { 0.0 };
-            assert!((got - exact).abs() < 1e-15, "degree {degree}: {got} against {exact}");
+            let got: f64 = GAUSS_LEGENDRE_8
+                .iter()
+                .map(|(u, w)| w * u.powi(degree))
+                .sum();
+            let exact = if degree % 2 == 0 {
+                2.0 / f64::from(degree + 1)
+            } else {
+                0.0
+            };
+            assert!(
+                (got - exact).abs() < 1e-15,
+                "degree {degree}: {got} against {exact}"
+            );
         }
     }
 }

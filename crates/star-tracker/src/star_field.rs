@@ -8,7 +8,7 @@
 //! half-width  min( s_x / 2, X - |x_c| ),  s_x their standard deviation, X the half-size of the field
 //! ```
 //!
-//! and the same in y, so that the box (full width s_x) is no larger than the spread of the remaining
+//! and the same in y, so that the box (full width `s_x`) is no larger than the spread of the remaining
 //! stars and wholly inside the field. The box sits opposite to the remaining stars, which keeps the
 //! field balanced. With fewer than two stars left there is no spread: the box is the whole field.
 //!
@@ -68,9 +68,15 @@ impl StarField {
         rng: &mut R,
     ) -> Result<Self, TrackerError> {
         if stars < 2 {
-            return Err(TrackerError::TooFewStars { got: stars, need: 2 });
+            return Err(TrackerError::TooFewStars {
+                got: stars,
+                need: 2,
+            });
         }
-        let mut field = Self { slots: Vec::with_capacity(stars), next_id: 1 };
+        let mut field = Self {
+            slots: Vec::with_capacity(stars),
+            next_id: 1,
+        };
         let mut seen: Vec<Pixel> = Vec::with_capacity(stars);
         let [hx, hy] = camera.half_size_px();
         for _ in 0..stars {
@@ -88,10 +94,20 @@ impl StarField {
     /// Fewer than two stars cannot fix an attitude.
     pub fn from_stars(stars: Vec<FieldStar>) -> Result<Self, TrackerError> {
         if stars.len() < 2 {
-            return Err(TrackerError::TooFewStars { got: stars.len(), need: 2 });
+            return Err(TrackerError::TooFewStars {
+                got: stars.len(),
+                need: 2,
+            });
         }
-        let next_id = stars.iter().map(|star| star.id).max().map_or(1, |id| id + 1);
-        Ok(Self { slots: stars, next_id })
+        let next_id = stars
+            .iter()
+            .map(|star| star.id)
+            .max()
+            .map_or(1, |id| id + 1);
+        Ok(Self {
+            slots: stars,
+            next_id,
+        })
     }
 
     /// The stars, slot by slot.
@@ -110,7 +126,9 @@ impl StarField {
         rng: &mut R,
     ) -> usize {
         let inside = |star: &FieldStar| {
-            camera.project(&(q * star.direction)).filter(|at| camera.contains(*at))
+            camera
+                .project(&(q * star.direction))
+                .filter(|at| camera.contains(*at))
         };
         let mut remaining: Vec<Pixel> = Vec::new();
         let mut gone: Vec<usize> = Vec::new();
@@ -159,7 +177,12 @@ pub fn replacement_box(camera: &Camera, remaining: &[Pixel]) -> [[f64; 2]; 2] {
     let range = |values: &dyn Fn(&Pixel) -> f64, half: f64| {
         let n = remaining.len() as f64;
         let mean = remaining.iter().map(values).sum::<f64>() / n;
-        let spread = (remaining.iter().map(|p| (values(p) - mean).powi(2)).sum::<f64>() / n).sqrt();
+        let spread = (remaining
+            .iter()
+            .map(|p| (values(p) - mean).powi(2))
+            .sum::<f64>()
+            / n)
+            .sqrt();
         let width = (0.5 * spread).min(half - mean.abs());
         [-mean - width, -mean + width]
     };
@@ -174,9 +197,9 @@ fn draw_apart<R: Rng + ?Sized>(bounds: [[f64; 2]; 2], others: &[Pixel], rng: &mu
         Pixel { x, y }
     };
     let apart = |p: &Pixel| {
-        others.iter().all(|o| {
-            (p.x - o.x).abs().max((p.y - o.y).abs()) >= StarField::MIN_SEPARATION_PX
-        })
+        others
+            .iter()
+            .all(|o| (p.x - o.x).abs().max((p.y - o.y).abs()) >= StarField::MIN_SEPARATION_PX)
     };
     let mut at = draw();
     for _ in 0..100 {
@@ -216,10 +239,14 @@ impl<'a> CatalogueTracking<'a> {
         margin_px: f64,
     ) -> Self {
         let stars = catalogue.stars();
-        let mut by_brightness: Vec<usize> =
-            (0..stars.len()).filter(|&i| stars[i].mag <= limiting_mag).collect();
+        let mut by_brightness: Vec<usize> = (0..stars.len())
+            .filter(|&i| stars[i].mag <= limiting_mag)
+            .collect();
         by_brightness.sort_by(|&a, &b| {
-            stars[a].mag.total_cmp(&stars[b].mag).then(stars[a].id.cmp(&stars[b].id))
+            stars[a]
+                .mag
+                .total_cmp(&stars[b].mag)
+                .then(stars[a].id.cmp(&stars[b].id))
         });
         Self {
             catalogue,
@@ -248,8 +275,10 @@ impl<'a> CatalogueTracking<'a> {
                 changed += 1;
             }
         }
-        let mut free: Vec<usize> =
-            (0..self.slots.len()).rev().filter(|&slot| self.slots[slot].is_none()).collect();
+        let mut free: Vec<usize> = (0..self.slots.len())
+            .rev()
+            .filter(|&slot| self.slots[slot].is_none())
+            .collect();
         let before = free.len();
         if before == 0 {
             return changed;
@@ -274,15 +303,25 @@ impl<'a> CatalogueTracking<'a> {
         (0_i32..).zip(&self.slots).filter_map(|(slot, index)| {
             let star = &self.catalogue.stars()[(*index)?];
             let direction = self.directions[(*index)?];
-            Some((slot, FieldStar { id: star.id, direction, mag: star.mag, bv: star.bv }))
+            Some((
+                slot,
+                FieldStar {
+                    id: star.id,
+                    direction,
+                    mag: star.mag,
+                    bv: star.bv,
+                },
+            ))
         })
     }
 
     fn inside(&self, camera: &Camera, q: &UnitQuaternion<f64>, index: usize) -> bool {
         let half = camera.half_size_px();
-        camera.project(&(q * self.directions[index])).is_some_and(|p| {
-            p.x.abs() <= half[0] - self.margin_px && p.y.abs() <= half[1] - self.margin_px
-        })
+        camera
+            .project(&(q * self.directions[index]))
+            .is_some_and(|p| {
+                p.x.abs() <= half[0] - self.margin_px && p.y.abs() <= half[1] - self.margin_px
+            })
     }
 }
 
@@ -313,15 +352,25 @@ mod tests {
                 .filter(|&i| !seen(&before, i).is_some_and(|p| camera.contains(p)))
                 .collect();
             assert_eq!(field.update(&camera, &q, &mut rng), gone.len());
-            let mut remaining: Vec<Pixel> =
-                (0..14).filter(|i| !gone.contains(i)).map(|i| seen(&before, i).unwrap()).collect();
+            let mut remaining: Vec<Pixel> = (0..14)
+                .filter(|i| !gone.contains(i))
+                .map(|i| seen(&before, i).unwrap())
+                .collect();
             for &slot in &gone {
                 let p = seen(&field, slot).unwrap();
                 let [x, y] = replacement_box(&camera, &remaining);
                 // 1e-9 px: the projection of a direction made from the pixel
-                assert!(p.x > x[0] - 1e-9 && p.x < x[1] + 1e-9 && p.y > y[0] - 1e-9 && p.y < y[1] + 1e-9);
+                assert!(
+                    p.x > x[0] - 1e-9
+                        && p.x < x[1] + 1e-9
+                        && p.y > y[0] - 1e-9
+                        && p.y < y[1] + 1e-9
+                );
                 assert!(camera.contains(p));
-                assert!(ids.insert(field.stars()[slot].id), "a new star has a new identity");
+                assert!(
+                    ids.insert(field.stars()[slot].id),
+                    "a new star has a new identity"
+                );
                 remaining.push(p);
                 replaced += 1;
             }
@@ -337,7 +386,8 @@ mod tests {
         assert!((0.5 * (x[0] + x[1]) - 450.0).abs() < 1e-9 && (0.5 * (y[0] + y[1])).abs() < 1e-9);
         // spread in x: sqrt(5000/3) = 40.8; the field's edge leaves 62
         assert!((x[1] - x[0] - (5000.0_f64 / 3.0).sqrt()).abs() < 1e-9);
-        let wide = [(-500.0, 0.0), (510.0, 0.0), (511.0, 1.0), (509.0, 3.0)].map(|(x, y)| Pixel { x, y });
+        let wide =
+            [(-500.0, 0.0), (510.0, 0.0), (511.0, 1.0), (509.0, 3.0)].map(|(x, y)| Pixel { x, y });
         let [x, _] = replacement_box(&camera, &wide);
         assert!(x[0] >= -512.0 && x[1] <= 512.0);
         assert_eq!(replacement_box(&camera, &stars[..1]), [[-512.0, 512.0]; 2]);

@@ -11,7 +11,7 @@
 //! 2.7e-8 for a million streams.
 //!
 //! Source: Blackman & Vigna, "Scrambled linear pseudorandom number generators", ACM TOMS 47 (2021),
-//! xoshiro256++ seeded by SplitMix64 as its authors recommend.
+//! xoshiro256++ seeded by `SplitMix64` as its authors recommend.
 
 use rand_core::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -77,7 +77,7 @@ impl NoiseStreams {
     }
 }
 
-/// The finaliser of SplitMix64 after its increment: a bijection of 64 bits.
+/// The finaliser of `SplitMix64` after its increment: a bijection of 64 bits.
 const fn mix(x: u64) -> u64 {
     let z = x.wrapping_add(0x9e37_79b9_7f4a_7c15);
     let z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -116,10 +116,18 @@ mod tests {
     #[test]
     fn neighbouring_draws_are_uncorrelated() {
         let n = 100_000_u32;
-        let (mut a, mut b) = (stream(1, 0, Purpose::TemporalNoise), stream(1, 1, Purpose::TemporalNoise));
+        let (mut a, mut b) = (
+            stream(1, 0, Purpose::TemporalNoise),
+            stream(1, 1, Purpose::TemporalNoise),
+        );
         let uniform = |bits: u64| (bits >> 11) as f64 / (1_u64 << 53) as f64 - 0.5;
-        let sum: f64 = (0..n).map(|_| uniform(a.next_u64()) * uniform(b.next_u64())).sum();
+        let sum: f64 = (0..n)
+            .map(|_| uniform(a.next_u64()) * uniform(b.next_u64()))
+            .sum();
         let correlation = 12.0 * sum / f64::from(n);
-        assert!(correlation.abs() < 5.0 / f64::from(n).sqrt(), "correlation {correlation}");
+        assert!(
+            correlation.abs() < 5.0 / f64::from(n).sqrt(),
+            "correlation {correlation}"
+        );
     }
 }

@@ -1,0 +1,127 @@
+//! Optical distortion outside the declared prior: radial, decentring, off-centre.
+//!
+//! ```text
+//! x, y    tangent-plane position minus the centre (cx_px, cy_px),   r^2 = x^2 + y^2
+//! dx = x (k1 r^2 + k2 r^4) + 2 p1 x y + p2 (r^2 + 2 x^2)
+//! dy = y (k1 r^2 + k2 r^4) + p1 (r^2 + 2 y^2) + 2 p2 x y            times f: px
+//! ```
+//!
+//! The coefficients have no unit (focal length 1). As regressors, k1, k2, p1, p2 enter about the
+//! boresight; to first order a displaced centre of a radial term is itself a decentring one, so cx, cy
+//! are not fitted.
+//!
+//! Source: Brown, "Decentering distortion of lenses", Photogrammetric Engineering 32 (1966) 444.
+
+use focal_plane::{Camera, Pixel};
+use star_tracker::StarView;
+
+use crate::parameters::Reader;
+use crate::shift::{Shift, ShiftCandidate, Shifted};
+use crate::{
+    ActsOn, Candidate, Coefficient, Effect, EffectError, EffectKind, Parameter, Parameters, Scene,
+    Surroundings,
+};
+
+const ID: &str = "optical_distortion";
+const TERMS: [&str; 4] = ["k1", "k2", "p1", "p2"];
+
+/// Shift at the edge of the field that would not surprise, arcsec.
+const PLAUSIBLE_ARCSEC: f64 = 10.0;
+
+/// The kind.
+#[derive(Debug)]
+pub(crate) struct Kind;
+
+impl EffectKind for Kind {
+    fn id(&self) -> &'static str {
+        ID
+    }
+    fn summary(&self) -> &'static str {
+        "radial and decentring distortion outside the declared prior"
+    }
+    fn acts_on(&self) -> ActsOn {
+        ActsOn {
+            stars: true,
+            ..ActsOn::default()
+        }
+    }
+    fn build(
+        &self,
+        parameters: &Parameters,
+        surroundings: &Surroundings<'_>,
+    ) -> Result<Box<dyn Effect>, EffectError> {
+        let known = ["k1", "k2", "p1", "p2", "cx_px", "cy_px"];
+        let reader = Reader::new(ID, parameters, &known)?;
+        let values = reader.axes(TERMS)?;
+        let centre = Pixel {
+            x: reader.number_or("cx_px", 0.0)?,
+            y: reader.number_or("cy_px", 0.0)?,
+        };
+        let brown = Brown {
+            camera: surroundings.camera.clone(),
+            centre,
+        };
+        Ok(Box::new(Shifted::new(brown, values.to_vec())))
+    }
+    fn candidates(&self, scene: &Scene<'_>) -> Vec<Box<dyn Candidate>> {
+        if !scene.has_stars {
+            return Vec::new();
+        }
+        let camera = scene.surroundings.camera.clone();
+        vec![ShiftCandidate::boxed(Brown {
+            camera,
+            centre: Pixel::default(),
+        })]
+    }
+}
+
+#[derive(Clone, Debug)]
+struct Brown {
+    camera: Camera,
+    centre: Pixel,
+}
+
+impl Shift for Brown {
+    fn id(&self) -> &'static str {
+        ID
+    }
+    fn coefficients(&self) -> Vec<Coefficient> {
+        let edge = self.camera.half_size_px()[0] / self.camera.focal_length_px()[0];
+        let size = PLAUSIBLE_ARCSEC / focal_plane::ARCSEC_PER_RAD;
+        let plausible = [
+            size / edge.powi(3),
+            size / edge.powi(5),
+            size / edge.powi(2),
+            size / edge.powi(2),
+        ];
+        TERMS
+            .into_iter()
+            .zip(plausible)
+            .map(|(n, p)| Coefficient::new(n, "", p))
+            .collect()
+    }
+    fn terms(&self, star: &StarView, out: &mut [[f64; 2]]) {
+        let off = Pixel {
+            x: star.at.x - self.centre.x,
+            y: star.at.y - self.centre.y,
+        };
+        let t = self.camera.tangent(off);
+        let (x, y) = (t.x, t.y);
+        let r2 = x * x + y * y;
+        let [fx, fy] = self.camera.focal_length_px();
+        out[0] = [fx * x * r2, fy * y * r2];
+        out[1] = [fx * x * r2 * r2, fy * y * r2 * r2];
+        out[2] = [fx * 2.0 * x * y, fy * (r2 + 2.0 * y * y)];
+        out[3] = [fx * (r2 + 2.0 * x * x), fy * 2.0 * x * y];
+    }
+    fn parameters(&self, values: &[f64]) -> Vec<Parameter> {
+        let mut all: Vec<Parameter> = TERMS
+            .into_iter()
+            .zip(values)
+            .map(|(n, &v)| Parameter::new(n, v, ""))
+            .collect();
+        all.push(Parameter::new("cx_px", self.centre.x, "px"));
+        all.push(Parameter::new("cy_px", self.centre.y, "px"));
+        all
+    }
+}

@@ -1,0 +1,139 @@
+//! Periodic misalignment: one line in the attitude, of any cause.
+//!
+//! ```text
+//! theta_a(t) = a_cos cos(2 pi f t) + a_sin sin(2 pi f t),    a = x, y, z      arcsec, tracker axes
+//! ```
+//!
+//! Source: definition; harmonics of the orbit, for instance.
+
+use core::f64::consts::TAU;
+
+use crate::bending::{Bending, BendingCandidate, Bent};
+use crate::parameters::Reader;
+use crate::{
+    ActsOn, Candidate, Coefficient, Effect, EffectError, EffectKind, Nonlinear, Parameter,
+    Parameters, Scene, Surroundings,
+};
+
+const ID: &str = "periodic_misalignment";
+
+const NAMES: [&str; 6] = [
+    "x_cos_arcsec",
+    "x_sin_arcsec",
+    "y_cos_arcsec",
+    "y_sin_arcsec",
+    "z_cos_arcsec",
+    "z_sin_arcsec",
+];
+
+/// Frequencies that the catalogue proposes: the first harmonics of the span. A line above them is
+/// found in a spectrum, and [`line_at`] makes its candidate.
+const HARMONICS: u32 = 24;
+
+/// The kind.
+#[derive(Debug)]
+pub(crate) struct Kind;
+
+impl EffectKind for Kind {
+    fn id(&self) -> &'static str {
+        ID
+    }
+    fn summary(&self) -> &'static str {
+        "the tracker swings against the reference at frequency_hz"
+    }
+    fn acts_on(&self) -> ActsOn {
+        ActsOn {
+            attitude: true,
+            ..ActsOn::default()
+        }
+    }
+    fn build(
+        &self,
+        parameters: &Parameters,
+        _: &Surroundings<'_>,
+    ) -> Result<Box<dyn Effect>, EffectError> {
+        let mut known = vec!["frequency_hz"];
+        known.extend(NAMES);
+        let reader = Reader::new(ID, parameters, &known)?;
+        let frequency_hz = reader.within("frequency_hz", [1e-12, 1e6], "positive")?;
+        let values = reader.axes(NAMES)?;
+        let bending = Line {
+            frequency_hz,
+            range: [frequency_hz; 2],
+            step: 0.0,
+        };
+        Ok(Box::new(Bent {
+            bending,
+            values: values.to_vec(),
+        }))
+    }
+    fn candidates(&self, scene: &Scene<'_>) -> Vec<Box<dyn Candidate>> {
+        let span = scene.surroundings.length_s();
+        if !scene.sees_misalignment() || span <= 0.0 {
+            return Vec::new();
+        }
+        (1..=HARMONICS)
+            .map(|k| f64::from(k) / span)
+            .take_while(|f| *f < 0.5 / scene.step_s)
+            .map(|f| line_at(f, span))
+            .collect()
+    }
+}
+
+/// A line of unknown amplitude at `frequency_hz`, in data `span_s` long.
+///
+/// Frequency is refined within half a bin `1 / span_s` to either side: what a line leaves at a slightly
+/// wrong frequency would pass for another line.
+pub fn line_at(frequency_hz: f64, span_s: f64) -> Box<dyn Candidate> {
+    let bin = 1.0 / span_s;
+    let range = [(frequency_hz - bin).max(0.1 * bin), frequency_hz + bin];
+    BendingCandidate::boxed(Line {
+        frequency_hz,
+        range,
+        step: 0.5 * bin,
+    })
+}
+
+#[derive(Clone, Debug)]
+struct Line {
+    frequency_hz: f64,
+    range: [f64; 2],
+    step: f64,
+}
+
+impl Bending for Line {
+    fn id(&self) -> &'static str {
+        ID
+    }
+    fn coefficients(&self) -> Vec<Coefficient> {
+        NAMES
+            .map(|name| Coefficient::new(name, "arcsec", 5.0))
+            .into()
+    }
+    fn functions(&self) -> usize {
+        2
+    }
+    fn at(&self, t_s: f64, out: &mut [f64]) {
+        let (sin, cos) = (TAU * (self.frequency_hz * t_s).fract()).sin_cos();
+        out.copy_from_slice(&[cos, sin]);
+    }
+    fn fixed(&self) -> Vec<Parameter> {
+        vec![Parameter::new("frequency_hz", self.frequency_hz, "Hz")]
+    }
+    fn nonlinear(&self) -> Vec<Nonlinear> {
+        vec![Nonlinear {
+            name: "frequency_hz",
+            unit: "Hz",
+            value: self.frequency_hz,
+            range: self.range,
+            step: self.step,
+        }]
+    }
+    fn with_nonlinear(&self, values: &[f64]) -> Option<Self> {
+        let [low, high] = self.range;
+        (low..=high).contains(&values[0]).then(|| Self {
+            frequency_hz: values[0],
+            ..self.clone()
+        })
+    }
+}

@@ -1,0 +1,175 @@
+//! Pixel phase harmonics: the centroid error is not the declared one.
+//!
+//! ```text
+//! dx = x<k>_amplitude sin(k phi_x + x<k>_phase),    phi = 2 pi frac(P + 0.5 - pixel_centre)
+//! ```
+//!
+//! and the same in y, arcsec at the centre's scale, beside the declared centroid error and evaluated
+//! at the same distorted, noise-free position. As regressors the sine and the cosine of each order are
+//! two coefficients (amplitude cos phase, amplitude sin phase); amplitude and phase are reported.
+//!
+//! Source: [M23] Eq. 9-11, Step 3, with another periodic function in place of the triangle.
+
+use focal_plane::Camera;
+use star_tracker::{Stages, StarView};
+
+use crate::parameters::Reader;
+use crate::shift::{Shift, ShiftCandidate, Shifted};
+use crate::{
+    ActsOn, Candidate, Coefficient, Effect, EffectError, EffectKind, Parameter, Parameters, Scene,
+    Surroundings,
+};
+
+const ID: &str = "pixel_phase_harmonics";
+
+/// Highest order.
+const ORDERS: u32 = 4;
+
+/// The kind.
+#[derive(Debug)]
+pub(crate) struct Kind;
+
+impl EffectKind for Kind {
+    fn id(&self) -> &'static str {
+        ID
+    }
+    fn summary(&self) -> &'static str {
+        "the centroid error has harmonics in the pixel phase beside the declared one"
+    }
+    fn acts_on(&self) -> ActsOn {
+        ActsOn {
+            stars: true,
+            ..ActsOn::default()
+        }
+    }
+    fn build(
+        &self,
+        parameters: &Parameters,
+        surroundings: &Surroundings<'_>,
+    ) -> Result<Box<dyn Effect>, EffectError> {
+        let all: Vec<String> = (1..=ORDERS).flat_map(names_of).collect();
+        let known: Vec<&str> = all.iter().map(String::as_str).collect();
+        let reader = Reader::new(ID, parameters, &known)?;
+        let mut orders = Vec::new();
+        let mut values = Vec::new();
+        for k in 1..=ORDERS {
+            if !names_of(k).iter().any(|name| reader.has(name)) {
+                continue;
+            }
+            orders.push(k);
+            for [amplitude, phase] in names(k) {
+                let amplitude = reader.number_or(&amplitude, 0.0)?;
+                let (sin, cos) = reader.number_or(&phase, 0.0)?.sin_cos();
+                values.extend([amplitude * cos, amplitude * sin]);
+            }
+        }
+        if orders.is_empty() {
+            return Err(EffectError::MissingParameter {
+                effect: ID,
+                name: "x<k>_amplitude_arcsec or y<k>_amplitude_arcsec, k = 1 to 4",
+            });
+        }
+        Ok(Box::new(Shifted::new(
+            Phase {
+                camera: surroundings.camera.clone(),
+                orders,
+            },
+            values,
+        )))
+    }
+    fn candidates(&self, scene: &Scene<'_>) -> Vec<Box<dyn Candidate>> {
+        if !scene.has_stars {
+            return Vec::new();
+        }
+        let camera = scene.surroundings.camera;
+        let mut all: Vec<Box<dyn Candidate>> =
+            (1..=ORDERS).map(|k| harmonics_of(camera, &[k])).collect();
+        all.push(harmonics_of(camera, &[1, 2, 3, 4]));
+        all
+    }
+}
+
+/// Harmonics of these orders (1 to 4) in both axes, of unknown size.
+///
+/// # Panics
+///
+/// For an order that does not exist.
+pub fn harmonics_of(camera: &Camera, orders: &[u32]) -> Box<dyn Candidate> {
+    assert!(
+        orders.iter().all(|k| (1..=ORDERS).contains(k)),
+        "orders are 1 to {ORDERS}"
+    );
+    ShiftCandidate::boxed(Phase {
+        camera: camera.clone(),
+        orders: orders.to_vec(),
+    })
+}
+
+/// Names of amplitude and phase of order k, per axis.
+fn names(k: u32) -> [[String; 2]; 2] {
+    ["x", "y"].map(|axis| {
+        [
+            format!("{axis}{k}_amplitude_arcsec"),
+            format!("{axis}{k}_phase_rad"),
+        ]
+    })
+}
+
+fn names_of(k: u32) -> Vec<String> {
+    names(k).into_iter().flatten().collect()
+}
+
+#[derive(Clone, Debug)]
+struct Phase {
+    camera: Camera,
+    orders: Vec<u32>,
+}
+
+impl Shift for Phase {
+    fn id(&self) -> &'static str {
+        ID
+    }
+    fn stages(&self) -> Stages {
+        Stages {
+            centroid: true,
+            ..Stages::NONE
+        }
+    }
+    fn coefficients(&self) -> Vec<Coefficient> {
+        let mut all = Vec::new();
+        for k in &self.orders {
+            for axis in ["x", "y"] {
+                for wave in ["sin", "cos"] {
+                    let name = format!("{axis}{k}_{wave}_arcsec");
+                    all.push(Coefficient::new(name, "arcsec", 2.0));
+                }
+            }
+        }
+        all
+    }
+    fn terms(&self, star: &StarView, out: &mut [[f64; 2]]) {
+        let [scale_x, scale_y] = self.camera.arcsec_per_px();
+        let (phi_x, phi_y) = (
+            self.camera.phase_rad(star.at.x),
+            self.camera.phase_rad(star.at.y),
+        );
+        for (terms, &k) in out.chunks_exact_mut(4).zip(&self.orders) {
+            let (sin_x, cos_x) = (f64::from(k) * phi_x).sin_cos();
+            let (sin_y, cos_y) = (f64::from(k) * phi_y).sin_cos();
+            terms[0] = [sin_x / scale_x, 0.0];
+            terms[1] = [cos_x / scale_x, 0.0];
+            terms[2] = [0.0, sin_y / scale_y];
+            terms[3] = [0.0, cos_y / scale_y];
+        }
+    }
+    fn parameters(&self, values: &[f64]) -> Vec<Parameter> {
+        let mut all = Vec::new();
+        for (&k, four) in self.orders.iter().zip(values.chunks_exact(4)) {
+            for ([amplitude, phase], wave) in names(k).into_iter().zip(four.chunks_exact(2)) {
+                all.push(Parameter::new(amplitude, wave[0].hypot(wave[1]), "arcsec"));
+                all.push(Parameter::new(phase, wave[1].atan2(wave[0]), "rad"));
+            }
+        }
+        all
+    }
+}

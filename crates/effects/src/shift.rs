@@ -1,0 +1,183 @@
+//! Effects that shift an image by terms linear in their coefficients.
+//!
+//! ```text
+//! dP(star) = sum_j c_j T_j(star, P)      px
+//! ```
+//!
+//! One formula `T` serves both ways: forward, at the position the light comes through, and as the
+//! columns of a fit, at the modelled position. The two positions differ by the declared distortion
+//! at most, which is of second order.
+//!
+//! Source: linearity only; each effect's terms have their own.
+
+use core::fmt::Debug;
+use std::collections::BTreeMap;
+
+use focal_plane::{Camera, Pixel, PointsMut, VectorsMut};
+use star_tracker::{Disturbance, Stages, StarView};
+
+use crate::candidate::check_columns;
+use crate::{
+    AttitudeRows, Candidate, Coefficient, Effect, EffectError, Parameter, StarRows, Surroundings,
+};
+
+/// Most terms of one effect.
+pub(crate) const MAX_TERMS: usize = 32;
+
+/// The terms of one effect.
+pub(crate) trait Shift: Clone + Debug + Send + Sync + 'static {
+    /// Identity in the catalogue.
+    fn id(&self) -> &'static str;
+    /// Where it acts: the image before the declared distortion, or the centroid.
+    fn stages(&self) -> Stages {
+        Stages {
+            image: true,
+            ..Stages::NONE
+        }
+    }
+    /// Coefficients in the order of the terms.
+    fn coefficients(&self) -> Vec<Coefficient>;
+    /// Shift per unit of each coefficient, px.
+    fn terms(&self, star: &StarView, out: &mut [[f64; 2]]);
+    /// Reported parameters of these values.
+    fn parameters(&self, values: &[f64]) -> Vec<Parameter> {
+        self.coefficients()
+            .into_iter()
+            .zip(values)
+            .map(|(c, &value)| Parameter::new(c.name, value, c.unit))
+            .collect()
+    }
+    /// What tells it from others of its kind.
+    fn selectors(&self) -> BTreeMap<String, String> {
+        BTreeMap::new()
+    }
+}
+
+/// A shift with its values.
+#[derive(Clone, Debug)]
+pub(crate) struct Shifted<S> {
+    shift: S,
+    values: Vec<f64>,
+}
+
+impl<S: Shift> Shifted<S> {
+    pub(crate) fn new(shift: S, values: Vec<f64>) -> Self {
+        assert!(values.len() <= MAX_TERMS, "at most {MAX_TERMS} terms");
+        Self { shift, values }
+    }
+
+    fn total(&self, star: &StarView) -> [f64; 2] {
+        let mut terms = [[0.0; 2]; MAX_TERMS];
+        self.shift.terms(star, &mut terms[..self.values.len()]);
+        let mut sum = [0.0; 2];
+        for (term, value) in terms.iter().zip(&self.values) {
+            sum[0] += value * term[0];
+            sum[1] += value * term[1];
+        }
+        sum
+    }
+}
+
+impl<S: Shift> Disturbance for Shifted<S> {
+    fn stages(&self) -> Stages {
+        self.shift.stages()
+    }
+    fn image_shift_px(&self, star: &StarView) -> [f64; 2] {
+        self.total(star)
+    }
+    fn centroid_shift_px(&self, star: &StarView) -> [f64; 2] {
+        self.total(star)
+    }
+}
+
+impl<S: Shift> Effect for Shifted<S> {
+    fn id(&self) -> &'static str {
+        self.shift.id()
+    }
+    fn parameters(&self) -> Vec<Parameter> {
+        self.shift.parameters(&self.values)
+    }
+    fn selectors(&self) -> BTreeMap<String, String> {
+        self.shift.selectors()
+    }
+}
+
+/// A shift of unknown size.
+#[derive(Clone, Debug)]
+pub(crate) struct ShiftCandidate<S> {
+    shift: S,
+    coefficients: Vec<Coefficient>,
+}
+
+impl<S: Shift> ShiftCandidate<S> {
+    pub(crate) fn boxed(shift: S) -> Box<dyn Candidate> {
+        let coefficients = shift.coefficients();
+        Box::new(Self {
+            shift,
+            coefficients,
+        })
+    }
+}
+
+impl<S: Shift> Candidate for ShiftCandidate<S> {
+    fn id(&self) -> &'static str {
+        self.shift.id()
+    }
+    fn selectors(&self) -> BTreeMap<String, String> {
+        self.shift.selectors()
+    }
+    fn coefficients(&self) -> &[Coefficient] {
+        &self.coefficients
+    }
+    fn acts_on_stars(&self) -> bool {
+        true
+    }
+    fn acts_on_attitude(&self) -> bool {
+        false
+    }
+    fn star_columns(&self, _: &Camera, rows: &StarRows<'_>, out: PointsMut<'_>) -> bool {
+        let (n, p) = (rows.len(), self.coefficients.len());
+        check_columns(p, n, out.x.len());
+        let mut terms = [[0.0; 2]; MAX_TERMS];
+        for i in 0..n {
+            self.shift.terms(&rows.view(i), &mut terms[..p]);
+            for (j, term) in terms[..p].iter().enumerate() {
+                out.x[j * n + i] = term[0];
+                out.y[j * n + i] = term[1];
+            }
+        }
+        true
+    }
+    fn attitude_columns(&self, _: &AttitudeRows<'_>, _: VectorsMut<'_>) -> bool {
+        false
+    }
+    fn realise(
+        &self,
+        values: &[f64],
+        _: &Surroundings<'_>,
+    ) -> Result<Box<dyn Effect>, EffectError> {
+        Ok(Box::new(Shifted::new(self.shift.clone(), values.to_vec())))
+    }
+}
+
+impl StarRows<'_> {
+    /// Row `i` as a disturbance sees it, at its modelled position.
+    pub(crate) fn view(&self, i: usize) -> StarView {
+        StarView {
+            t_s: self.t_s[i],
+            slot: self.slot[i],
+            star_id: self.star_id[i],
+            mag: self.mag[i],
+            bv: self.bv[i],
+            at: self.at(i),
+        }
+    }
+
+    /// Modelled position of row `i`.
+    pub(crate) fn at(&self, i: usize) -> Pixel {
+        Pixel {
+            x: self.x_px[i],
+            y: self.y_px[i],
+        }
+    }
+}

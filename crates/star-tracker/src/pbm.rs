@@ -1,0 +1,562 @@
+//! The physics-based model (PBM): truth attitude in, measured centroids and attitude out.
+//!
+//! ```text
+//! Step 1   v = q(t) u,  P = (f_x v_x / v_z, f_y v_y / v_z)     stars of the frame, ideal position
+//! Step 2   P += (F1(P), F2(P))                                 distortion residual, Eq. 4-8
+//! Step 3   P += c(phase(P))                                    centroid error at the distorted position
+//! Step 4   P += n,   n ~ N(0, sigma_TN^2) per axis             temporal noise
+//! Step 5   q_meas = argmin sum |w_i - C v_i|^2                 QUEST on the measured positions
+//! ```
+//!
+//! Centroid error and noise are held in arcsec at the centre's scale,
+//! `focal_plane::Camera::arcsec_per_px`, and become pixels by it. Disturbances
+//! ([`crate::Disturbance`]) act at their stages in between; without any, the batch runs through
+//! elementwise kernels only.
+//!
+//! A row whose exposure is not wholly inside the span of the truth is left out (NaN), never
+//! extrapolated.
+//!
+//! Source: [M23] Section 2.6 and Fig. 4. Eq. 12 is minimised (Eq. 13 has the frames reversed,
+//! erratum E3).
+
+use std::sync::Arc;
+
+use centroid::CentroidError;
+use distortion::{DistortionField, PixelDistortion};
+use focal_plane::{
+    ARCSEC_PER_RAD, AttitudeSource, Camera, Pixel, Points, PointsMut, VectorsMut, rotate_into,
+    rotation_from_vector,
+};
+use nalgebra::{UnitQuaternion, Vector3};
+use quest::{ProfileBatch, QuaternionsMut, solve_batch_into};
+use rand_core::Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+use crate::quadrature::GAUSS_LEGENDRE_8;
+use crate::star_field::uniform;
+use crate::{Disturbance, Measured, NoiseStreams, Rows, Stages, StarView, TemporalNoise};
+
+/// Substitutions after which the instant of a row is taken as found. Each shrinks the error by
+/// `line_time x speed`, 4e-4 for 12 px/s and 30 us, so three are the rule.
+const INSTANT_STEPS: u32 = 30;
+/// An instant is found when it moves by less, s.
+const INSTANT_TOLERANCE_S: f64 = 1e-13;
+
+/// The physics-based model of one tracker.
+#[derive(Clone, Debug)]
+pub struct Pbm {
+    camera: Camera,
+    distortion: DistortionField,
+    lens: PixelDistortion,
+    centroid_error: CentroidError,
+    /// The same in px.
+    centroid_error_px: CentroidError,
+    noise: TemporalNoise,
+    disturbances: Vec<Arc<dyn Disturbance>>,
+    stages: Stages,
+    exposure_s: f64,
+}
+
+/// Memory of a batch: made once, grown to the largest batch seen.
+#[derive(Clone, Debug, Default)]
+pub struct Scratch {
+    vx: Vec<f64>,
+    vy: Vec<f64>,
+    vz: Vec<f64>,
+    ideal_x: Vec<f64>,
+    ideal_y: Vec<f64>,
+    weight: Vec<f64>,
+    normal: Vec<f64>,
+    profiles: ProfileBatch,
+}
+
+impl Scratch {
+    fn resize(&mut self, rows: usize) {
+        for column in [
+            &mut self.vx,
+            &mut self.vy,
+            &mut self.vz,
+            &mut self.ideal_x,
+            &mut self.ideal_y,
+            &mut self.weight,
+        ] {
+            column.resize(rows, 0.0);
+        }
+        self.normal.resize(2 * rows, 0.0);
+    }
+}
+
+impl Pbm {
+    /// A tracker without errors.
+    pub fn new(camera: Camera) -> Self {
+        let distortion = DistortionField::zero();
+        Self {
+            lens: distortion.for_camera(&camera),
+            camera,
+            distortion,
+            centroid_error: CentroidError::None,
+            centroid_error_px: CentroidError::None,
+            noise: TemporalNoise::NONE,
+            disturbances: Vec::new(),
+            stages: Stages::NONE,
+            exposure_s: 0.0,
+        }
+    }
+
+    /// The same with this distortion residual (LSFE).
+    #[must_use]
+    pub fn with_distortion(mut self, field: DistortionField) -> Self {
+        self.lens = field.for_camera(&self.camera);
+        self.distortion = field;
+        self
+    }
+
+    /// The same with this centroid error (HSFE), its amplitudes in arcsec.
+    #[must_use]
+    pub fn with_centroid_error(mut self, error_arcsec: CentroidError) -> Self {
+        self.centroid_error_px = error_arcsec.scaled(self.camera.arcsec_per_px().map(|s| 1.0 / s));
+        self.centroid_error = error_arcsec;
+        self
+    }
+
+    /// The same with this temporal noise.
+    #[must_use]
+    pub fn with_noise(mut self, noise: TemporalNoise) -> Self {
+        self.noise = noise;
+        self
+    }
+
+    /// The same with one more disturbance; disturbances act in the order in which they were added.
+    /// Of several exposures the longest holds.
+    #[must_use]
+    pub fn with_disturbance(mut self, disturbance: impl Into<Arc<dyn Disturbance>>) -> Self {
+        let disturbance = disturbance.into();
+        let stages = disturbance.stages();
+        self.stages = self.stages.union(stages);
+        if stages.exposure {
+            self.exposure_s = self.exposure_s.max(disturbance.exposure_s());
+        }
+        self.disturbances.push(disturbance);
+        self
+    }
+
+    /// The same without disturbances: the declared model.
+    #[must_use]
+    pub fn undisturbed(&self) -> Self {
+        Self {
+            disturbances: Vec::new(),
+            stages: Stages::NONE,
+            exposure_s: 0.0,
+            ..self.clone()
+        }
+    }
+
+    /// The camera.
+    pub fn camera(&self) -> &Camera {
+        &self.camera
+    }
+
+    /// The distortion residual.
+    pub fn distortion(&self) -> &DistortionField {
+        &self.distortion
+    }
+
+    /// The centroid error, amplitudes in arcsec.
+    pub fn centroid_error(&self) -> &CentroidError {
+        &self.centroid_error
+    }
+
+    /// The temporal noise.
+    pub fn noise(&self) -> &TemporalNoise {
+        &self.noise
+    }
+
+    /// The disturbances, in the order in which they act.
+    pub fn disturbances(&self) -> &[Arc<dyn Disturbance>] {
+        &self.disturbances
+    }
+
+    /// Noise-free measured positions of every row, px (Steps 1 to 3, with disturbances); returns how
+    /// many rows were left out (NaN).
+    ///
+    /// # Panics
+    ///
+    /// If the columns of `rows` do not fit together, or `out` differs in length.
+    pub fn positions_into(
+        &self,
+        truth: &dyn AttitudeSource,
+        rows: Rows<'_>,
+        scratch: &mut Scratch,
+        mut out: PointsMut<'_>,
+    ) -> usize {
+        rows.check();
+        assert_eq!(out.len(), rows.len(), "one position for each row");
+        scratch.resize(rows.len());
+        if self.stages.instant || self.stages.exposure {
+            self.ideal_row_by_row(truth, rows, scratch);
+        } else {
+            self.ideal_frame_by_frame(truth, rows, scratch);
+        }
+        if self.stages.image {
+            self.shift_images(rows, scratch);
+        }
+        // the directions are done with: their columns hold the distorted positions
+        let ideal = Points {
+            x: &scratch.ideal_x,
+            y: &scratch.ideal_y,
+        };
+        self.lens.distort_into(
+            ideal,
+            PointsMut {
+                x: &mut scratch.vx,
+                y: &mut scratch.vy,
+            },
+        );
+        let distorted = Points {
+            x: &scratch.vx,
+            y: &scratch.vy,
+        };
+        let centre = self.camera.pixel_centre();
+        self.centroid_error_px
+            .displace_into(distorted, centre, out.reborrow());
+        if self.stages.centroid {
+            self.shift_centroids(rows, distorted, out.reborrow());
+        }
+        out.x.iter().filter(|x| x.is_nan()).count()
+    }
+
+    /// Steps 1 to 5 for a batch of frames.
+    ///
+    /// The stream of noise yields two normals per row in the order of the rows, used or not. Rows are
+    /// weighted by the inverse of the declared noise variance, equally where that is one number.
+    ///
+    /// # Panics
+    ///
+    /// If the columns of `rows` do not fit together.
+    pub fn measure_into(
+        &self,
+        truth: &dyn AttitudeSource,
+        rows: Rows<'_>,
+        streams: &mut NoiseStreams,
+        scratch: &mut Scratch,
+        out: &mut Measured,
+    ) {
+        out.resize(rows.frames(), rows.len());
+        let noise_free = PointsMut {
+            x: &mut out.noise_free_x_px,
+            y: &mut out.noise_free_y_px,
+        };
+        out.rows_left_out = self.positions_into(truth, rows, scratch, noise_free);
+        self.add_noise(truth, rows, streams, scratch, out);
+        self.solve(rows, scratch, out);
+    }
+
+    /// Step 1 where no row needs its own instant: one attitude a frame.
+    fn ideal_frame_by_frame(
+        &self,
+        truth: &dyn AttitudeSource,
+        rows: Rows<'_>,
+        scratch: &mut Scratch,
+    ) {
+        let Scratch {
+            vx,
+            vy,
+            vz,
+            ideal_x,
+            ideal_y,
+            ..
+        } = scratch;
+        let mut v = VectorsMut {
+            x: vx,
+            y: vy,
+            z: vz,
+        };
+        for (k, &t_s) in rows.t_s.iter().enumerate() {
+            let of = rows.of(k);
+            let Some(q) = truth.attitude(t_s) else {
+                for column in [&mut *v.x, &mut *v.y, &mut *v.z] {
+                    column[of.clone()].fill(f64::NAN);
+                }
+                continue;
+            };
+            let q = self.misaligned(t_s, q);
+            rotate_into(&q, rows.direction.range(of.clone()), v.range(of.clone()));
+            if self.stages.direction || self.stages.tracker_direction {
+                for row in of {
+                    let star = rows.view(k, row, Pixel::default());
+                    let seen =
+                        self.in_tracker(&star, q * self.apparent(&star, rows.direction(row)));
+                    v.x[row] = seen.x;
+                    v.y[row] = seen.y;
+                    v.z[row] = seen.z;
+                }
+            }
+        }
+        self.camera.project_into(
+            v.as_shared(),
+            PointsMut {
+                x: ideal_x,
+                y: ideal_y,
+            },
+        );
+    }
+
+    /// Step 1 where rows are exposed at their own instants or over a time.
+    fn ideal_row_by_row(&self, truth: &dyn AttitudeSource, rows: Rows<'_>, scratch: &mut Scratch) {
+        for k in 0..rows.frames() {
+            for row in rows.of(k) {
+                let star = rows.view(k, row, Pixel::default());
+                let at = self.exposed(truth, star, rows.direction(row));
+                let Pixel { x, y } = at.unwrap_or(Pixel {
+                    x: f64::NAN,
+                    y: f64::NAN,
+                });
+                scratch.ideal_x[row] = x;
+                scratch.ideal_y[row] = y;
+            }
+        }
+    }
+
+    /// Mean of the star's path over the exposure of its row.
+    fn exposed(
+        &self,
+        truth: &dyn AttitudeSource,
+        mut star: StarView,
+        u: Vector3<f64>,
+    ) -> Option<Pixel> {
+        let u = self.apparent(&star, u);
+        let mut t_s = self.instant_s(&star);
+        for _ in 0..INSTANT_STEPS {
+            star.at = self.seen_at(truth, t_s, &star, &u)?;
+            let next_s = self.instant_s(&star);
+            let moved_s = (next_s - t_s).abs();
+            t_s = next_s;
+            if moved_s <= INSTANT_TOLERANCE_S {
+                break;
+            }
+        }
+        if self.exposure_s <= 0.0 {
+            return self.seen_at(truth, t_s, &star, &u);
+        }
+        let half_s = 0.5 * self.exposure_s;
+        let [first_s, last_s] = truth.span_s();
+        if t_s - half_s < first_s || t_s + half_s > last_s {
+            return None;
+        }
+        let mut mean = Pixel::default();
+        for (node, weight) in GAUSS_LEGENDRE_8 {
+            let at = self.seen_at(truth, t_s + half_s * node, &star, &u)?;
+            mean.x += 0.5 * weight * at.x;
+            mean.y += 0.5 * weight * at.y;
+        }
+        Some(mean)
+    }
+
+    fn seen_at(
+        &self,
+        truth: &dyn AttitudeSource,
+        t_s: f64,
+        star: &StarView,
+        u: &Vector3<f64>,
+    ) -> Option<Pixel> {
+        let q = self.misaligned(t_s, truth.attitude(t_s)?);
+        self.camera.project(&self.in_tracker(star, q * u))
+    }
+
+    fn instant_s(&self, star: &StarView) -> f64 {
+        star.t_s
+            + self
+                .at_stage(|s| s.instant)
+                .map(|d| d.time_shift_s(star))
+                .sum::<f64>()
+    }
+
+    fn misaligned(&self, t_s: f64, q: UnitQuaternion<f64>) -> UnitQuaternion<f64> {
+        self.at_stage(|s| s.attitude)
+            .fold(q, |q, d| rotation_from_vector(&d.misalignment_rad(t_s)) * q)
+    }
+
+    fn apparent(&self, star: &StarView, u: Vector3<f64>) -> Vector3<f64> {
+        self.at_stage(|s| s.direction)
+            .fold(u, |u, d| d.direction(star, u))
+    }
+
+    fn in_tracker(&self, star: &StarView, v: Vector3<f64>) -> Vector3<f64> {
+        self.at_stage(|s| s.tracker_direction)
+            .fold(v, |v, d| d.tracker_direction(star, v))
+    }
+
+    /// Disturbances that act at a stage; none are asked when no disturbance acts there.
+    fn at_stage(&self, stage: fn(Stages) -> bool) -> impl Iterator<Item = &dyn Disturbance> {
+        let any = stage(self.stages);
+        let all = if any {
+            self.disturbances.as_slice()
+        } else {
+            &[]
+        };
+        all.iter()
+            .map(AsRef::as_ref)
+            .filter(move |d| stage(d.stages()))
+    }
+
+    fn shift_images(&self, rows: Rows<'_>, scratch: &mut Scratch) {
+        for k in 0..rows.frames() {
+            for row in rows.of(k) {
+                let at = Pixel {
+                    x: scratch.ideal_x[row],
+                    y: scratch.ideal_y[row],
+                };
+                let star = rows.view(k, row, at);
+                for disturbance in self.at_stage(|s| s.image) {
+                    let [dx, dy] = disturbance.image_shift_px(&star);
+                    scratch.ideal_x[row] += dx;
+                    scratch.ideal_y[row] += dy;
+                }
+            }
+        }
+    }
+
+    fn shift_centroids(&self, rows: Rows<'_>, distorted: Points<'_>, out: PointsMut<'_>) {
+        for k in 0..rows.frames() {
+            for row in rows.of(k) {
+                let at = Pixel {
+                    x: distorted.x[row],
+                    y: distorted.y[row],
+                };
+                let star = rows.view(k, row, at);
+                for disturbance in self.at_stage(|s| s.centroid) {
+                    let [dx, dy] = disturbance.centroid_shift_px(&star);
+                    out.x[row] += dx;
+                    out.y[row] += dy;
+                }
+            }
+        }
+    }
+
+    /// Step 4.
+    fn add_noise(
+        &self,
+        truth: &dyn AttitudeSource,
+        rows: Rows<'_>,
+        streams: &mut NoiseStreams,
+        scratch: &mut Scratch,
+        out: &mut Measured,
+    ) {
+        let scale = self.camera.arcsec_per_px();
+        let Scratch { normal, weight, .. } = scratch;
+        for value in normal.iter_mut() {
+            *value = StandardNormal.sample(&mut streams.noise);
+        }
+        if self.noise.is_constant() && !self.stages.noise {
+            let [sx, sy] = scale.map(|s| self.noise.base_arcsec() / s);
+            for row in 0..rows.len() {
+                out.x_px[row] = out.noise_free_x_px[row] + sx * normal[2 * row];
+                out.y_px[row] = out.noise_free_y_px[row] + sy * normal[2 * row + 1];
+            }
+            for (weight, x) in weight.iter_mut().zip(&out.x_px) {
+                *weight = if x.is_nan() { 0.0 } else { 1.0 };
+            }
+        } else {
+            self.add_varying_noise(truth, rows, normal, weight, out);
+        }
+        if self.stages.spike {
+            self.add_spikes(rows, &mut streams.spikes, out);
+        }
+    }
+
+    /// Step 4 where sigma differs between rows.
+    fn add_varying_noise(
+        &self,
+        truth: &dyn AttitudeSource,
+        rows: Rows<'_>,
+        normal: &[f64],
+        weight: &mut [f64],
+        out: &mut Measured,
+    ) {
+        let [scale_x, scale_y] = self.camera.arcsec_per_px();
+        for k in 0..rows.frames() {
+            let rate = truth.rate_rad_s(rows.t_s[k]).unwrap_or_default();
+            for row in rows.of(k) {
+                let at = Pixel {
+                    x: out.noise_free_x_px[row],
+                    y: out.noise_free_y_px[row],
+                };
+                let star = rows.view(k, row, at);
+                let speed = rate.cross(&self.camera.direction(at)).norm() * ARCSEC_PER_RAD;
+                let declared = self.noise.sigma_arcsec(star.mag, speed);
+                let sigma = self.at_stage(|s| s.noise).fold(declared, |sigma, d| {
+                    d.noise_sigma_arcsec(&star, speed, sigma)
+                });
+                out.x_px[row] = at.x + sigma / scale_x * normal[2 * row];
+                out.y_px[row] = at.y + sigma / scale_y * normal[2 * row + 1];
+                weight[row] = match (at.x.is_nan(), declared > 0.0) {
+                    (true, _) => 0.0,
+                    (false, true) => 1.0 / (declared * declared),
+                    (false, false) => 1.0,
+                };
+            }
+        }
+    }
+
+    fn add_spikes<R: Rng>(&self, rows: Rows<'_>, rng: &mut R, out: &mut Measured) {
+        for k in 0..rows.frames() {
+            for row in rows.of(k) {
+                let at = Pixel {
+                    x: out.noise_free_x_px[row],
+                    y: out.noise_free_y_px[row],
+                };
+                let star = rows.view(k, row, at);
+                for disturbance in self.at_stage(|s| s.spike) {
+                    let [dx, dy] = disturbance.spike_px(&star, &mut || uniform(rng));
+                    out.x_px[row] += dx;
+                    out.y_px[row] += dy;
+                }
+            }
+        }
+    }
+
+    /// Step 5.
+    fn solve(&self, rows: Rows<'_>, scratch: &mut Scratch, out: &mut Measured) {
+        let Scratch {
+            vx,
+            vy,
+            vz,
+            weight,
+            profiles,
+            ..
+        } = scratch;
+        let measured = Points {
+            x: &out.x_px,
+            y: &out.y_px,
+        };
+        self.camera.direction_into(
+            measured,
+            VectorsMut {
+                x: vx,
+                y: vy,
+                z: vz,
+            },
+        );
+        profiles.accumulate(
+            quest::Vectors {
+                x: vx,
+                y: vy,
+                z: vz,
+            },
+            quest::Vectors {
+                x: rows.direction.x,
+                y: rows.direction.y,
+                z: rows.direction.z,
+            },
+            weight,
+            rows.first_row,
+        );
+        let q = QuaternionsMut {
+            x: &mut out.qx,
+            y: &mut out.qy,
+            z: &mut out.qz,
+            w: &mut out.qw,
+        };
+        solve_batch_into(profiles, q, &mut out.status);
+    }
+}
