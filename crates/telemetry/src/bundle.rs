@@ -2,13 +2,17 @@
 //!
 //! Source: telemetry bundle format (docs/formats/bundle.md).
 
+mod convert;
+mod read;
+mod write;
+
 use std::path::Path;
 
 use focal_plane::{Camera, Catalogue, StarFrames};
 
 use crate::{
-    AttitudeTable, ExtraColumns, Files, Folder, Housekeeping, Metadata, RateTable, ReferenceTable,
-    TelemetryError, WindowTable,
+    AttitudeTable, ExtraColumns, Files, Folder, Housekeeping, Metadata, Output, RateTable,
+    ReferenceTable, TelemetryError, WindowTable,
 };
 
 /// How tables are written.
@@ -21,6 +25,27 @@ pub enum TableFormat {
     CsvGz,
     /// `.parquet`
     Parquet,
+}
+
+impl TableFormat {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Csv, Self::CsvGz, Self::Parquet];
+
+    /// The end of a file's name, with its dot.
+    #[must_use]
+    pub fn extension(self) -> &'static str {
+        match self {
+            Self::Csv => ".csv",
+            Self::CsvGz => ".csv.gz",
+            Self::Parquet => ".parquet",
+        }
+    }
+
+    /// Name of a table's file.
+    #[must_use]
+    pub fn file_name(self, table: &str) -> String {
+        format!("{table}{}", self.extension())
+    }
 }
 
 /// A telemetry bundle, read and checked.
@@ -58,28 +83,32 @@ impl Bundle {
         Self::read_from(&Folder::at(path))
     }
 
-    /// Reads a bundle from any set of files.
+    /// Reads a bundle from any set of files. Files of other names are not opened.
     ///
     /// # Errors
     ///
     /// As [`read`](Self::read).
     pub fn read_from(files: &dyn Files) -> Result<Self, TelemetryError> {
-        Err(TelemetryError::NoMeasurement {
-            bundle: files.label(),
-            found: "none".into(),
-        })
+        read::read(files)
     }
 
-    /// Writes a folder, all or nothing.
+    /// Writes a folder, all or nothing. Tables of an older bundle in that folder are replaced, or
+    /// removed where this one has none. Renamed columns get the format's names.
     ///
     /// # Errors
     ///
-    /// Tables that do not fit together, or what the operating system says.
+    /// Tables that do not fit together, a folder that holds tables but no `bundle.toml`, or what
+    /// the operating system says.
     pub fn write(&self, dir: &Path, format: TableFormat) -> Result<(), TelemetryError> {
-        let _ = format;
-        Err(TelemetryError::NoMeasurement {
-            bundle: dir.display().to_string(),
-            found: "none".into(),
-        })
+        write::write(self, dir, format)
+    }
+
+    /// Writes the files of the bundle into a folder that gets others as well.
+    ///
+    /// # Errors
+    ///
+    /// As [`write`](Self::write), other than for older tables, which stay.
+    pub fn write_to(&self, output: &Output, format: TableFormat) -> Result<(), TelemetryError> {
+        write::write_to(self, output, format)
     }
 }

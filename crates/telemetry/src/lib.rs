@@ -6,13 +6,19 @@
 #![forbid(unsafe_code)]
 
 mod bundle;
+pub mod config;
 mod error;
 mod extra;
 mod files;
+pub mod hipparcos;
+mod layout;
 mod metadata;
 mod model;
+mod output;
 mod pixel_name;
 pub mod report;
+mod residuals;
+mod table;
 mod tables;
 mod time;
 
@@ -27,5 +33,7 @@ pub use model::{
     EffectEntry, EffectPlace, EffectValue, HemAxes, HemAxis, MODEL_FORMAT, Model, ModelKind,
     ModelNoise, ModelTracker,
 };
+pub use output::{Output, write_file};
+pub use residuals::{AttitudeResiduals, DarkMap, StarResiduals};
 pub use tables::{AttitudeTable, Housekeeping, RateTable, ReferenceTable, WindowTable};
 pub use time::{Epoch, TimeScale};

@@ -6,6 +6,8 @@
 //!
 //! Source: telemetry bundle format (docs/formats/bundle.md).
 
+pub(crate) mod read;
+
 use std::collections::BTreeMap;
 
 use focal_plane::Camera;
@@ -18,9 +20,8 @@ use crate::time::{Epoch, TimeScale};
 pub const BUNDLE_FORMAT: &str = "boresight-bundle/1";
 
 /// Everything in `bundle.toml`. Keys that are absent are `None`, unless a default is named.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Metadata {
-    format: &'static str,
     /// Free text.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub title: Option<String>,
@@ -58,29 +59,23 @@ pub struct Metadata {
     pub columns: BTreeMap<String, BTreeMap<String, String>>,
 }
 
-impl Default for Metadata {
-    fn default() -> Self {
-        Self {
-            format: BUNDLE_FORMAT,
-            title: None,
-            source: None,
-            licence: None,
-            epoch: None,
-            epoch_offset_s: 0.0,
-            time_scale: None,
-            sample_rate_hz: None,
-            catalog_epoch_year: None,
-            tracker: TrackerMeta::default(),
-            images: None,
-            frames: None,
-            columns: BTreeMap::new(),
-        }
-    }
-}
-
 impl Metadata {
-    /// Julian year (TDB scale where `time_scale` allows the difference to matter: it never does
-    /// here, a second moves no star) at time `t_s` of the tables; `None` without an epoch.
+    /// The metadata as a file.
+    pub(crate) fn to_toml(&self) -> Result<String, toml::ser::Error> {
+        #[derive(Serialize)]
+        struct File<'a> {
+            format: &'static str,
+            #[serde(flatten)]
+            meta: &'a Metadata,
+        }
+        toml::to_string(&File {
+            format: BUNDLE_FORMAT,
+            meta: self,
+        })
+    }
+
+    /// Julian year at time `t_s` of the tables, in the bundle's own time scale (a minute more or
+    /// less moves no star); `None` without an epoch.
     #[must_use]
     pub fn julian_year(&self, t_s: f64) -> Option<f64> {
         Some(self.epoch?.julian_year(self.epoch_offset_s + t_s))

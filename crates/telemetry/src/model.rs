@@ -9,10 +9,17 @@
 //!
 //! Source: model format (docs/formats/model.md).
 
+mod read;
+mod write;
+
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use crate::TelemetryError;
+use focal_plane::{Camera, CameraError};
+
+use crate::config::Config;
+use crate::metadata::read::camera;
+use crate::{TelemetryError, TomlError, TrackerMeta};
 
 /// The value of `format` in a model file.
 pub const MODEL_FORMAT: &str = "boresight-model/1";
@@ -22,6 +29,8 @@ pub const MODEL_FORMAT: &str = "boresight-model/1";
 pub struct Model {
     /// Physics-based or high-fidelity error model.
     pub kind: ModelKind,
+    /// Free text.
+    pub title: Option<String>,
     /// The tracker; what is `None` is taken from the bundle where it has it.
     pub tracker: ModelTracker,
     /// Declared noise and fields.
@@ -141,13 +150,22 @@ impl EffectEntry {
     }
 }
 
-/// Where an `[[effect]]` and its keys stand in a file.
+/// Where an `[[effect]]` and its keys stand in a file; empty if made in memory.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct EffectPlace {
-    /// Line of the `[[effect]]`, 1-based; 0 if made in memory.
-    pub line: usize,
-    /// Line of each key.
-    pub keys: BTreeMap<String, usize>,
+    /// Its head, as an error without a message.
+    head: Option<TomlError>,
+    /// Its keys.
+    keys: BTreeMap<String, TomlError>,
+}
+
+impl EffectPlace {
+    /// Line of a key, or of the head if there is no such key, 1-based; 0 if made in memory.
+    #[must_use]
+    pub fn line(&self, key: &str) -> usize {
+        let spot = self.keys.get(key).or(self.head.as_ref());
+        spot.map_or(0, |spot| spot.line)
+    }
 }
 
 impl Model {
@@ -169,16 +187,44 @@ impl Model {
     ///
     /// As [`read`](Self::read).
     pub fn parse(text: &str, file: &str, ignored: &[&str]) -> Result<Self, TelemetryError> {
-        let _ = (text, ignored);
-        Err(TelemetryError::MissingFile {
-            file: file.into(),
-            hint: String::new(),
-        })
+        read::read(&Config::parse(text, file)?, file, ignored)
     }
 
     /// The model as a file.
     #[must_use]
     pub fn to_toml(&self) -> String {
-        String::new()
+        write::write(self)
+    }
+
+    /// The camera that the model declares; `None` without pixels or without a focal length.
+    ///
+    /// # Errors
+    ///
+    /// Values that were changed after reading and no longer make a camera.
+    pub fn camera(&self) -> Result<Option<Camera>, CameraError> {
+        camera(&TrackerMeta {
+            pixels: self.tracker.pixels,
+            focal_length_px: self.tracker.focal_length_px,
+            fov_deg: self.tracker.fov_deg,
+            exposure_s: None,
+            pixel_centre: self.tracker.pixel_centre,
+        })
+    }
+
+    /// An error in an effect, shown at the value of its key (`id`, a parameter) if the model came
+    /// from a file: for what only the effects catalogue can judge.
+    pub fn effect_error(&self, index: usize, key: &str, message: &str) -> TelemetryError {
+        let place = self.effects.get(index).map(|effect| &effect.at);
+        let spot = place.and_then(|at| at.keys.get(key).or(at.head.as_ref()));
+        match spot {
+            Some(spot) => TelemetryError::Toml(Box::new(TomlError {
+                message: message.into(),
+                ..spot.clone()
+            })),
+            None => TelemetryError::Inconsistent {
+                table: "model",
+                reason: format!("effect {}: {message}", index + 1),
+            },
+        }
     }
 }

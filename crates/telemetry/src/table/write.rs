@@ -1,0 +1,213 @@
+//! Writing tables, row by row or block by block: no second copy of a column is made.
+//!
+//! Numbers are written with the fewest digits that read back as the same double.
+//!
+//! Source: RFC 4180; Apache Parquet format, snappy compression.
+
+use std::borrow::Cow;
+use std::fmt::Write as _;
+use std::io::{self, Write};
+use std::sync::Arc;
+
+use arrow_array::{ArrayRef, BooleanArray, Float64Array, Int64Array, RecordBatch, StringArray};
+use arrow_schema::{ArrowError, DataType, Field, Schema};
+use flate2::Compression;
+use flate2::write::GzEncoder;
+use parquet::arrow::ArrowWriter;
+use parquet::basic::Compression as ParquetCompression;
+use parquet::errors::ParquetError;
+use parquet::file::properties::WriterProperties;
+
+use crate::{ExtraCells, ExtraColumn, TableFormat, TelemetryError, TextCells};
+
+/// Rows of Parquet made at once.
+const BATCH: usize = 8192;
+/// Rows of a row group: what is held in memory, encoded.
+const GROUP: usize = 1 << 17;
+
+/// The cells of a column, by row.
+pub(crate) enum Cells<'a> {
+    /// NaN is written as an empty cell, or null.
+    Numbers(Box<dyn Fn(usize) -> f64 + 'a>),
+    Integers(Box<dyn Fn(usize) -> i64 + 'a>),
+    Flags(Box<dyn Fn(usize) -> bool + 'a>),
+    Text(&'a TextCells),
+}
+
+/// A table to be written.
+pub(crate) struct OutTable<'a> {
+    rows: usize,
+    columns: Vec<(Cow<'a, str>, Cells<'a>)>,
+}
+
+impl<'a> OutTable<'a> {
+    pub(crate) fn new(rows: usize) -> Self {
+        Self {
+            rows,
+            columns: Vec::new(),
+        }
+    }
+
+    pub(crate) fn numbers_by(
+        &mut self,
+        name: impl Into<Cow<'a, str>>,
+        cell: impl Fn(usize) -> f64 + 'a,
+    ) {
+        self.columns
+            .push((name.into(), Cells::Numbers(Box::new(cell))));
+    }
+
+    pub(crate) fn numbers(&mut self, name: impl Into<Cow<'a, str>>, cells: &'a [f64]) {
+        self.numbers_by(name, |row| cells[row]);
+    }
+
+    pub(crate) fn integers_by(
+        &mut self,
+        name: impl Into<Cow<'a, str>>,
+        cell: impl Fn(usize) -> i64 + 'a,
+    ) {
+        self.columns
+            .push((name.into(), Cells::Integers(Box::new(cell))));
+    }
+
+    pub(crate) fn flags(&mut self, name: impl Into<Cow<'a, str>>, cells: &'a [bool]) {
+        self.columns
+            .push((name.into(), Cells::Flags(Box::new(|row| cells[row]))));
+    }
+
+    pub(crate) fn extra(&mut self, columns: &'a [ExtraColumn]) {
+        for ExtraColumn { name, cells } in columns {
+            match cells {
+                ExtraCells::Numbers(cells) => self.numbers(name.as_str(), cells),
+                ExtraCells::Text(cells) => {
+                    self.columns.push((name.into(), Cells::Text(cells)));
+                }
+            }
+        }
+    }
+
+    /// Writes in one of the forms; `file` is the name in messages.
+    pub(crate) fn write(
+        &self,
+        format: TableFormat,
+        to: impl Write + Send,
+        file: &str,
+    ) -> Result<(), TelemetryError> {
+        let done = match format {
+            TableFormat::Csv => self.csv(to).map(|_| ()),
+            TableFormat::CsvGz => self
+                .csv(GzEncoder::new(to, Compression::default()))
+                .and_then(|gzip| gzip.finish()?.flush()),
+            TableFormat::Parquet => self.parquet(to).map_err(io::Error::other),
+        };
+        done.map_err(|error| TelemetryError::io(file, "write", &error))
+    }
+
+    fn csv<W: Write>(&self, to: W) -> io::Result<W> {
+        let mut csv = csv::WriterBuilder::new()
+            .buffer_capacity(1 << 16)
+            .from_writer(to);
+        csv.write_record(self.columns.iter().map(|(name, _)| name.as_bytes()))?;
+        let mut text = String::new();
+        for row in 0..self.rows {
+            for (_, cells) in &self.columns {
+                text.clear();
+                match cells {
+                    Cells::Numbers(cell) => number(&mut text, cell(row)),
+                    Cells::Integers(cell) => plain(&mut text, cell(row)),
+                    Cells::Flags(cell) => plain(&mut text, cell(row)),
+                    Cells::Text(cells) => text.push_str(cells.get(row).unwrap_or("")),
+                }
+                csv.write_field(&text)?;
+            }
+            csv.write_record(None::<&[u8]>)?;
+        }
+        csv.into_inner().map_err(|error| error.into_error())
+    }
+
+    fn parquet(&self, to: impl Write + Send) -> Result<(), ParquetError> {
+        // text that is all numbers, as extra columns of a CSV file are, becomes numbers
+        let columns: Vec<(&str, Cells<'_>)> = self
+            .columns
+            .iter()
+            .map(|(name, cells)| (&**name, cells.for_parquet()))
+            .collect();
+        let fields: Vec<Field> = columns
+            .iter()
+            .map(|(name, cells)| Field::new(*name, cells.data_type(), true))
+            .collect();
+        let schema = Arc::new(Schema::new(fields));
+        let properties = WriterProperties::builder()
+            .set_compression(ParquetCompression::SNAPPY)
+            .set_max_row_group_row_count(Some(GROUP))
+            .build();
+        let mut writer = ArrowWriter::try_new(to, Arc::clone(&schema), Some(properties))?;
+        for start in (0..self.rows).step_by(BATCH) {
+            let end = self.rows.min(start + BATCH);
+            let arrays = columns.iter().map(|(_, cells)| cells.array(start, end));
+            let batch = RecordBatch::try_new(Arc::clone(&schema), arrays.collect());
+            writer.write(&batch.map_err(|error: ArrowError| error)?)?;
+        }
+        writer.close().map(|_| ())
+    }
+}
+
+impl Cells<'_> {
+    fn for_parquet(&self) -> Cells<'_> {
+        match self {
+            Self::Numbers(cell) => Cells::Numbers(Box::new(cell)),
+            Self::Integers(cell) => Cells::Integers(Box::new(cell)),
+            Self::Flags(cell) => Cells::Flags(Box::new(cell)),
+            Self::Text(cells) => {
+                let number = |cell: &str| cell.is_empty() || cell.parse::<f64>().is_ok();
+                if !cells.iter().all(number) {
+                    return Cells::Text(cells);
+                }
+                let cell = |row| cells.get(row).unwrap_or("").parse().unwrap_or(f64::NAN);
+                Cells::Numbers(Box::new(cell))
+            }
+        }
+    }
+
+    fn data_type(&self) -> DataType {
+        match self {
+            Self::Numbers(_) => DataType::Float64,
+            Self::Integers(_) => DataType::Int64,
+            Self::Flags(_) => DataType::Boolean,
+            Self::Text(_) => DataType::Utf8,
+        }
+    }
+
+    fn array(&self, start: usize, end: usize) -> ArrayRef {
+        let rows = start..end;
+        match self {
+            Self::Numbers(cell) => {
+                let value = |row| Some(cell(row)).filter(|number| !number.is_nan());
+                Arc::new(rows.map(value).collect::<Float64Array>())
+            }
+            Self::Integers(cell) => Arc::new(Int64Array::from_iter_values(rows.map(cell))),
+            Self::Flags(cell) => Arc::new(BooleanArray::from_iter(rows.map(|row| Some(cell(row))))),
+            Self::Text(cells) => {
+                let value = |row| cells.get(row);
+                Arc::new(rows.map(value).collect::<StringArray>())
+            }
+        }
+    }
+}
+
+fn plain(text: &mut String, value: impl std::fmt::Display) {
+    // writing to memory does not fail
+    let _ = write!(text, "{value}");
+}
+
+/// The shortest digits that read back the same; an exponent where plain digits would be long.
+fn number(text: &mut String, value: f64) {
+    let size = value.abs();
+    if value.is_nan() {
+        // a missing value
+    } else if size != 0.0 && !(1e-9..1e17).contains(&size) {
+        let _ = write!(text, "{value:e}");
+    } else {
+        let _ = write!(text, "{value}");
+    }
+}
