@@ -130,16 +130,24 @@ pub fn rotation_vector(
     v * scale
 }
 
+/// Square of the half angle below which the series of sine and cosine are used: the steps between
+/// samples. Their first left-out terms, `h2^4/9!` and `h2^5/10!`, are below 1e-16.
+const SERIES_BELOW: f64 = 0.002;
+
 /// The rotation `exp(theta)`, theta in rad: `v' = v + theta x v + ...`. Inverse of
 /// [`rotation_vector`]; exact to rounding for the smallest angles.
 #[must_use]
 pub fn rotation_from_vector(theta: &Vector3<f64>) -> UnitQuaternion<f64> {
-    let half = 0.5 * theta.norm();
-    let scale = if half < 1e-8 {
-        0.5
+    let h2 = 0.25 * theta.norm_squared();
+    let (sinc, cos) = if h2 < SERIES_BELOW {
+        (
+            1.0 - h2 * (1.0 / 6.0 - h2 * (1.0 / 120.0 - h2 / 5040.0)),
+            1.0 - h2 * (0.5 - h2 * (1.0 / 24.0 - h2 * (1.0 / 720.0 - h2 / 40_320.0))),
+        )
     } else {
-        0.5 * half.sin() / half
+        let half = h2.sqrt();
+        (half.sin() / half, half.cos())
     };
-    let v = theta * scale;
-    UnitQuaternion::new_unchecked(Quaternion::new(half.cos(), v.x, v.y, v.z))
+    let v = theta * (0.5 * sinc);
+    UnitQuaternion::new_unchecked(Quaternion::new(cos, v.x, v.y, v.z))
 }

@@ -372,21 +372,23 @@ fn pinhole([fx, fy]: [f64; 2], x: f64, y: f64, z: f64) -> [f64; 2] {
 
 #[inline]
 fn ray([fx, fy]: [f64; 2], x_px: f64, y_px: f64) -> [f64; 3] {
-    let (x, y) = (x_px / fx, y_px / fy);
+    // reciprocals leave a loop over stars, divisions would not
+    let (x, y) = (x_px * (1.0 / fx), y_px * (1.0 / fy));
     let scale = 1.0 / (1.0 + x * x + y * y).sqrt();
     [x * scale, y * scale, scale]
 }
 
+/// Adding and taking away 1.5 * 2^52 rounds to the nearest whole number, for coordinates up to
+/// 2^51; unlike `floor` it is two plain additions on every processor.
+const WHOLE: f64 = 6_755_399_441_055_744.0;
+
 #[inline]
 fn phase(p_px: f64, shift: f64) -> f64 {
     let p = p_px + shift;
-    let fraction = p - p.floor();
-    // -1e-20 - floor(-1e-20) rounds to 1, which is the same phase as 0
-    let fraction = if fraction < 1.0 || fraction.is_nan() {
-        fraction
-    } else {
-        0.0
-    };
+    let past = p - ((p + WHOLE) - WHOLE);
+    let fraction = if past < 0.0 { past + 1.0 } else { past };
+    // -1e-20 + 1 rounds to 1, which is the same phase as 0
+    let fraction = if fraction >= 1.0 { 0.0 } else { fraction };
     TAU * fraction
 }
 

@@ -9,7 +9,7 @@
 //! A frame's rows are contiguous and frames follow one another in time, so that a kernel can run
 //! over all rows of a batch at once.
 //!
-//! Source: telemetry bundle format, table `stars` (docs/formats).
+//! Not physics: columns as in table `stars` of a telemetry bundle.
 
 use std::ops::Range;
 

@@ -42,9 +42,10 @@
 //! # Ok::<(), focal_plane::CameraError>(())
 //! ```
 //!
-//! \[M23\]: Miller et al. 2023, star-tracker error models validated on DART and PSP data.
+//! \[M23\]: Miller et al. 2023, In-Orbit Assessment of a Physics-based Star Tracker Model Using
+//! DART and PSP Flight Data.
 //!
-//! Source: \[M23\] Eq. 1 and Section 2 for the pinhole and frames; each module names its own.
+//! Source: \[M23\] Eq. 1 (pinhole); each module names its own.
 #![forbid(unsafe_code)]
 
 mod attitude;

@@ -17,7 +17,7 @@
 //! # Ok::<(), focal_plane::CameraError>(())
 //! ```
 //!
-//! Source: layout only, no physics.
+//! Not physics: layout of memory only.
 
 macro_rules! views {
     ($shared:ident, $exclusive:ident, $what:literal, $($field:ident: $doc:literal),+) => {

@@ -118,13 +118,13 @@ fn bad_cameras_are_named() {
     );
     assert!(fov(f64::NAN, 20.0).is_some());
     // tan(10 deg) changes by 0.5 % for 0.098 deg of field
-    assert_eq!(fov(20.0, 20.09), None);
+    assert_eq!(fov(20.0, 20.097), None);
     assert!(matches!(
-        fov(20.0, 20.11),
+        fov(20.0, 20.099),
         Some(CameraError::AxesDiffer { .. })
     ));
     assert!(matches!(
-        fov(20.11, 20.0),
+        fov(20.099, 20.0),
         Some(CameraError::AxesDiffer { .. })
     ));
     let message = fov(20.0, 40.0)

@@ -255,6 +255,21 @@ fn bad_frames_are_named() {
     );
 }
 
+/// The two need not be neighbours.
+#[test]
+fn a_slot_repeats_anywhere_in_a_frame() {
+    let mut frames = two_frames();
+    frames.push(1, 12, 0.0, 0.0);
+    assert!(matches!(
+        frames.check(),
+        Err(FramesError::RepeatedSlot {
+            frame: 2,
+            slot: 1,
+            ..
+        })
+    ));
+}
+
 #[test]
 #[should_panic(expected = "begin a frame before its stars")]
 fn a_star_needs_a_frame() {

@@ -362,13 +362,14 @@ impl Segment {
     }
 }
 
-/// Last entry of ascending `t_s` at or before `t`, given `t_s[0] <= t`; tries `hint` and the one
-/// after it before it searches.
+/// Last entry of ascending `t_s` at or before `t`, given `t_s[0] <= t`: a few steps on from `hint`,
+/// and a search if it is not there.
 pub(crate) fn locate(t_s: &[f64], t: f64, hint: usize) -> usize {
-    let covers = |i: usize| t_s[i] <= t && t_s.get(i + 1).is_none_or(|&next| t < next);
-    for i in [hint, hint + 1] {
-        if i < t_s.len() && covers(i) {
-            return i;
+    const STEPS: usize = 8;
+    if t_s.get(hint).is_some_and(|&at| at <= t) {
+        let ahead = &t_s[hint + 1..t_s.len().min(hint + 1 + STEPS)];
+        if let Some(steps) = ahead.iter().position(|&next| t < next) {
+            return hint + steps;
         }
     }
     t_s.partition_point(|&sample| sample <= t) - 1
