@@ -99,7 +99,7 @@ fn error_falls_as_h3_with_slopes_from_neighbours() -> Result<(), AttitudeError> 
 
 /// About one axis the rotation vector is a scalar, and the error of a cubic Hermite is at most
 /// `h^4/384 max |f''''|`, reached where the fourth derivative is largest. A 0.036 Hz mode of
-/// 100 arcsec at 2 Hz: 3e-6 arcsec; slerp would give `h^2/8 max |f''|` = 0.16 arcsec.
+/// 100 arcsec at 2 Hz: 4e-5 arcsec; slerp would give `h^2/8 max |f''|` = 0.16 arcsec.
 #[test]
 fn one_axis_meets_the_bound_of_hermite_interpolation() -> Result<(), AttitudeError> {
     let (amplitude, w, h) = (100.0 / focal_plane::ARCSEC_PER_RAD, 2.0, 0.5);
