@@ -13,6 +13,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use crate::QuestError;
+use crate::single::{check, inverse_length};
 
 /// Covariance of the attitude error, rad^2, tracker axes; `sigma_rad[i]` per axis of star i.
 ///
@@ -33,11 +34,11 @@ pub fn covariance(
     sigma_rad: &[f64],
 ) -> Result<Matrix3<f64>, QuestError> {
     let weights = weights_of(measured, sigma_rad)?;
-    crate::single::check("measured", measured)?;
-    let information = information(measured, &weights);
+    check("measured", measured)?;
     let total: f64 = weights.iter().sum();
-    spread_checked(&information, total)?;
-    inverse(&information).ok_or(QuestError::Parallel {
+    let information = information(measured, &weights, total);
+    spread_checked(&information)?;
+    of_information(&information, total).ok_or(QuestError::Parallel {
         set: "measured",
         spread_rad: 0.0,
     })
@@ -54,7 +55,7 @@ pub fn covariance_as_printed(
     sigma_rad: &[f64],
 ) -> Result<Matrix3<f64>, QuestError> {
     let weights = weights_of(measured, sigma_rad)?;
-    crate::single::check("measured", measured)?;
+    check("measured", measured)?;
     let total: f64 = weights.iter().sum();
     let mut m = Matrix3::identity();
     for (w, a) in measured.iter().zip(&weights) {
@@ -91,12 +92,14 @@ fn weights_of(measured: &[Vector3<f64>], sigma_rad: &[f64]) -> Result<Vec<f64>, 
     sigma_rad.iter().enumerate().map(weight).collect()
 }
 
-/// `sum a (I - w w^T)`, summed as `y^2 + z^2` and the like: near the boresight `1 - z^2` would
+/// `sum a_i (I - w w^T) / sum a_i`, summed as `y^2 + z^2` and the like: near the boresight `1 - z^2` would
 /// cancel, and that is the weak axis.
-pub(crate) fn information(measured: &[Vector3<f64>], weights: &[f64]) -> [f64; 6] {
+pub(crate) fn information(measured: &[Vector3<f64>], weights: &[f64], total: f64) -> [f64; 6] {
+    let unit = 1.0 / total;
     let mut m = [0.0; 6];
     for (w, &a) in measured.iter().zip(weights) {
-        let a = a / w.norm_squared();
+        let scale = inverse_length(w);
+        let a = a * unit * scale * scale;
         m[0] += a * (w.y * w.y + w.z * w.z);
         m[1] += a * (w.x * w.x + w.z * w.z);
         m[2] += a * (w.x * w.x + w.y * w.y);
@@ -109,8 +112,8 @@ pub(crate) fn information(measured: &[Vector3<f64>], weights: &[f64]) -> [f64; 6
 
 /// Error if all vectors lie on one line: the mean square distance from it is the least eigenvalue
 /// of the information at unit weight, and half the gap of exact data.
-fn spread_checked(information: &[f64; 6], total: f64) -> Result<(), QuestError> {
-    let spread = crate::polish::least_eigenvalue(information.map(|x| x / total));
+fn spread_checked(information: &[f64; 6]) -> Result<(), QuestError> {
+    let spread = crate::polish::least_eigenvalue(*information);
     if 2.0 * spread >= crate::MIN_GAP {
         return Ok(());
     }
@@ -120,9 +123,12 @@ fn spread_checked(information: &[f64; 6], total: f64) -> Result<(), QuestError> 
     })
 }
 
-/// Inverse of a positive definite symmetric matrix, if it is one.
-pub(crate) fn inverse(m: &[f64; 6]) -> Option<Matrix3<f64>> {
+/// Inverse of the information, if it is positive definite.
+pub(crate) fn of_information(m: &[f64; 6], total: f64) -> Option<Matrix3<f64>> {
     let [xx, yy, zz, xy, xz, yz] = *m;
-    let full = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
-    full.cholesky().map(|c| c.inverse())
+    let (cxx, cyy, czz) = (yy * zz - yz * yz, xx * zz - xz * xz, xx * yy - xy * xy);
+    let (cxy, cxz, cyz) = (xz * yz - xy * zz, xy * yz - xz * yy, xy * xz - xx * yz);
+    let det = xx * cxx + xy * cxy + xz * cxz;
+    let full = Matrix3::new(cxx, cxy, cxz, cxy, cyy, cyz, cxz, cyz, czz) / det / total;
+    (det > 0.0 && xx > 0.0 && czz > 0.0).then_some(full)
 }

@@ -21,8 +21,8 @@ use crate::sequential::rotated_quaternion;
 pub const POLISH_GAP: f64 = 4.712_160_915_387_242e-3;
 
 /// Least gap accepted, `10 sqrt(eps)`: where `100 eps/gap^2`, the error that the quartic alone may
-/// make, reaches 1 rad. A polished attitude still holds to 3e-7 rad there. Two stars of equal
-/// weight come to it 1.9 arcmin apart, and any 1 degree apart by weights of 1:2000.
+/// make, reaches 1 rad. A polished attitude still holds to 3e-8 rad there (`20 eps/gap`). Two stars
+/// of equal weight come to it 1.9 arcmin apart, two 1 degree apart by weights of 1:4000.
 pub const MIN_GAP: f64 = 1.490_116_119_384_765_6e-7;
 
 /// Row-major 3x3 profile of one frame at unit total weight; rows measured, columns reference.
