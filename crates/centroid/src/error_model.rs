@@ -22,7 +22,7 @@ pub enum CentroidError {
     /// No error.
     #[default]
     None,
-    /// The paper's triangle, [M23] Eq. 10.
+    /// The paper's triangle, `[M23]` Eq. 10.
     Triangle(Triangle),
     /// A harmonic series on each axis.
     Harmonics(Harmonics),

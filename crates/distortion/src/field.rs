@@ -94,7 +94,7 @@ impl DistortionField {
         &self.b
     }
 
-    /// Displacement at one place, arcsec, [M23] Eq. 8.
+    /// Displacement at one place, arcsec, `[M23]` Eq. 8.
     ///
     /// Outside [-1, 1] the polynomials grow without bound and mean nothing.
     pub fn evaluate(&self, at: Normalised) -> [f64; 2] {

@@ -50,7 +50,7 @@ impl LsfSigma {
     }
 }
 
-/// A bare angle is read as circular, as [M23] section 2.2 does.
+/// A bare angle is read as circular, as `[M23]` section 2.2 does.
 impl From<Angle> for LsfSigma {
     fn from(sigma: Angle) -> Self {
         Self::Circular(sigma)
