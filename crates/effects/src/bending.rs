@@ -6,7 +6,7 @@
 //! ```
 //!
 //! The coefficients are ordered axis by axis, and within an axis by k. As a residual of the attitude,
-//! theta is the error log(q_meas q_ref^-1) itself: `v_meas = v + theta x v`.
+//! theta is the error `log(q_meas q_ref^-1)` itself: `v_meas = v + theta x v`.
 //!
 //! Source: [M23] Section 4.3 for why the frame bends; the Jacobian is that of `focal_plane::Camera`.
 
@@ -34,7 +34,7 @@ pub(crate) trait Bending: Clone + Debug + Send + Sync + 'static {
     fn coefficients(&self) -> Vec<Coefficient>;
     /// How many functions.
     fn functions(&self) -> usize;
-    /// g_k at a time.
+    /// `g_k` at a time.
     fn at(&self, t_s: f64, out: &mut [f64]);
     /// Parameters that are not coefficients.
     fn fixed(&self) -> Vec<Parameter> {

@@ -8,7 +8,7 @@
 //! ```
 //!
 //! Star columns are in px per unit of the coefficient, attitude columns in rad per unit (tracker axes,
-//! theta = log(q_meas q_ref^-1)). Columns are raw: whoever fits projects out misalignment, constants
+//! `theta = log(q_meas q_ref^-1)`). Columns are raw: whoever fits projects out misalignment, constants
 //! and whatever else the declared model leaves free. They are evaluated at modelled positions, never
 //! at measured ones (on measured positions noise explains itself).
 //!

@@ -59,7 +59,7 @@ impl EffectKind for Kind {
         Ok(Box::new(ExposureSmear { exposure_s }))
     }
     fn candidates(&self, scene: &Scene<'_>) -> Vec<Box<dyn Candidate>> {
-        if !scene.has_stars && !(scene.has_attitude && scene.has_reference) {
+        if !(scene.has_stars || scene.has_attitude && scene.has_reference) {
             return Vec::new();
         }
         vec![Box::new(SmearCandidate::about(

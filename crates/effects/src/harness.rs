@@ -202,6 +202,24 @@ impl Bench {
             .collect()
     }
 
+    /// Measured minus noise-free x of star `slot` in every frame, arcsec.
+    pub(crate) fn noise_x_arcsec(&self, pbm: &Pbm, slot: usize, seed: u64) -> Vec<f64> {
+        let mut measured = Measured::default();
+        let mut streams = NoiseStreams::new(seed, 0);
+        pbm.measure_into(
+            &self.truth,
+            self.rows(),
+            &mut streams,
+            &mut Scratch::default(),
+            &mut measured,
+        );
+        let scale = self.camera.arcsec_per_px()[0];
+        let noise = |row: usize| (measured.x_px[row] - measured.noise_free_x_px[row]) * scale;
+        (0..self.t_s.len())
+            .map(|k| noise(self.first_row[k] + slot))
+            .collect()
+    }
+
     /// Calls `use_rows` with the star rows of the undisturbed model.
     pub(crate) fn with_star_rows<T>(&self, use_rows: impl FnOnce(&StarRows<'_>) -> T) -> T {
         let n = self.slot.len();

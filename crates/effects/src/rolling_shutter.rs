@@ -1,4 +1,4 @@
-//! Rolling shutter: row y is exposed at t + line_time y, y in centred pixels.
+//! Rolling shutter: row y is exposed at `t + line_time y`, y in centred pixels.
 //!
 //! ```text
 //! forward     P(t'),   t' = t + line_time y(t')       solved by substitution

@@ -52,7 +52,7 @@ impl EffectKind for Kind {
         }))
     }
     fn candidates(&self, scene: &Scene<'_>) -> Vec<Box<dyn Candidate>> {
-        if !scene.has_stars && !(scene.has_attitude && scene.has_reference) {
+        if !(scene.has_stars || scene.has_attitude && scene.has_reference) {
             return Vec::new();
         }
         vec![Box::new(OffsetCandidate::about(0.0))]

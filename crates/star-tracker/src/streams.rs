@@ -91,7 +91,7 @@ mod tests {
 
     use super::*;
 
-    /// First output of SplitMix64 from state 0, from the authors' reference program.
+    /// First output of `SplitMix64` from state 0, from the authors' reference program.
     #[test]
     fn mix_is_splitmix64() {
         assert_eq!(mix(0), 0xe220_a839_7b1d_cdaf);
