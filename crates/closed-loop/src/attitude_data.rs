@@ -141,10 +141,6 @@ impl Design for WhitenedDesign<'_> {
 }
 
 impl Evidence for AttitudeEvidence<'_> {
-    fn frames(&self) -> usize {
-        self.data.t_s.len()
-    }
-
     fn precision(&self) -> Vec<f64> {
         self.constant_sigma.iter().map(|s| if s.is_finite() { 1.0 / (s * s) } else { 0.0 }).collect()
     }

@@ -9,7 +9,7 @@
 use effects::{Candidate, Scene};
 
 use crate::attitude_data::{AttitudeData, AttitudeEvidence};
-use crate::close::{AttitudeResiduals, Closed, catalogue_candidates};
+use crate::close::{Closed, catalogue_candidates};
 use crate::coloured::Coloured;
 use crate::empirical::{EMPIRICAL, Empirical, Variable};
 use crate::error::CloseError;
@@ -22,6 +22,7 @@ use crate::search::{Found, amplitudes, borrowed, fit, search};
 use crate::situation::Situation;
 use crate::star_data::median_step;
 use focal_plane::{AttitudeSource, Series};
+use telemetry::AttitudeResiduals;
 use telemetry::report::{Errors, Report, Rows};
 
 /// Fewest frames from which an effect and its noise can both be had.
@@ -236,7 +237,7 @@ fn finish(
             t_s: data.t_s.clone(),
             before_arcsec: [bx, by, bz],
             after_arcsec: [ax, ay, az],
-            fold: folds.fold_of_frame(),
+            fold: folds.column(),
             outlier: outliers,
         }),
         dark_map: None,

@@ -13,7 +13,7 @@
 
 use effects::Candidate;
 use telemetry::report::Report;
-use telemetry::{Bundle, Model};
+use telemetry::{AttitudeResiduals, Bundle, DarkMap, Model, StarResiduals};
 
 use crate::attitude_loop;
 use crate::error::CloseError;
@@ -32,7 +32,7 @@ pub struct Closed {
     /// Attitude residuals before and after, a row each.
     pub attitude: Option<AttitudeResiduals>,
     /// The dark map, where one was estimated and adopted.
-    pub dark_map: Option<crate::images::DarkMap>,
+    pub dark_map: Option<DarkMap>,
     /// How rival explanations at image level compare, where there are images.
     pub rivals: Vec<Rival>,
 }
@@ -46,44 +46,6 @@ pub struct Rival {
     pub star_rms_arcsec: [f64; 2],
     /// Gain in out-of-fold log-likelihood over the declared model, nats.
     pub delta_loglik: f64,
-}
-
-/// Star residuals as columns, one entry a row of the `stars` table that was used.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct StarResiduals {
-    /// Time of the frame, s.
-    pub t_s: Vec<f64>,
-    /// Slot.
-    pub slot: Vec<i32>,
-    /// Star.
-    pub star_id: Vec<i64>,
-    /// Measured position, centred px.
-    pub x_px: Vec<f64>,
-    /// Measured position, centred px.
-    pub y_px: Vec<f64>,
-    /// Residual under the declared model at its best, x and y, arcsec, out of fold.
-    pub before_arcsec: [Vec<f64>; 2],
-    /// Residual with the added effects.
-    pub after_arcsec: [Vec<f64>; 2],
-    /// Fold of the row.
-    pub fold: Vec<usize>,
-    /// Left out of the figures.
-    pub outlier: Vec<bool>,
-}
-
-/// Attitude residuals as columns, one entry an attitude that the reference covers.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct AttitudeResiduals {
-    /// Time, s.
-    pub t_s: Vec<f64>,
-    /// Rotation left under the declared model at its best, x, y, z, arcsec, out of fold.
-    pub before_arcsec: [Vec<f64>; 3],
-    /// With the added effects.
-    pub after_arcsec: [Vec<f64>; 3],
-    /// Fold of the row.
-    pub fold: Vec<usize>,
-    /// Left out of the figures of at least one axis.
-    pub outlier: Vec<bool>,
 }
 
 /// Closes the loop between `model` and `bundle`. `progress` hears what is being

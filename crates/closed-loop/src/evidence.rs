@@ -32,8 +32,6 @@ pub(crate) struct Residuals {
 
 /// A kind of measurement.
 pub(crate) trait Evidence: Sync {
-    /// Instants of measurement.
-    fn frames(&self) -> usize;
     /// Prior precision of each nuisance column, 1/arcsec^2 (or free: 0).
     fn precision(&self) -> Vec<f64>;
     /// Residual columns (see [`crate::fit::Layout`]).

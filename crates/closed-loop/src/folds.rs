@@ -45,6 +45,12 @@ impl Folds {
         }
     }
 
+    /// The fold of each frame as tables have it.
+    pub(crate) fn column(&self) -> Vec<u32> {
+        let narrow = |f| u32::try_from(f).unwrap_or(u32::MAX);
+        self.fold_of_frame().into_iter().map(narrow).collect()
+    }
+
     /// The fold of each frame.
     pub(crate) fn fold_of_frame(&self) -> Vec<usize> {
         let mut fold = Vec::new();

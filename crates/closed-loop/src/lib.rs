@@ -31,6 +31,5 @@ mod star_data;
 mod star_design;
 mod star_loop;
 
-pub use close::{AttitudeResiduals, Closed, Rival, StarResiduals, close};
+pub use close::{Closed, Rival, close};
 pub use error::CloseError;
-pub use images::{DarkMap, DarkPixel};

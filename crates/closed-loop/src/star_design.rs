@@ -216,10 +216,6 @@ impl StarEvidence<'_> {
 }
 
 impl Evidence for StarEvidence<'_> {
-    fn frames(&self) -> usize {
-        self.data.frames.frames()
-    }
-
     fn precision(&self) -> Vec<f64> {
         self.nuisance.precision()
     }

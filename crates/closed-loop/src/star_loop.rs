@@ -12,9 +12,10 @@ use std::collections::BTreeMap;
 use effects::{Candidate, Scene, StarFacts, StarRows};
 use focal_plane::{AttitudeSource, Points, rotation_vector};
 use telemetry::report::{Errors, Report, Rows};
+use telemetry::{AttitudeResiduals, DarkMap, StarResiduals};
 
 use crate::attitude_loop::channels_of_interest;
-use crate::close::{AttitudeResiduals, Closed, StarResiduals, catalogue_candidates};
+use crate::close::{Closed, catalogue_candidates};
 use crate::declared;
 use crate::empirical::{EMPIRICAL, Empirical, Variable};
 use crate::error::CloseError;
@@ -360,7 +361,7 @@ fn finish(f: &Finish<'_>) -> Result<Closed, CloseError> {
     };
     let [ax, ay]: [Vec<f64>; 2] = after.axes.try_into().unwrap_or_default();
     let [bx, by]: [Vec<f64>; 2] = f.before.axes.clone().try_into().unwrap_or_default();
-    let fold_of_frame = f.folds.fold_of_frame();
+    let fold_of_frame = f.folds.column();
     let frames = &f.data.frames;
     let fold = (0..frames.frames())
         .flat_map(|k| std::iter::repeat_n(fold_of_frame[k], frames.rows_of(k).len()))
@@ -383,7 +384,12 @@ fn finish(f: &Finish<'_>) -> Result<Closed, CloseError> {
         dark_map: f
             .image
             .filter(|(level, _)| level.dark_map.stands)
-            .map(|(_, formed)| formed.map.clone()),
+            .map(|(_, formed)| DarkMap {
+                x_px: formed.map.pixels.iter().map(|p| p.x_px).collect(),
+                y_px: formed.map.pixels.iter().map(|p| p.y_px).collect(),
+                dn: formed.map.pixels.iter().map(|p| p.dn).collect(),
+                sigma_dn: formed.map.pixels.iter().map(|p| p.sigma_dn).collect(),
+            }),
         rivals: f.image.map(|(level, _)| level.rivals.clone()).unwrap_or_default(),
     })
 }
@@ -418,7 +424,7 @@ fn attitude_residuals(f: &Finish<'_>, after: &Residuals) -> Option<AttitudeResid
             .collect()
     };
     let (shift_before, shift_after) = (shift(f.before), shift(after));
-    let fold = f.folds.fold_of_frame();
+    let fold = f.folds.column();
     let own: BTreeMap<u64, usize> =
         table.t_s.iter().enumerate().map(|(k, t)| (t.to_bits(), k)).collect();
     let mut out = AttitudeResiduals::default();

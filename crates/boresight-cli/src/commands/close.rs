@@ -1,0 +1,67 @@
+//! `boresight close`: the main job.
+
+use std::io::Write as _;
+
+use anyhow::Context as _;
+use boresight::closed_loop::{Closed, close};
+use boresight::report::summary;
+use boresight::telemetry::{Bundle, Model, Output};
+
+use crate::arguments::Close;
+use crate::console::Console;
+use crate::example;
+
+pub(crate) fn run(options: &Close, console: &Console) -> anyhow::Result<()> {
+    console.progress("reading");
+    let (model, bundle, title) = match (&options.model, &options.bundle) {
+        (Some(model), Some(bundle)) => {
+            let title = format!("{} against {}", bundle.display(), model.display());
+            (Model::read(model)?, Bundle::read(bundle)?, title)
+        }
+        _ => {
+            let title = "the example inside the binary: simulated, with an effect that its model lacks";
+            (example::model()?, example::bundle()?, title.to_owned())
+        }
+    };
+    let closed = close(&model, &bundle, &|what| console.progress(what))?;
+    let text = summary(&closed);
+    if let Some(dir) = &options.out {
+        console.progress("writing results");
+        let output = Output::new(dir)?;
+        // An interrupted run leaves nothing behind.
+        let partial = output.partial().to_owned();
+        let _ = ctrlc::set_handler(move || {
+            let _ = std::fs::remove_dir_all(&partial);
+            interrupted();
+        });
+        write(&closed, &text, &output)?;
+        output.commit()?;
+    }
+    console.say(&format!("Input     {title}\n{text}"));
+    if console.json() {
+        console.machine(&serde_json::to_string_pretty(&closed.report).context("the report as JSON")?);
+    }
+    Ok(())
+}
+
+#[expect(clippy::exit, reason = "the answer to Ctrl-C, after the partial output is gone")]
+fn interrupted() {
+    std::process::exit(130)
+}
+
+fn write(closed: &Closed, text: &str, output: &Output) -> anyhow::Result<()> {
+    let json = serde_json::to_string_pretty(&closed.report).context("the report as JSON")?;
+    output.write("report.json", |to| writeln!(to, "{json}"))?;
+    output.write("summary.txt", |to| to.write_all(text.as_bytes()))?;
+    output.write("model.toml", |to| to.write_all(closed.model.to_toml().as_bytes()))?;
+    if let Some(stars) = &closed.stars {
+        stars.write(output)?;
+    }
+    if let Some(attitude) = &closed.attitude {
+        attitude.write(output)?;
+    }
+    if let Some(map) = &closed.dark_map {
+        map.write(output)?;
+    }
+    Ok(())
+}

@@ -1,0 +1,62 @@
+//! All that is printed.
+
+use std::time::Duration;
+
+use indicatif::{ProgressBar, ProgressStyle};
+
+/// Where results, progress and errors go.
+#[derive(Debug)]
+pub(crate) struct Console {
+    quiet: bool,
+    json: bool,
+    bar: ProgressBar,
+}
+
+impl Console {
+    pub(crate) fn new(quiet: bool, json: bool) -> Self {
+        // Draws on stderr, and not at all when that is no terminal.
+        let bar = if quiet { ProgressBar::hidden() } else { ProgressBar::new_spinner() };
+        if let Ok(style) = ProgressStyle::with_template("{spinner} {elapsed} {msg}") {
+            bar.set_style(style);
+        }
+        if !quiet {
+            bar.enable_steady_tick(Duration::from_millis(200));
+        }
+        Self { quiet, json, bar }
+    }
+
+    /// Says what is being done.
+    pub(crate) fn progress(&self, what: &str) {
+        self.bar.set_message(what.to_owned());
+    }
+
+    /// Whether the machine-readable result is wanted.
+    pub(crate) fn json(&self) -> bool {
+        self.json
+    }
+
+    /// A result for people; nothing under `--json` or `--quiet`.
+    #[expect(clippy::print_stdout, reason = "results go to stdout, here alone")]
+    pub(crate) fn say(&self, text: &str) {
+        self.bar.finish_and_clear();
+        if !self.json && !self.quiet {
+            println!("{}", text.trim_end());
+        }
+    }
+
+    /// A result for machines; nothing without `--json`.
+    #[expect(clippy::print_stdout, reason = "results go to stdout, here alone")]
+    pub(crate) fn machine(&self, text: &str) {
+        self.bar.finish_and_clear();
+        if self.json {
+            println!("{text}");
+        }
+    }
+
+    /// What went wrong, with its causes.
+    #[expect(clippy::print_stderr, reason = "errors go to stderr, here alone")]
+    pub(crate) fn error(&self, error: &anyhow::Error) {
+        self.bar.finish_and_clear();
+        eprintln!("error: {error:#}");
+    }
+}

@@ -1,0 +1,152 @@
+//! Position, flux and background of a star from one window.
+//!
+//! ```text
+//! minimise sum w (z - F psi(p - s) - B - D)^2 + (B - B0)^2/sigma_B^2   over F, B, s
+//! w = 1/var,   var = a + b max(model, 0) + v       v variance of the dark map
+//! ```
+//!
+//! Gauss-Newton; a step of the position is limited, and from the second step on
+//! pixels with `|r| > clip scale sqrt(var)` are left out, decided anew each time:
+//! a particle hit costs its pixel, not the star.
+//!
+//! Source: Anderson & King 2000, PASP 112, 1360, section 2 (fitting the effective PSF).
+
+use nalgebra::{Matrix4, Vector4};
+
+use super::sample::Sample;
+use super::spline::Grid;
+use super::spot::WindowTaps;
+
+/// Largest step of a position, px.
+const MAX_STEP_PX: f64 = 0.3;
+/// A step below this, px, ends the iteration.
+const SETTLED_PX: f64 = 1e-7;
+/// Multiples of the noise beyond which a pixel is left out.
+const CLIP: f64 = 5.0;
+
+/// Variance of a pixel as a function of what it should read.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct PixelNoise {
+    /// Variance of a dark pixel.
+    pub(crate) a: f64,
+    /// Variance per unit of signal.
+    pub(crate) b: f64,
+}
+
+impl PixelNoise {
+    pub(crate) fn variance(&self, model: f64) -> f64 {
+        self.a + self.b * model.max(0.0)
+    }
+}
+
+/// What is known before a window of one star is looked at.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Known<'a> {
+    pub(crate) grid: &'a Grid,
+    pub(crate) psi: &'a [f64],
+    pub(crate) noise: PixelNoise,
+    /// Noise of this star's pixels over that.
+    pub(crate) scale: f64,
+    /// Expected background and its variance.
+    pub(crate) background: f64,
+    pub(crate) background_variance: f64,
+    /// Dark map by detector pixel.
+    pub(crate) dark: &'a [f64],
+    /// Its variance, if it is to be counted.
+    pub(crate) dark_variance: Option<&'a [f64]>,
+}
+
+/// One window's four numbers.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Fitted {
+    pub(crate) at: [f64; 2],
+    pub(crate) flux: f64,
+    pub(crate) background: f64,
+    /// Formal variances.
+    pub(crate) background_variance: f64,
+    pub(crate) position_variance: [f64; 2],
+}
+
+/// Pixels of one window under the fitted model.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Pixels {
+    pub(crate) residual: Vec<f64>,
+    pub(crate) model: Vec<f64>,
+    pub(crate) good: Vec<bool>,
+    taps: WindowTaps,
+}
+
+/// Fits window `w`, starting from the position, flux and background of `start`.
+/// `None` where the numbers leave the window or do not stay numbers.
+pub(crate) fn fit(
+    known: &Known<'_>,
+    sample: &Sample,
+    w: usize,
+    start: &Fitted,
+    steps: usize,
+    pixels: &mut Pixels,
+) -> Option<Fitted> {
+    let cells = sample.cells_of(w);
+    pixels.good.clear();
+    pixels.good.extend_from_slice(&sample.valid[cells.clone()]);
+    pixels.residual.resize(cells.len(), 0.0);
+    pixels.model.resize(cells.len(), 0.0);
+    let mut now = *start;
+    let mut covariance = Matrix4::zeros();
+    let mut settled = false;
+    for step in 0..=steps {
+        pixels.taps.set(known.grid, sample, w, now.at);
+        let last = step == steps || settled;
+        let mut normal = Matrix4::<f64>::zeros();
+        let mut moment = Vector4::<f64>::zeros();
+        for (k, (i, &[c, r])) in cells.clone().zip(&sample.cells).enumerate() {
+            let [psi, gx, gy] =
+                known.grid.evaluate(known.psi, &pixels.taps.x[c], &pixels.taps.y[r]);
+            let dark = sample.pixel[i];
+            let model = now.flux * psi + now.background + known.dark[dark];
+            let residual = sample.z[i] - model;
+            let variance = known.noise.variance(model) + known.dark_variance.map_or(0.0, |v| v[dark]);
+            pixels.model[k] = model;
+            pixels.residual[k] = residual;
+            if step > 0 {
+                let limit = CLIP * known.scale;
+                pixels.good[k] = sample.valid[i] && residual * residual < limit * limit * variance;
+            }
+            if last || !pixels.good[k] {
+                continue;
+            }
+            let column = [psi, 1.0, -now.flux * gx, -now.flux * gy];
+            let weight = 1.0 / variance;
+            for p in 0..4 {
+                let v = weight * column[p];
+                moment[p] += v * residual;
+                for q in p..4 {
+                    normal[(q, p)] += v * column[q];
+                }
+            }
+        }
+        if last {
+            break;
+        }
+        normal[(1, 1)] += 1.0 / known.background_variance;
+        moment[1] += (known.background - now.background) / known.background_variance;
+        let ridge = 1e-12 * normal.trace();
+        for p in 0..4 {
+            normal[(p, p)] += ridge;
+        }
+        // reads the lower half
+        let factor = normal.cholesky()?;
+        let d = factor.solve(&moment);
+        covariance = factor.inverse();
+        now.flux += d[0];
+        now.background += d[1];
+        for axis in 0..2 {
+            now.at[axis] += d[2 + axis].clamp(-MAX_STEP_PX, MAX_STEP_PX);
+        }
+        settled = step > 1 && d[2].abs().max(d[3].abs()) < SETTLED_PX;
+    }
+    now.background_variance = covariance[(1, 1)];
+    now.position_variance = [covariance[(2, 2)], covariance[(3, 3)]];
+    let sound = now.flux > 0.0 && now.flux.is_finite() && now.background.is_finite();
+    (sound && sample.near(w, now.at)).then_some(now)
+}

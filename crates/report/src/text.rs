@@ -1,0 +1,207 @@
+//! A summary that a flight analyst can read, and paste into a report.
+
+use std::fmt::Write as _;
+
+use closed_loop::Closed;
+use telemetry::report::{Errors, FoundEffect, Report, Selector, Verdict};
+
+/// The findings of a run in words and numbers, some 20 lines of at most 100 columns.
+#[must_use]
+pub fn summary(closed: &Closed) -> String {
+    let mut out = String::new();
+    let report = &closed.report;
+    verdict(&mut out, report);
+    figures(&mut out, report);
+    effects(&mut out, report);
+    rivals(&mut out, closed);
+    considered(&mut out, report);
+    leftover(&mut out, report);
+    out
+}
+
+/// Writing to a string cannot fail.
+macro_rules! line {
+    ($out:expr) => { $out.push('\n') };
+    ($out:expr, $($arg:tt)*) => {{ let _ = writeln!($out, $($arg)*); }};
+}
+
+fn verdict(out: &mut String, report: &Report) {
+    let names: Vec<&str> = report.effects.iter().map(|e| e.id.as_str()).collect();
+    let sentence = match report.verdict {
+        Verdict::Consistent => "the data follows the declared model; nothing is left to explain".to_owned(),
+        Verdict::Explained => format!("explained by {}; nothing is left", names.join(" + ")),
+        Verdict::PartlyExplained => format!("partly explained by {}; something is left", names.join(" + ")),
+        Verdict::Unexplained => "something is left that no effect of the catalogue explains".to_owned(),
+    };
+    line!(out, "Verdict   {sentence}");
+    line!(
+        out,
+        "Data      {} rows used, {} outliers, {} outside the reference; {} folds, every figure out of fold",
+        report.rows.used,
+        report.rows.outliers,
+        report.rows.outside_reference,
+        report.folds
+    );
+    line!(out);
+}
+
+fn figures(out: &mut String, report: &Report) {
+    line!(out, "{:<28}{:>12}{:>12}{:>10}", "", "before", "after", "ratio");
+    let (before, after) = (&report.before, &report.after);
+    if let (Some(b), Some(a)) = (before.star_rms_arcsec, after.star_rms_arcsec) {
+        for (k, axis) in ["x", "y"].into_iter().enumerate() {
+            figure(out, &format!("star residual {axis}, arcsec"), b[k], a[k]);
+        }
+    }
+    if let (Some(b), Some(a)) = (before.attitude_rms_arcsec, after.attitude_rms_arcsec) {
+        for (k, axis) in ["X", "Y", "Z"].into_iter().enumerate() {
+            figure(out, &format!("attitude residual {axis}, arcsec"), b[k], a[k]);
+        }
+    }
+    for (name, get) in [
+        ("chi2 per degree of freedom", (|e: &Errors| e.chi2_per_dof) as fn(&Errors) -> Option<f64>),
+        ("log-likelihood per frame", |e| e.loglik_per_frame),
+    ] {
+        if let (Some(b), Some(a)) = (get(before), get(after)) {
+            line!(out, "{name:<28}{b:>12.4}{a:>12.4}");
+        }
+    }
+    line!(out);
+}
+
+fn figure(out: &mut String, name: &str, before: f64, after: f64) {
+    let digits = if before < 1.0 { 4 } else { 3 };
+    line!(out, "{name:<28}{before:>12.digits$}{after:>12.digits$}{:>10.3}", after / before);
+}
+
+fn effects(out: &mut String, report: &Report) {
+    for effect in &report.effects {
+        line!(out, "Added     {}{}", effect.id, selectors(effect));
+        for (name, estimate) in &effect.parameters {
+            let unit = if estimate.unit.is_empty() { String::new() } else { format!(" {}", estimate.unit) };
+            match estimate.sigma {
+                Some(sigma) => {
+                    line!(out, "            {name} = {} +- {}{unit}", number(estimate.value), number(sigma));
+                }
+                None => line!(out, "            {name} = {}{unit}", number(estimate.value)),
+            }
+        }
+        let share = effect
+            .variance_explained
+            .map_or(String::new(), |v| format!(", {:.1} % of the variance before", 100.0 * v));
+        line!(out, "            gain {:.1} nats out of fold, p = {:.1e}{share}", effect.delta_loglik, effect.p_value);
+        let alike: Vec<String> = effect
+            .confusable_with
+            .iter()
+            .take(3)
+            .map(|c| format!("{} ({:+.2})", c.id, c.correlation))
+            .collect();
+        if !alike.is_empty() {
+            line!(out, "            looks like {}", alike.join(", "));
+        }
+    }
+    if !report.effects.is_empty() {
+        line!(out);
+    }
+}
+
+fn selectors(effect: &FoundEffect) -> String {
+    if effect.selectors.is_empty() {
+        return String::new();
+    }
+    let list: Vec<String> = effect
+        .selectors
+        .iter()
+        .map(|(key, value)| match value {
+            Selector::Integer(i) => format!("{key} = {i}"),
+            Selector::Text(t) => format!("{key} = {t}"),
+        })
+        .collect();
+    format!(" ({})", list.join(", "))
+}
+
+fn rivals(out: &mut String, closed: &Closed) {
+    if closed.rivals.is_empty() {
+        return;
+    }
+    line!(out, "{:<52}{:>9}{:>9}{:>12}", "Rival explanations of the images, out of fold", "x, \"", "y, \"", "gain, nats");
+    for rival in &closed.rivals {
+        line!(
+            out,
+            "  {:<50}{:>9.4}{:>9.4}{:>12.1}",
+            rival.what,
+            rival.star_rms_arcsec[0],
+            rival.star_rms_arcsec[1],
+            rival.delta_loglik
+        );
+    }
+    line!(out);
+}
+
+fn considered(out: &mut String, report: &Report) {
+    let (seen, unseen): (Vec<_>, Vec<_>) = report.considered.iter().partition(|c| c.observable);
+    let mut tried = seen;
+    tried.sort_by(|a, b| b.delta_loglik.unwrap_or(0.0).total_cmp(&a.delta_loglik.unwrap_or(0.0)));
+    if !tried.is_empty() {
+        line!(out, "Considered and not added (gain in nats; size that would have shown at 5 sigma):");
+        for c in tried.iter().take(8) {
+            let size = match (&c.parameter, c.detectable, &c.unit) {
+                (Some(parameter), Some(d), Some(unit)) => format!("{parameter} {} {unit}", number(d)),
+                _ => String::new(),
+            };
+            line!(out, "  {:<26}{:>9.1}   {size}", c.id, c.delta_loglik.unwrap_or(0.0));
+        }
+    }
+    if !unseen.is_empty() {
+        let names: Vec<&str> = unseen.iter().map(|c| c.id.as_str()).collect();
+        let mut row = String::from("Not observable in this data:");
+        for name in names {
+            if row.len() + name.len() + 2 > 98 {
+                line!(out, "{row}");
+                row = String::from("   ");
+            }
+            row.push(' ');
+            row.push_str(name);
+        }
+        line!(out, "{row}");
+    }
+}
+
+fn leftover(out: &mut String, report: &Report) {
+    if !report.unattributed.present {
+        return;
+    }
+    line!(out, "What is left follows (share of its variance, out of fold):");
+    for d in report.unattributed.depends_on.iter().filter(|d| d.variance_explained > 0.0).take(5) {
+        line!(out, "  {:<34}{:>7.1} %   p = {:.1e}", d.variable, 100.0 * d.variance_explained, d.p_value);
+    }
+}
+
+/// Four significant digits, plain where that is readable.
+fn number(value: f64) -> String {
+    let size = value.abs();
+    if value == 0.0 || (1e-3..1e6).contains(&size) {
+        let digits = if size >= 1000.0 { 0 } else if size >= 1.0 { 3 } else { 5 };
+        let text = format!("{value:.digits$}");
+        return if text.contains('.') {
+            text.trim_end_matches('0').trim_end_matches('.').to_owned()
+        } else {
+            text
+        };
+    }
+    format!("{value:.3e}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::number;
+
+    #[test]
+    fn numbers_stay_readable() {
+        assert_eq!(number(3.01e-5), "3.010e-5");
+        assert_eq!(number(0.9), "0.9");
+        assert_eq!(number(408.0), "408");
+        assert_eq!(number(12345.6), "12346");
+        assert_eq!(number(0.0), "0");
+    }
+}
