@@ -1,2 +1,25 @@
 //! Motions and skies: bundles simulated from a scenario.
+//!
+//! A [`Scenario`] is a model file with `[motion]`, `[sky]` and `[run]`; [`simulate`] makes the bundle
+//! that a tracker of that model, with the effects of the scenario acting in it, would have sent.
 #![forbid(unsafe_code)]
+
+mod error;
+mod housekeeping;
+mod motion;
+mod reference;
+mod run;
+mod scenario;
+mod simulate;
+mod sky;
+
+pub use error::ScenarioError;
+pub use housekeeping::{Channel, Housekeeping, OrbitVelocity, SinusoidChannel, Thermostat};
+pub use motion::{
+    ClosedLoop, Hold, Motion, Pointing, Recorded, RecordedTable, Sinusoid, Slew, Slews,
+};
+pub use reference::{Gyro, Reference};
+pub use run::{Reported, Run};
+pub use scenario::Scenario;
+pub use simulate::{Simulated, simulate, simulate_with_truth};
+pub use sky::{GeneratedSky, HipparcosSky, Sky, hipparcos};

@@ -1,0 +1,429 @@
+//! From a scenario to a bundle.
+//!
+//! ```text
+//! motion -> truth -> sky -> rows -> physics-based model with the effects -> stars, attitude
+//!             \-> reference, rates        housekeeping -> effects
+//! ```
+//!
+//! Every random number comes from the stream of its purpose (seed, draw, purpose), and everything runs
+//! in one order on one thread: the same scenario gives the same bundle anywhere.
+//!
+//! Source: [M23] Section 2.6 and Fig. 4.
+
+use std::sync::Arc;
+
+use centroid::{CentroidError, Triangle};
+use distortion::{DistortionField, LsfSigma};
+use effects::{Effect, FrameGeometry, ParameterValue, Parameters, Surroundings, VectorFrame};
+use focal_plane::{Angle, AttitudeSeries, AttitudeSource, Camera, StarFrames, Vectors};
+use nalgebra::Vector3;
+use rand_distr::{Distribution, StandardNormal};
+use star_tracker::{
+    Disturbance, Measured, NoiseStreams, Pbm, Purpose, Rows, Scratch, Stages, TemporalNoise, stream,
+};
+use telemetry::{
+    AttitudeTable, Bundle, EffectEntry, EffectValue, Frames, Metadata, Model, ModelKind,
+    QuaternionSigns, TrackerMeta,
+};
+
+use crate::housekeeping::Channels;
+use crate::reference::Wander;
+use crate::run::Reported;
+use crate::sky::Seen;
+use crate::{Motion, Scenario, ScenarioError};
+
+/// Order of the distortion polynomials where the model does not say: [M23] Section 4.2.
+const DISTORTION_ORDER: u32 = 7;
+
+/// A bundle with what it was made from.
+#[derive(Clone, Debug)]
+pub struct Simulated {
+    /// What a user of the tracker gets.
+    pub bundle: Bundle,
+    /// True attitude.
+    pub truth: AttitudeSeries,
+    /// The tracker with everything that acts in it.
+    pub pbm: Pbm,
+    /// The effects of the scenario, in its order; they are among the disturbances of `pbm` too.
+    pub effects: Vec<Arc<dyn Effect>>,
+    /// Stars asked for and what came out, row by row of the frames of the run, rows left out included.
+    pub measured: Measured,
+    /// True inertial directions of these rows: x, y, z.
+    pub direction: [Vec<f64>; 3],
+    /// Slots and stars of these rows; their positions are NaN.
+    pub rows: StarFrames,
+}
+
+/// The bundle of the scenario's own draw.
+///
+/// # Errors
+/// A number outside its range, an effect that cannot be built, a recording that cannot be read, or a
+/// field without stars.
+pub fn simulate(scenario: &Scenario) -> Result<Bundle, ScenarioError> {
+    Ok(simulate_with_truth(scenario, scenario.run.draw)?.bundle)
+}
+
+/// The bundle of another draw of the same scenario, with the truth behind it.
+///
+/// # Errors
+/// As [`simulate`].
+pub fn simulate_with_truth(scenario: &Scenario, draw: u64) -> Result<Simulated, ScenarioError> {
+    scenario.run.check()?;
+    let model = &scenario.model;
+    if model.kind != ModelKind::Pbm {
+        return Err(ScenarioError::NotPhysicsBased);
+    }
+    let seed = scenario.run.seed;
+    let camera = camera(model)?;
+    let rate_hz = scenario
+        .run
+        .rate_hz
+        .or(model.tracker.update_rate_hz)
+        .ok_or(ScenarioError::Missing {
+            name: "run.rate_hz or tracker.update_rate_hz",
+        })?;
+    let (truth, t_s) = truth_and_times(scenario, rate_hz, draw)?;
+    let year = scenario
+        .run
+        .epoch
+        .map_or(crate::sky::CATALOGUE_YEAR, |epoch| epoch.julian_year(0.0));
+    let seen = scenario.sky.follow(
+        &camera,
+        &truth,
+        &t_s,
+        model.tracker.max_stars,
+        year,
+        &mut stream(seed, draw, Purpose::StarField),
+    )?;
+    let channels = match &scenario.housekeeping {
+        Some(housekeeping) => housekeeping.channels(
+            truth.span_s(),
+            &mut stream(seed, draw, Purpose::Housekeeping),
+        )?,
+        None => Channels::default(),
+    };
+    let surroundings = Surroundings {
+        camera: &camera,
+        span_s: [t_s[0], t_s[t_s.len() - 1]],
+        channels: &channels.series,
+        frames: channels.vectors.then_some(INERTIAL),
+    };
+    let effects = build_effects(&model.effects, &surroundings)?;
+    let mut pbm = tracker(model, &camera, seed, draw)?;
+    for effect in &effects {
+        let disturbance: Arc<dyn Disturbance> = effect.clone();
+        pbm = pbm.with_disturbance(disturbance);
+    }
+    let measured = measure(&pbm, &truth, &seen, NoiseStreams::new(seed, draw));
+    let bundle = Bundle {
+        meta: metadata(scenario, rate_hz, draw, channels.vectors),
+        camera: Some(camera),
+        attitude: scenario
+            .run
+            .reports(Reported::Attitude)
+            .then(|| attitude_table(&t_s, &measured)),
+        stars: scenario
+            .run
+            .reports(Reported::Stars)
+            .then(|| star_frames(&seen.frames, &measured, scenario.run.position_step_px)),
+        reference: reference(scenario, &truth, &t_s, rate_hz, &effects, draw)?,
+        rates: rates(scenario, &truth, &t_s, rate_hz, draw)?,
+        catalog: scenario
+            .run
+            .reports(Reported::Catalog)
+            .then_some(seen.catalogue),
+        housekeeping: channels.table,
+        ..Bundle::default()
+    };
+    Ok(Simulated {
+        bundle,
+        truth,
+        pbm,
+        effects,
+        measured,
+        direction: seen.direction,
+        rows: seen.frames,
+    })
+}
+
+/// Vectors of simulated housekeeping are inertial.
+const INERTIAL: FrameGeometry = FrameGeometry {
+    tracker_boresight: None,
+    reference_boresight: None,
+    vectors_in: VectorFrame::Inertial,
+    quaternion_signs: Some([1.0; 3]),
+};
+
+fn camera(model: &Model) -> Result<Camera, ScenarioError> {
+    let tracker = &model.tracker;
+    let pixels = tracker.pixels.ok_or(ScenarioError::Missing {
+        name: "tracker.pixels",
+    })?;
+    let camera = match (tracker.fov_deg, tracker.focal_length_px) {
+        (Some(fov_deg), _) => Camera::from_fov_deg(pixels, fov_deg)?,
+        (None, Some(focal_px)) => Camera::from_focal_length_px(pixels, focal_px)?,
+        (None, None) => {
+            return Err(ScenarioError::Missing {
+                name: "tracker.fov_deg or tracker.focal_length_px",
+            });
+        }
+    };
+    Ok(match tracker.pixel_centre {
+        Some(pixel_centre) => camera.with_pixel_centre(pixel_centre)?,
+        None => camera,
+    })
+}
+
+/// True attitude, and the times of the frames.
+fn truth_and_times(
+    scenario: &Scenario,
+    rate_hz: f64,
+    draw: u64,
+) -> Result<(AttitudeSeries, Vec<f64>), ScenarioError> {
+    let run = &scenario.run;
+    let mut rng = stream(run.seed, draw, Purpose::Motion);
+    let recorded = matches!(scenario.motion, Motion::Recorded(_));
+    let duration_s = match run.duration_s {
+        Some(duration_s) => duration_s,
+        None if recorded => 0.0,
+        None => {
+            return Err(ScenarioError::Missing {
+                name: "run.duration_s",
+            });
+        }
+    };
+    let span_s = [-run.margin_s, duration_s + run.margin_s];
+    let truth = scenario.motion.truth(span_s, &scenario.folder, &mut rng)?;
+    let [first_s, last_s] = truth.span_s();
+    let (start_s, end_s) = match (recorded, run.duration_s) {
+        (true, Some(duration_s)) => (first_s, last_s.min(first_s + duration_s)),
+        // its last sample is a frame too
+        (true, None) => (first_s, last_s + 0.5 / rate_hz),
+        (false, _) => (0.0, duration_s),
+    };
+    let mut t_s = Vec::new();
+    let mut k = 0.0;
+    // half a millionth of a step: a duration that is a whole number of steps must not gain a frame
+    while k / rate_hz < end_s - start_s - 5e-7 / rate_hz || t_s.is_empty() {
+        t_s.push(start_s + k / rate_hz);
+        k += 1.0;
+    }
+    Ok((truth, t_s))
+}
+
+/// The declared tracker: distortion drawn, nothing beyond the model yet but the constant misalignment
+/// of this draw.
+fn tracker(model: &Model, camera: &Camera, seed: u64, draw: u64) -> Result<Pbm, ScenarioError> {
+    let noise = &model.noise;
+    let mut pbm = Pbm::new(camera.clone());
+    if let Some(sigma_arcsec) = noise.temporal_arcsec {
+        pbm = pbm.with_noise(TemporalNoise::circular_arcsec(sigma_arcsec)?);
+    }
+    if let Some(peak_arcsec) = noise.centroid_arcsec {
+        pbm = pbm.with_centroid_error(CentroidError::Triangle(Triangle::from_peak(peak_arcsec)));
+    }
+    if let Some(sigma_arcsec) = noise.distortion_arcsec {
+        let order = noise.distortion_order.unwrap_or(DISTORTION_ORDER) as usize;
+        let sigma = LsfSigma::Circular(Angle::from_arcsec(sigma_arcsec));
+        let mut rng = stream(seed, draw, Purpose::Distortion);
+        pbm = pbm.with_distortion(DistortionField::draw(order, sigma, &mut rng)?);
+    }
+    if let Some(sigma_arcsec) = noise.bias_arcsec {
+        let mut rng = stream(seed, draw, Purpose::Bias);
+        let theta_rad = Vector3::from(sigma_arcsec.map(|sigma| {
+            let normal: f64 = StandardNormal.sample(&mut rng);
+            Angle::from_arcsec(sigma * normal).rad()
+        }));
+        let bias: Arc<dyn Disturbance> = Arc::new(ConstantMisalignment { theta_rad });
+        pbm = pbm.with_disturbance(bias);
+    }
+    Ok(pbm)
+}
+
+/// The unknown constant misalignment of one draw: part of the declared model, so no effect.
+#[derive(Debug)]
+struct ConstantMisalignment {
+    theta_rad: Vector3<f64>,
+}
+
+impl Disturbance for ConstantMisalignment {
+    fn stages(&self) -> Stages {
+        Stages {
+            attitude: true,
+            ..Stages::NONE
+        }
+    }
+
+    fn misalignment_rad(&self, _t_s: f64) -> Vector3<f64> {
+        self.theta_rad
+    }
+}
+
+fn build_effects(
+    entries: &[EffectEntry],
+    surroundings: &Surroundings<'_>,
+) -> Result<Vec<Arc<dyn Effect>>, ScenarioError> {
+    entries
+        .iter()
+        .map(|entry| {
+            let built = effects::build(&entry.id, &parameters(entry)?, surroundings)?;
+            Ok(Arc::from(built))
+        })
+        .collect()
+}
+
+fn parameters(entry: &EffectEntry) -> Result<Parameters, ScenarioError> {
+    let value = |(name, value): (&String, &EffectValue)| {
+        let value = match value {
+            EffectValue::Number(number) => ParameterValue::Number(*number),
+            EffectValue::Text(text) => ParameterValue::Text(text.clone()),
+            EffectValue::Numbers(_) => {
+                return Err(ScenarioError::EffectList {
+                    effect: entry.id.clone(),
+                    name: name.clone(),
+                });
+            }
+        };
+        Ok((name.clone(), value))
+    };
+    entry.parameters.iter().map(value).collect()
+}
+
+fn measure(pbm: &Pbm, truth: &AttitudeSeries, seen: &Seen, mut streams: NoiseStreams) -> Measured {
+    let [x, y, z] = &seen.direction;
+    let rows = Rows {
+        t_s: &seen.frames.t_s,
+        first_row: &seen.frames.first_row,
+        slot: &seen.frames.slot,
+        star_id: &seen.frames.star_id,
+        mag: &seen.mag,
+        bv: &seen.bv,
+        direction: Vectors { x, y, z },
+    };
+    let mut out = Measured::default();
+    pbm.measure_into(truth, rows, &mut streams, &mut Scratch::default(), &mut out);
+    out
+}
+
+fn attitude_table(t_s: &[f64], measured: &Measured) -> AttitudeTable {
+    let solved = t_s
+        .iter()
+        .enumerate()
+        .filter_map(|(k, &t)| Some((t, measured.attitude(k)?)));
+    let (t_s, q) = solved.unzip();
+    AttitudeTable { t_s, q }
+}
+
+/// Measured stars: rows that were left out are not there, and a frame without stars is a gap.
+fn star_frames(asked: &StarFrames, measured: &Measured, step_px: f64) -> StarFrames {
+    // a quotient of whole numbers is the double nearest to the decimal: it stays short in a file
+    let per_px = (1.0 / step_px).round();
+    let round = move |px: f64| match step_px > 0.0 {
+        true if step_px < 1.0 && (per_px * step_px - 1.0).abs() < 1e-12 => {
+            (px * per_px).round() / per_px
+        }
+        true => (px / step_px).round() * step_px,
+        false => px,
+    };
+    let mut out = StarFrames::with_capacity(asked.frames(), asked.rows());
+    for k in 0..asked.frames() {
+        let kept = |row: &usize| !measured.x_px[*row].is_nan();
+        if !asked.rows_of(k).any(|row| kept(&row)) {
+            continue;
+        }
+        out.begin(asked.t_s[k]);
+        for row in asked.rows_of(k).filter(kept) {
+            let (x, y) = (round(measured.x_px[row]), round(measured.y_px[row]));
+            out.push(asked.slot[row], asked.star_id[row], x, y);
+        }
+    }
+    out
+}
+
+/// Multiples of a step from the first frame, one sample beyond the frames on either side.
+fn sample_times(frames_s: &[f64], rate_hz: f64) -> Vec<f64> {
+    let (first_s, last_s) = (frames_s[0], frames_s[frames_s.len() - 1]);
+    let mut t_s = vec![first_s - 1.0 / rate_hz];
+    let mut k = 0.0;
+    while t_s[t_s.len() - 1] <= last_s {
+        t_s.push(first_s + k / rate_hz);
+        k += 1.0;
+    }
+    t_s
+}
+
+fn reference(
+    scenario: &Scenario,
+    truth: &AttitudeSeries,
+    frames_s: &[f64],
+    rate_hz: f64,
+    effects: &[Arc<dyn Effect>],
+    draw: u64,
+) -> Result<Option<telemetry::ReferenceTable>, ScenarioError> {
+    let Some(reference) = &scenario.reference else {
+        return Ok(None);
+    };
+    let rate_hz = reference.rate_hz.unwrap_or(rate_hz);
+    ScenarioError::check_positive("reference.rate_hz", rate_hz)?;
+    let others: Vec<Wander> = effects
+        .iter()
+        .filter_map(|effect| effect.reference_wander())
+        .map(|wander| Wander {
+            sigma_arcsec: wander.sigma_arcsec,
+            tau_s: wander.tau_s,
+        })
+        .collect();
+    let mut rng = stream(scenario.run.seed, draw, Purpose::Reference);
+    reference
+        .table(truth, &sample_times(frames_s, rate_hz), &others, &mut rng)
+        .map(Some)
+}
+
+fn rates(
+    scenario: &Scenario,
+    truth: &AttitudeSeries,
+    frames_s: &[f64],
+    rate_hz: f64,
+    draw: u64,
+) -> Result<Option<telemetry::RateTable>, ScenarioError> {
+    let Some(gyro) = &scenario.rates else {
+        return Ok(None);
+    };
+    let rate_hz = gyro.rate_hz.unwrap_or(rate_hz);
+    ScenarioError::check_positive("rates.rate_hz", rate_hz)?;
+    let mut rng = stream(scenario.run.seed, draw, Purpose::Gyro);
+    gyro.table(truth, &sample_times(frames_s, rate_hz), &mut rng)
+        .map(Some)
+}
+
+fn metadata(scenario: &Scenario, rate_hz: f64, draw: u64, vectors: bool) -> Metadata {
+    let (run, tracker) = (&scenario.run, &scenario.model.tracker);
+    let frames = Frames {
+        vectors_in: Some(telemetry::VectorFrame::Inertial),
+        quaternion_signs: QuaternionSigns::Known([1.0; 3]),
+        ..Frames::default()
+    };
+    Metadata {
+        title: run.title.clone(),
+        source: Some(format!(
+            "simulated by boresight, seed {}, draw {draw}",
+            run.seed
+        )),
+        epoch: run.epoch,
+        time_scale: run.time_scale,
+        sample_rate_hz: Some(rate_hz),
+        tracker: TrackerMeta {
+            pixels: tracker.pixels,
+            focal_length_px: if tracker.fov_deg.is_some() {
+                None
+            } else {
+                tracker.focal_length_px
+            },
+            fov_deg: tracker.fov_deg,
+            exposure_s: tracker.exposure_s,
+            pixel_centre: tracker.pixel_centre,
+        },
+        frames: vectors.then_some(frames),
+        ..Metadata::default()
+    }
+}
