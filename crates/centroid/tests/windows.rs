@@ -119,6 +119,48 @@ fn formal_errors_agree_with_monte_carlo() -> Result<(), Boxed> {
     Ok(())
 }
 
+/// With nothing but the background level uncertain, the formal error is |dx/db| sigma_b. Central
+/// differences over h = 0.02: their error is h^2/6 of the third derivative, relative to dx/db about
+/// (h pixels / flux)^2 = (0.02 * 49 / 6000)^2 = 3e-8; steps of 1e-9 px are left by the iteration.
+#[test]
+fn background_level_enters_the_formal_error() -> Result<(), Boxed> {
+    let at = Pixel {
+        x: FIRST.x + 3.9,
+        y: FIRST.y + 1.6,
+    };
+    let (values, no_noise) = (spot(7, at, 0.9, 6000.0)?, [0.0; 49]);
+    let noise = Noise::Variance(&no_noise);
+    let (first, plain) = (FirstMoment::default(), GaussianWeighted::new(0.9));
+    let matched = GaussianWeighted::matched(0.9);
+    let check = |estimate: &dyn Fn(&Window<'_>) -> Result<CentroidEstimate, CentroidFailure>| {
+        let with = |background| {
+            estimate(&Window {
+                background,
+                background_sigma: 3.0,
+                ..window(&values, 7)
+            })
+        };
+        let (low, middle, high) = (with(-0.02)?, with(0.0)?, with(0.02)?);
+        for (sigma, slope) in [
+            (middle.sigma_x_px, (high.x_px - low.x_px) / 0.04),
+            (middle.sigma_y_px, (high.y_px - low.y_px) / 0.04),
+            (middle.sigma_flux, (high.flux - low.flux) / 0.04),
+        ] {
+            let expected = 3.0 * slope.abs();
+            assert!(expected > 1e-5, "{expected}");
+            assert!(
+                (sigma - expected).abs() < 1e-4 * expected + 3e-7,
+                "{sigma} {expected}"
+            );
+        }
+        Ok::<(), CentroidFailure>(())
+    };
+    check(&|window| first.estimate(window, &noise))?;
+    check(&|window| plain.estimate(window, &noise))?;
+    check(&|window| matched.estimate(window, &noise))?;
+    Ok(())
+}
+
 /// A weight keeps the noise of empty pixels out: less than half the error of the first moment
 /// here, and the truncation bias of a spot off the middle is gone.
 #[test]
