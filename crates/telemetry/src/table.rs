@@ -73,9 +73,23 @@ enum Store {
 #[derive(Debug, Default)]
 struct Channel {
     numbers: Vec<f64>,
-    /// Place and text of the first word, and all cells.
-    words: Option<(Place, String, TextCells)>,
+    words: Option<Words>,
     any_number: bool,
+}
+
+/// A column of words: the place of the first one, and all cells.
+#[derive(Debug)]
+struct Words {
+    place: Place,
+    first: String,
+    cells: TextCells,
+}
+
+/// A word where a number should be.
+struct Word {
+    place: Place,
+    text: String,
+    expected: String,
 }
 
 /// Collects the rows of a table.
@@ -184,42 +198,47 @@ impl Builder {
     ) -> Result<(), TelemetryError> {
         let cell = cell.trim_ascii();
         let row = self.rows + ahead;
-        let wrong = |expected| Err((expected, String::from_utf8_lossy(cell).into_owned()));
-        let done = match &mut self.stores[column] {
+        let expected = match &mut self.stores[column] {
             Store::Numbers { cells, blank } => match number(cell, *blank) {
                 Some(number) => {
                     cells.push(number);
-                    Ok(())
+                    return Ok(());
                 }
-                None => wrong(expected_number(*blank)),
+                None => expected_number(*blank),
             },
             Store::Integers(cells) => match integer(cell) {
                 Some(number) => {
                     cells.push(number);
-                    Ok(())
+                    return Ok(());
                 }
-                None => wrong("a whole number"),
+                None => "a whole number",
             },
             Store::Pixel { offset, blank } => match number(cell, *blank) {
                 Some(number) => {
                     if let Some(pixels) = &mut self.pixels {
                         pixels.set(row, *offset, number);
                     }
-                    Ok(())
+                    return Ok(());
                 }
-                None => wrong(expected_number(*blank)),
+                None => expected_number(*blank),
             },
-            Store::Channel(channel) => channel.push(cell, place),
+            Store::Channel(channel) => {
+                let Err(word) = channel.push(cell, place) else {
+                    return Ok(());
+                };
+                let found = shown(word.text.as_bytes());
+                return Err(self.cell_error(column, word.place, &word.expected, &found));
+            }
             Store::Extra(ExtraCells::Text(cells)) => {
                 cells.push(&String::from_utf8_lossy(cell));
-                Ok(())
+                return Ok(());
             }
             Store::Extra(ExtraCells::Numbers(cells)) => {
                 cells.push(number(cell, true).unwrap_or(f64::NAN));
-                Ok(())
+                return Ok(());
             }
         };
-        done.map_err(|(expected, found)| self.cell_error(column, place, expected, &shown(&found)))
+        Err(self.cell_error(column, place, expected, &shown(cell)))
     }
 
     /// Whether the numbers of a column should be kept as text, so that nothing of them is lost.
@@ -319,7 +338,7 @@ impl Builder {
                 }
                 Store::Pixel { .. } => continue,
                 Store::Channel(channel) => match channel.words {
-                    Some((_, _, cells)) => ExtraCells::Text(cells),
+                    Some(words) => ExtraCells::Text(words.cells),
                     None => {
                         table.channels.insert(name, channel.numbers);
                         continue;
@@ -434,7 +453,7 @@ fn store(name: &str, layout: &Layout, pixels: Option<&PixelBlock>) -> Store {
 }
 
 impl Channel {
-    fn push(&mut self, cell: &[u8], place: Place) -> Result<(), (&'static str, String)> {
+    fn push(&mut self, cell: &[u8], place: Place) -> Result<(), Word> {
         let number = number(cell, true);
         match (&mut self.words, number) {
             (None, Some(number)) => {
@@ -443,29 +462,36 @@ impl Channel {
                 Ok(())
             }
             (None, None) => {
-                let word = String::from_utf8_lossy(cell).into_owned();
-                if self.any_number || word.parse::<f64>().is_ok() {
-                    return Err((expected_number(true), word));
+                let text = String::from_utf8_lossy(cell).into_owned();
+                if self.any_number || text.parse::<f64>().is_ok() {
+                    let expected = expected_number(true).into();
+                    return Err(Word {
+                        place,
+                        text,
+                        expected,
+                    });
                 }
                 // only empty cells so far: this may be a column of words
                 let mut cells = TextCells::default();
                 for _ in 0..self.numbers.len() {
                     cells.push("");
                 }
-                cells.push(&word);
+                cells.push(&text);
                 self.numbers = Vec::new();
-                self.words = Some((place, word, cells));
+                self.words = Some(Words {
+                    place,
+                    first: text,
+                    cells,
+                });
                 Ok(())
             }
-            (Some((first, word, _)), Some(number)) if !number.is_nan() => {
-                let found = format!(
-                    "{} (at {first}) beside numbers such as {number}",
-                    shown(word)
-                );
-                Err(("a number in every row, or in none", found))
-            }
-            (Some((_, _, cells)), _) => {
-                cells.push(&String::from_utf8_lossy(cell));
+            (Some(words), Some(number)) if !number.is_nan() => Err(Word {
+                place: words.place,
+                text: words.first.clone(),
+                expected: format!("a number, as {number} of {place}"),
+            }),
+            (Some(words), _) => {
+                words.cells.push(&String::from_utf8_lossy(cell));
                 Ok(())
             }
         }
@@ -481,8 +507,9 @@ fn expected_number(blank: bool) -> &'static str {
 }
 
 /// How a message shows a cell.
-fn shown(cell: &str) -> String {
+fn shown(cell: &[u8]) -> String {
     const MOST: usize = 40;
+    let cell: &str = &String::from_utf8_lossy(cell);
     match cell {
         "" => "an empty cell".into(),
         _ if cell.chars().count() > MOST => {

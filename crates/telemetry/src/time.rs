@@ -58,7 +58,9 @@ impl Epoch {
     ///
     /// ```
     /// let epoch = telemetry::Epoch::parse("2018-07-25T12:00:00").expect("a date");
-    /// assert!((epoch.julian_year(0.0) - 2018.561_259_4).abs() < 1e-7);
+    /// // 18 years with 5 leap days, then 205 days of 2018
+    /// let days = 18.0 * 365.0 + 5.0 + 205.0;
+    /// assert!((epoch.julian_year(0.0) - 2000.0 - days / 365.25).abs() < 1e-12);
     /// assert!(telemetry::Epoch::parse("2018-02-30T12:00:00").is_none());
     /// ```
     #[must_use]
