@@ -119,7 +119,7 @@ fn formal_errors_agree_with_monte_carlo() -> Result<(), Boxed> {
     Ok(())
 }
 
-/// With nothing but the background level uncertain, the formal error is |dx/db| sigma_b. Central
+/// With nothing but the background level uncertain, the formal error is `|dx/db| sigma_b`. Central
 /// differences over h = 0.02: their error is h^2/6 of the third derivative, relative to dx/db about
 /// (h pixels / flux)^2 = (0.02 * 49 / 6000)^2 = 3e-8; steps of 1e-9 px are left by the iteration.
 #[test]
