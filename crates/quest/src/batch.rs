@@ -9,7 +9,7 @@
 //! kept where it was needed; what fails that too is solved alone. A frame's result therefore does
 //! not depend on its neighbours, and is bit for bit that of [`Profile::solve`].
 //!
-//! Source: as [`Profile`]; [M23] section 2.5.
+//! Source: as [`Profile`]; \[M23\] section 2.5.
 
 use crate::profile::{second_pass, solve_guarded};
 use crate::quartic::{FirstPass, Rows, first_pass};

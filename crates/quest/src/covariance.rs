@@ -7,7 +7,7 @@
 //! in rad^2, for the small rotation theta in tracker axes with `v_meas = v + theta x v`. `s_i` is
 //! the error of star i in rad, per axis across the line of sight, measurement and catalogue together.
 //!
-//! Source: [M23] Eq. 14, with its sum normalised (erratum E4): the printed form lacks the `s^2`
+//! Source: \[M23\] Eq. 14, with its sum normalised (erratum E4): the printed form lacks the `s^2`
 //! before the sum, and is negative for any real tracker.
 
 use nalgebra::{Matrix3, Vector3};
@@ -44,7 +44,7 @@ pub fn covariance(
     })
 }
 
-/// [M23] Eq. 14 as printed, `s^2 [I - sum s_i^-2 w_i w_i^T]^-1`: not a covariance (erratum E4), kept
+/// \[M23\] Eq. 14 as printed, `s^2 [I - sum s_i^-2 w_i w_i^T]^-1`: not a covariance (erratum E4), kept
 /// to compare with numbers made by it.
 ///
 /// # Errors

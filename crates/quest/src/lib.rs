@@ -28,14 +28,14 @@
 //!
 //! | gap | method | rounding error of the attitude |
 //! |---|---|---|
-//! | above [`POLISH_GAP`] | Newton on the quartic | `< 20 eps/gap^2`, so below 2e-10 rad |
-//! | down to [`MIN_GAP`] | and inverse iteration | `< 20 eps/gap` |
+//! | above [`POLISH_GAP`] | Newton on the quartic | `< 40 eps/gap^2`, so below 4e-10 rad |
+//! | down to [`MIN_GAP`] | and inverse iteration | `< 40 eps/gap` |
 //! | below | [`QuestError::Degenerate`] or [`QuestError::Parallel`] | |
 //!
 //! One frame and a batch run the same arithmetic: from the same profile they agree bit for bit.
 //!
 //! Source: Shuster & Oh, J. Guidance and Control 4 (1981) 70-77, doi:10.2514/3.19717, as used by
-//! [M23] section 2.5; the quartic in the form of Markley, J. Astronautical Sciences 41 (1993) 261.
+//! \[M23\] section 2.5; the quartic in the form of Markley, J. Astronautical Sciences 41 (1993) 261.
 #![forbid(unsafe_code)]
 
 mod batch;

@@ -6,7 +6,7 @@
 //!
 //! with `C` inertial to tracker, w measured and v from the catalogue.
 //!
-//! Source: [M23] Eq. 12-14. Eq. 13 as printed has the two sets the other way round (erratum E3);
+//! Source: \[M23\] Eq. 12-14. Eq. 13 as printed has the two sets the other way round (erratum E3);
 //! the square in Eq. 12 belongs on the norm (erratum E16).
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
@@ -24,10 +24,10 @@ pub const UNIT_TOLERANCE: f64 = 1e-6;
 pub struct Solution {
     /// Attitude, inertial to tracker: `v_tracker = q * v_inertial`; scalar part not negative.
     pub q: UnitQuaternion<f64>,
-    /// Covariance of the attitude error in tracker axes, [M23] Eq. 14 with erratum E4; rad^2 if the
+    /// Covariance of the attitude error in tracker axes, \[M23\] Eq. 14 with erratum E4; rad^2 if the
     /// weights are `1/sigma_i^2` with sigma in rad per axis.
     pub covariance: Matrix3<f64>,
-    /// [M23] Eq. 12, from the residuals. With weights `1/sigma_i^2` of M stars it is distributed as
+    /// \[M23\] Eq. 12, from the residuals. With weights `1/sigma_i^2` of M stars it is distributed as
     /// chi-squared of `2 M - 3` degrees of freedom.
     pub loss: f64,
     /// Largest eigenvalue of Davenport's matrix at unit total weight, `1 - loss/(2 sum weights)`.

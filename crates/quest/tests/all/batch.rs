@@ -129,9 +129,9 @@ fn same_attitude_from_the_same_stars() {
         }
         let (eps, gap) = (f64::EPSILON, single.gap);
         let one = if gap < POLISH_GAP {
-            20.0 * eps / gap
+            40.0 * eps / gap
         } else {
-            20.0 * eps / (gap * gap)
+            40.0 * eps / (gap * gap)
         };
         let apart = angle(&batch.quaternion(k), &single.q);
         assert!(

@@ -11,9 +11,9 @@ use crate::cases::{Draw, Stars, angle};
 fn bound(gap: f64) -> f64 {
     let eps = f64::EPSILON;
     let one = if gap < POLISH_GAP {
-        20.0 * eps / gap
+        40.0 * eps / gap
     } else {
-        20.0 * eps / (gap * gap)
+        40.0 * eps / (gap * gap)
     };
     2.0 * one + 8.0 * eps
 }

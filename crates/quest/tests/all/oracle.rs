@@ -40,7 +40,7 @@ fn quaternion(row: &Row, prefix: &str) -> Result<UnitQuaternion<f64>, Box<dyn Er
     )))
 }
 
-/// Within 20 eps/gap of the exact answer (20 eps/gap^2 unpolished); a refusal exactly below
+/// Within 40 eps/gap of the exact answer (40 eps/gap^2 unpolished); a refusal exactly below
 /// `MIN_GAP`. The quaternion's own rounding adds 2 eps.
 #[test]
 fn exact_and_scipy_solutions() -> Result<(), Box<dyn Error>> {
@@ -75,9 +75,9 @@ fn exact_and_scipy_solutions() -> Result<(), Box<dyn Error>> {
         let eps = f64::EPSILON;
         let bound = 2.0 * eps
             + if gap < POLISH_GAP {
-                20.0 * eps / gap
+                40.0 * eps / gap
             } else {
-                20.0 * eps / (gap * gap)
+                40.0 * eps / (gap * gap)
             };
         let error = angle(&got.q, &quaternion(&row, "")?);
         assert!(error <= bound, "{name}: {error:e} rad, bound {bound:e}");
