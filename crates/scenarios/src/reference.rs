@@ -222,6 +222,9 @@ mod tests {
                 "axis {axis}: {lag} against {a}"
             );
         }
-        assert_eq!(table.sigma_arcsec.unwrap()[7], [2.0, 0.5, 3.0]);
+        assert_eq!(
+            Vector3::from(table.sigma_arcsec.unwrap()[7]),
+            Vector3::new(2.0, 0.5, 3.0)
+        );
     }
 }

@@ -191,7 +191,5 @@ rate_hz = 2.0
         assert!(got.contains("motion"), "{got}");
         let got = message("rate_hz = 2.0", "rate_hz = \"fast\"");
         assert!(got.contains("line 15"), "{got}");
-        let got = message("duration_s = 60.0\n", "");
-        assert!(!got.is_empty());
     }
 }

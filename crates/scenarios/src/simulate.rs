@@ -404,7 +404,7 @@ fn metadata(scenario: &Scenario, rate_hz: f64, draw: u64, vectors: bool) -> Meta
         ..Frames::default()
     };
     Metadata {
-        title: run.title.clone(),
+        title: run.title.clone().or_else(|| scenario.model.title.clone()),
         source: Some(format!(
             "simulated by boresight, seed {}, draw {draw}",
             run.seed

@@ -8,7 +8,11 @@ use scenarios::{Scenario, simulate};
 fn the_example_of_the_page_makes_a_bundle() {
     let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/formats/scenario.md");
     let page = std::fs::read_to_string(page).unwrap();
-    let example = page.split("```toml\n").nth(1).and_then(|rest| rest.split("```").next()).unwrap();
+    let example = page
+        .split("```toml\n")
+        .nth(1)
+        .and_then(|rest| rest.split("```").next())
+        .unwrap();
     let bundle = simulate(&Scenario::parse(example, "scenario.md").unwrap()).unwrap();
     assert_eq!(bundle.stars.unwrap().frames(), 120);
     assert!(bundle.reference.unwrap().sigma_arcsec.is_some());

@@ -8,9 +8,9 @@ use nalgebra::Vector3;
 use scenarios::{ScenarioError, simulate_with_truth};
 use star_tracker::{Measured, NoiseStreams, Rows, Scratch};
 
-/// A rolling shutter shifts a star at row y by its velocity times line_time x y. To second order
+/// A rolling shutter shifts a star at row y by its velocity times `line_time` x y. To second order
 /// remain acceleration (0.6 px/s^2 x (16 ms)^2 / 2 = 7e-5 px) and the shift of the row itself
-/// (v line_time relative: 7 px/s x 30e-6 of 0.1 px = 2e-5 px).
+/// (v `line_time` relative: 7 px/s x 30e-6 of 0.1 px = 2e-5 px).
 #[test]
 fn a_rolling_shutter_shifts_by_velocity_times_row() {
     let rest = format!(

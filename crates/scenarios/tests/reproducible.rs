@@ -6,24 +6,26 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use common::{SLEWS, scenario};
-use scenarios::{Motion, Recorded, RecordedTable, Scenario, simulate, simulate_with_truth};
+use scenarios::{
+    Motion, Recorded, RecordedTable, Scenario, ScenarioError, simulate, simulate_with_truth,
+};
 use telemetry::{Bundle, TableFormat};
 
 const NOISE: &str = "temporal_arcsec = 7.43\ncentroid_arcsec = 5.06\ndistortion_arcsec = 3.1667";
 
-fn noisy() -> Scenario {
+fn noisy() -> Result<Scenario, ScenarioError> {
     let rest = format!(
         "{SLEWS}closed_loop = {{ sigma_arcsec = [1.0, 1.0, 1.0], frequency_hz = 0.036 }}\n\
          [reference]\nwander_arcsec = [0.5, 0.5, 0.5]\n[rates]\nwhite_arcsec_s = [0.1, 0.1, 0.1]\n\
          [housekeeping]\nchannel = [{{ kind = \"sinusoid\", name = \"a_c\", amplitude = 1.0, \
          period_s = 50.0, noise = 0.1 }}]\n[run]\nduration_s = 60.0\nrate_hz = 2.0\nseed = 9"
     );
-    scenario(NOISE, &rest).unwrap()
+    scenario(NOISE, &rest)
 }
 
 #[test]
 fn the_same_seed_gives_the_same_bundle_on_any_thread() {
-    let given = noisy();
+    let given = noisy().unwrap();
     let here = simulate(&given).unwrap();
     std::thread::scope(|scope| {
         let others: Vec<_> = (0..4)
@@ -37,7 +39,7 @@ fn the_same_seed_gives_the_same_bundle_on_any_thread() {
 
 #[test]
 fn another_draw_and_another_seed_differ_in_everything_random() {
-    let given = noisy();
+    let given = noisy().unwrap();
     let first = simulate_with_truth(&given, 0).unwrap();
     let mut reseeded = given.clone();
     reseeded.run.seed = 10;
@@ -72,14 +74,17 @@ fn files(folder: &Path) -> std::io::Result<BTreeMap<String, Vec<u8>>> {
 #[test]
 fn files_are_the_same_to_the_byte_and_read_back() {
     let folder = tempfile::tempdir().unwrap();
-    let bundle = simulate(&noisy()).unwrap();
+    let bundle = simulate(&noisy().unwrap()).unwrap();
     for format in [TableFormat::CsvGz, TableFormat::Csv, TableFormat::Parquet] {
         let (one, two) = (
             folder.path().join(format!("one-{format:?}")),
             folder.path().join(format!("two-{format:?}")),
         );
         bundle.write(&one, format).unwrap();
-        simulate(&noisy()).unwrap().write(&two, format).unwrap();
+        simulate(&noisy().unwrap())
+            .unwrap()
+            .write(&two, format)
+            .unwrap();
         let written = files(&one).unwrap();
         assert!(written.len() >= 7, "{:?}", written.keys());
         assert_eq!(written, files(&two).unwrap());
@@ -121,16 +126,18 @@ fn a_recorded_motion_repeats_the_stars() {
     replay.run.rate_hz = Some(10.0);
     let replayed = simulate(&replay).unwrap();
     let (before, after) = (original.stars.unwrap(), replayed.stars.unwrap());
-    let at: BTreeMap<(i64, i64), usize> = after
+    // a time on the 10 Hz grid as text, so that it can be a key
+    let key = |t: f64| format!("{t:.1}");
+    let at: BTreeMap<(String, i64), usize> = after
         .t_of_rows_s()
         .iter()
         .zip(&after.star_id)
         .enumerate()
-        .map(|(row, (t, id))| (((t * 10.0).round() as i64, *id), row))
+        .map(|(row, (t, id))| ((key(*t), *id), row))
         .collect();
     let mut compared = 0;
     for (row, t) in before.t_of_rows_s().iter().enumerate() {
-        let Some(&other) = at.get(&((t * 10.0).round() as i64, before.star_id[row])) else {
+        let Some(&other) = at.get(&(key(*t), before.star_id[row])) else {
             continue;
         };
         let off =

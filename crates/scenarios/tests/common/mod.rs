@@ -3,7 +3,7 @@
 use scenarios::{Scenario, ScenarioError};
 
 /// A scenario with the given `[noise]` entries, effects and other tables.
-pub fn scenario(noise: &str, rest: &str) -> Result<Scenario, ScenarioError> {
+pub(crate) fn scenario(noise: &str, rest: &str) -> Result<Scenario, ScenarioError> {
     let text = format!(
         "format = \"boresight-model/1\"\nkind = \"pbm\"\n\
          [tracker]\npixels = [1024, 1024]\nfov_deg = [20.0, 20.0]\nmax_stars = 14\n\
@@ -13,7 +13,7 @@ pub fn scenario(noise: &str, rest: &str) -> Result<Scenario, ScenarioError> {
 }
 
 /// Two slews to and fro about each cross axis.
-pub const SLEWS: &str = "
+pub(crate) const SLEWS: &str = "
 [motion]
 kind = \"slews\"
 start = { ra_deg = 75.0, dec_deg = 12.0, roll_deg = 20.0 }
