@@ -77,7 +77,7 @@ pub struct ModelTracker {
 pub struct ModelNoise {
     /// White noise per star, circular, 1 sigma, arcsec.
     pub temporal_arcsec: Option<f64>,
-    /// Peak of the centroid error's triangle on each axis ([M23] Eq. 10 as printed), arcsec.
+    /// Peak of the centroid error's triangle on each axis (\[M23\] Eq. 10 as printed), arcsec.
     pub centroid_arcsec: Option<f64>,
     /// Circular rms of the unknown distortion, arcsec.
     pub distortion_arcsec: Option<f64>,

@@ -4,9 +4,19 @@
 //!
 //! Source: report format (docs/formats/report.md).
 
+mod axes;
+
 use std::collections::BTreeMap;
+use std::io::Write as _;
 
 use serde::{Deserialize, Deserializer, Serialize};
+
+use crate::{Output, TelemetryError};
+
+pub use axes::{
+    ASSESS_FORMAT, AssessMethod, AssessReport, AxisFit, AxisPrinted, FIT_FORMAT, FitAxes,
+    FitReport, PreferredModel, WithSigma,
+};
 
 /// The value of `format` in `report.json`.
 pub const REPORT_FORMAT: &str = "boresight-report/1";
@@ -68,7 +78,7 @@ pub struct Errors {
     /// Attitude residual about x, y, z, rms, arcsec.
     #[serde(deserialize_with = "nan_triple")]
     pub attitude_rms_arcsec: Option<[f64; 3]>,
-    /// [M23] Eq. 19 between measured and model PSD of the attitude residual, per degree of freedom.
+    /// \[M23\] Eq. 19 between measured and model PSD of the attitude residual, per degree of freedom.
     #[serde(deserialize_with = "nan_triple")]
     pub log_psd_cost: Option<[f64; 3]>,
     /// Chi-squared per degree of freedom.
@@ -190,6 +200,18 @@ pub struct Dependence {
     /// Chance without dependence.
     #[serde(deserialize_with = "nan")]
     pub p_value: f64,
+}
+
+/// Writes `report.json`. Numbers that are not finite become `null`.
+///
+/// # Errors
+///
+/// What the operating system says.
+pub fn write(report: &Report, output: &Output) -> Result<(), TelemetryError> {
+    output.write("report.json", |to| {
+        serde_json::to_writer_pretty(&mut *to, report)?;
+        to.write_all(b"\n")
+    })
 }
 
 /// Reads `null` as NaN: JSON has no other way to say it.

@@ -32,7 +32,8 @@ fn line_changed(file: &str, line: usize, change: impl Fn(&str) -> String) -> Mem
 fn cell_changed(file: &str, line: usize, column: &str, to: &str) -> MemoryFiles {
     let header = text(&fixture("complete"), file);
     let names: Vec<&str> = header.lines().next().unwrap_or("").split(',').collect();
-    let at = names.iter().position(|name| *name == column).unwrap();
+    let at = names.iter().position(|name| *name == column);
+    let at = at.expect("a column of the table");
     line_changed(file, line, |line| {
         let mut cells: Vec<&str> = line.split(',').collect();
         cells[at] = to;
@@ -474,8 +475,8 @@ fn one_table_in_two_files() {
 
 fn gzipped(bytes: &[u8]) -> Vec<u8> {
     let mut gzip = GzEncoder::new(Vec::new(), Compression::default());
-    gzip.write_all(bytes).unwrap();
-    gzip.finish().unwrap()
+    gzip.write_all(bytes).expect("memory takes all");
+    gzip.finish().expect("memory takes all")
 }
 
 /// The good bundle with its stars gzipped.

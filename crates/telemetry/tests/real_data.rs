@@ -6,6 +6,10 @@ use std::path::PathBuf;
 
 use telemetry::{Bundle, MemoryFiles, TableFormat};
 
+#[expect(
+    clippy::print_stderr,
+    reason = "a test that checks nothing must say so"
+)]
 /// A folder of the real data, or `None` with a warning.
 fn data(name: &str) -> Option<PathBuf> {
     let root = std::env::var_os("BORESIGHT_DATA").map_or_else(
