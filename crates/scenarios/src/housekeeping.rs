@@ -127,3 +127,76 @@ impl Channel {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use star_tracker::{Purpose, stream};
+
+    use super::*;
+
+    /// The table is the channel that effects follow, plus white noise: mean within 5 sigma / sqrt n,
+    /// variance within 5 sqrt(2/n); and both reach beyond the span on either side.
+    #[test]
+    fn the_table_is_the_channel_plus_noise() {
+        let sinusoid = SinusoidChannel {
+            name: "optics_c".to_owned(),
+            mean: 12.0,
+            amplitude: 3.0,
+            period_s: 777.0,
+            phase_deg: 10.0,
+            per_s: 0.001,
+            noise: 0.5,
+        };
+        let housekeeping = Housekeeping {
+            rate_hz: 0.7,
+            channel: vec![Channel::Sinusoid(sinusoid)],
+        };
+        let span_s = [-5.0, 20_000.0];
+        let mut rng = stream(1, 0, Purpose::Housekeeping);
+        let channels = housekeeping.channels(span_s, &mut rng).unwrap();
+        let (table, series) = (channels.table.unwrap(), &channels.series["optics_c"]);
+        assert!(table.t_s[0] < span_s[0] && table.t_s[table.t_s.len() - 1] > span_s[1]);
+        assert!(series.at(span_s[0]).is_some() && series.at(span_s[1]).is_some());
+        let n = table.t_s.len() as f64;
+        let noise: Vec<f64> = table.channels["optics_c"]
+            .iter()
+            .zip(series.value())
+            .map(|(a, b)| a - b)
+            .collect();
+        let mean = noise.iter().sum::<f64>() / n;
+        let variance = noise.iter().map(|v| v * v).sum::<f64>() / n;
+        assert!(mean.abs() < 5.0 * 0.5 / n.sqrt(), "mean {mean}");
+        assert!(
+            (variance / 0.25 - 1.0).abs() < 5.0 * (2.0 / n).sqrt(),
+            "variance {variance}"
+        );
+        let t = series.t_s()[100];
+        let expected = 12.0
+            + 3.0 * (core::f64::consts::TAU * t / 777.0 + 10_f64.to_radians()).sin()
+            + 0.001 * t;
+        assert!((series.value()[100] - expected).abs() < 1e-12);
+    }
+
+    #[test]
+    fn two_channels_of_one_name_are_an_error() {
+        let orbit = OrbitVelocity {
+            prefix: String::new(),
+            radius_km: 7000.0,
+            period_s: 5800.0,
+            inclination_deg: 0.0,
+            node_deg: 0.0,
+            phase_deg: 0.0,
+            noise_km_s: 0.0,
+        };
+        let channel = vec![
+            Channel::OrbitVelocity(orbit.clone()),
+            Channel::OrbitVelocity(orbit),
+        ];
+        let housekeeping = Housekeeping {
+            rate_hz: 0.1,
+            channel,
+        };
+        let got = housekeeping.channels([0.0, 60.0], &mut stream(1, 0, Purpose::Housekeeping));
+        assert!(matches!(got, Err(ScenarioError::RepeatedChannel { name }) if name == "vx_km_s"));
+    }
+}

@@ -32,7 +32,7 @@ use crate::run::Reported;
 use crate::sky::Seen;
 use crate::{Motion, Scenario, ScenarioError};
 
-/// Order of the distortion polynomials where the model does not say: [M23] Section 4.2.
+/// Order of the distortion polynomials where the model does not say: `[M23]` Section 4.2.
 const DISTORTION_ORDER: u32 = 7;
 
 /// A bundle with what it was made from.

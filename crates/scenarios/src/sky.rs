@@ -19,7 +19,7 @@ use crate::ScenarioError;
 
 pub use hipparcos::hipparcos;
 
-/// Stars that fit in a tracker whose model does not say how many it follows: [M23] Table 1.
+/// Stars that fit in a tracker whose model does not say how many it follows: `[M23]` Table 1.
 const STARS: u32 = 15;
 
 /// Julian year of the catalogue in a simulated bundle.
@@ -32,7 +32,7 @@ pub(crate) const CATALOGUE_YEAR: f64 = 2000.0;
 pub enum Sky {
     /// `hipparcos`: the stars of the Hipparcos catalogue brighter than Hp = 6.5.
     Hipparcos(HipparcosSky),
-    /// `generated`: made-up stars, replaced as in [M23] Step 1.
+    /// `generated`: made-up stars, replaced as in `[M23]` Step 1.
     Generated(GeneratedSky),
 }
 

@@ -90,6 +90,7 @@ fn without_errors_the_tables_agree_with_each_other() {
     let year = bundle.meta.julian_year(0.0).unwrap();
     assert!(year > 2020.6 && year < 2020.7);
     stars.check().unwrap();
+    assert!((catalogue.epoch_year() - 2000.0).abs() < 1e-12);
     let t_s = stars.t_of_rows_s();
     for row in 0..stars.rows() {
         let index = catalogue.index_of(stars.star_id[row]).unwrap();

@@ -90,6 +90,7 @@ fn files_are_the_same_to_the_byte_and_read_back() {
         assert_eq!(written, files(&two).unwrap());
         let read = Bundle::read(&one).unwrap();
         assert_eq!(read.stars, bundle.stars);
+        assert_eq!(read.catalog, bundle.catalog);
         assert_eq!(
             read.attitude.as_ref().map(|a| a.t_s.len()),
             bundle.attitude.as_ref().map(|a| a.t_s.len())

@@ -99,5 +99,9 @@ mod tests {
         }
         let v = orbit.velocity_km_s(0.0);
         assert!(v.z > 0.0 && (v.z / v.norm() - i.sin()).abs() < 1e-12);
+        // a quarter later, at the northernmost point, it flies away from the node
+        let v = orbit.velocity_km_s(0.25 * orbit.period_s);
+        let node = Vector3::new(n.cos(), n.sin(), 0.0);
+        assert!((v / v.norm() + node).norm() < 1e-12);
     }
 }

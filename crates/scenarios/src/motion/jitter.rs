@@ -301,6 +301,28 @@ mod tests {
         }
     }
 
+    /// It starts as it goes on: over 1000 draws of three axes the first state has the same standard
+    /// deviations; relative error of a variance sqrt(2/3000).
+    #[test]
+    fn the_loop_starts_in_its_stationary_state() {
+        let given = ClosedLoop {
+            sigma_arcsec: [2.0; 3],
+            frequency_hz: 0.036,
+            damping: 0.3,
+        };
+        let sigma = Angle::from_arcsec(2.0).rad();
+        let w0 = core::f64::consts::TAU * 0.036;
+        let (mut angle, mut rate) = (0.0, 0.0);
+        for draw in 0..1000 {
+            let path = given.path([0.0, 1.0], 0.5, &mut stream(5, draw, Purpose::Motion));
+            angle += path.angle_rad[0].norm_squared() / (3000.0 * sigma * sigma);
+            rate += path.rate_rad_s[0].norm_squared() / (3000.0 * (w0 * sigma).powi(2));
+        }
+        let tolerance = 5.0 * (2.0_f64 / 3000.0).sqrt();
+        assert!((angle - 1.0).abs() < tolerance, "angle {angle}");
+        assert!((rate - 1.0).abs() < tolerance, "rate {rate}");
+    }
+
     /// The rate between samples integrates to the angles at the samples: Simpson is exact for it.
     #[test]
     fn the_rate_integrates_to_the_angle() {
