@@ -5,7 +5,9 @@ mod common;
 use common::{fixture, text};
 use focal_plane::{AttitudeSource, Camera, Pixel};
 use nalgebra::Vector3;
-use telemetry::{Bundle, ExtraCells, MemoryFiles, TableFormat, TimeScale};
+use proptest::collection::vec;
+use proptest::prelude::*;
+use telemetry::{Bundle, ExtraCells, Housekeeping, MemoryFiles, TableFormat, TimeScale};
 
 /// Bundles may hold NaN (missing values), which equal nothing: compare their text.
 fn shown(bundle: &Bundle) -> String {
@@ -295,4 +297,38 @@ fn the_catalogue_may_have_another_epoch() {
     files.insert("bundle.toml", meta.into_bytes());
     let catalog = Bundle::read_from(&files).unwrap().catalog.unwrap();
     assert_eq!(catalog.epoch_year().to_bits(), 1991.25_f64.to_bits());
+}
+
+/// A missing value is an empty cell in CSV, so that no reader has to know a word for it.
+#[test]
+fn missing_values_are_empty_cells() {
+    let dir = tempfile::tempdir().unwrap();
+    let bundle = Bundle::read_from(&fixture("complete")).unwrap();
+    bundle.write(dir.path(), TableFormat::Csv).unwrap();
+    let housekeeping = std::fs::read_to_string(dir.path().join("housekeeping.csv")).unwrap();
+    let row = housekeeping.lines().nth(3).unwrap();
+    assert_eq!(row, "1.6,0,,7.5,-0.5,0,fine");
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    /// Every finite double comes back bit for bit, whatever the form of the table.
+    #[test]
+    fn numbers_go_round_bit_for_bit(numbers in vec(prop::num::f64::ANY, 1..40)) {
+        let numbers: Vec<f64> = numbers.into_iter().filter(|x| x.is_finite()).collect();
+        prop_assume!(!numbers.is_empty());
+        let mut bundle = Bundle::read_from(&fixture("attitude_only")).unwrap();
+        bundle.housekeeping = Some(Housekeeping {
+            t_s: (0..numbers.len()).map(|row| row as f64).collect(),
+            channels: [("any".to_owned(), numbers.clone())].into(),
+        });
+        let dir = tempfile::tempdir().unwrap();
+        for format in TableFormat::ALL {
+            bundle.write(dir.path(), format).unwrap();
+            let again = Bundle::read(dir.path()).unwrap().housekeeping.unwrap();
+            let bits = |column: &[f64]| column.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
+            prop_assert_eq!(bits(&again.channels["any"]), bits(&numbers));
+        }
+    }
 }
