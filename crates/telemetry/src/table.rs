@@ -3,9 +3,11 @@
 //!
 //! Source: telemetry bundle format, the table of files (docs/formats/bundle.md).
 
+mod cell;
 pub(crate) mod csv;
 pub(crate) mod parquet;
 mod pixels;
+mod raw;
 pub(crate) mod write;
 
 use std::collections::BTreeMap;
@@ -13,7 +15,10 @@ use std::collections::BTreeMap;
 use crate::config::nearest;
 use crate::layout::{Kind, Layout, Need, Rest};
 use crate::{ExtraCells, ExtraColumn, ImagesMeta, Place, TelemetryError, TextCells, pixel_name};
+use cell::{Channel, expected_number, integer, number, shown, whole};
 pub(crate) use pixels::PixelBlock;
+use raw::Places;
+pub(crate) use raw::RawTable;
 
 /// What the metadata say about a table.
 #[derive(Clone, Copy, Debug)]
@@ -24,41 +29,6 @@ pub(crate) struct Setting<'a> {
     pub(crate) images: Option<&'a ImagesMeta>,
 }
 
-/// Lines or rows of the rows of a table, compactly: most files have one line a row.
-#[derive(Clone, Debug, Default)]
-struct Places {
-    /// `(first row, its line less its index)`, wherever the difference changes.
-    steps: Vec<(usize, u64)>,
-    rows_not_lines: bool,
-}
-
-impl Places {
-    fn push(&mut self, row: usize, place: Place) {
-        let number = match place {
-            Place::Line(line) => line,
-            Place::Row(row) => {
-                self.rows_not_lines = true;
-                row
-            }
-        };
-        let less = number.saturating_sub(row as u64);
-        if self.steps.last().is_none_or(|&(_, last)| last != less) {
-            self.steps.push((row, less));
-        }
-    }
-
-    fn of(&self, row: usize) -> Place {
-        let after = self.steps.partition_point(|&(first, _)| first <= row);
-        let less = after.checked_sub(1).map_or(2, |at| self.steps[at].1);
-        let number = row as u64 + less;
-        if self.rows_not_lines {
-            Place::Row(number)
-        } else {
-            Place::Line(number)
-        }
-    }
-}
-
 /// Where the cells of one column of the file go.
 #[derive(Debug)]
 enum Store {
@@ -67,29 +37,6 @@ enum Store {
     Pixel { offset: usize, blank: bool },
     Channel(Channel),
     Extra(ExtraCells),
-}
-
-/// A column that is a channel, or else text: which, shows with its first cell that is not empty.
-#[derive(Debug, Default)]
-struct Channel {
-    numbers: Vec<f64>,
-    words: Option<Words>,
-    any_number: bool,
-}
-
-/// A column of words: the place of the first one, and all cells.
-#[derive(Debug)]
-struct Words {
-    place: Place,
-    first: String,
-    cells: TextCells,
-}
-
-/// A word where a number should be.
-struct Word {
-    place: Place,
-    text: String,
-    expected: String,
 }
 
 /// Collects the rows of a table.
@@ -450,162 +397,4 @@ fn store(name: &str, layout: &Layout, pixels: Option<&PixelBlock>) -> Store {
         return Store::Channel(Channel::default());
     }
     Store::Extra(ExtraCells::Text(TextCells::default()))
-}
-
-impl Channel {
-    fn push(&mut self, cell: &[u8], place: Place) -> Result<(), Word> {
-        let number = number(cell, true);
-        match (&mut self.words, number) {
-            (None, Some(number)) => {
-                self.any_number |= !number.is_nan();
-                self.numbers.push(number);
-                Ok(())
-            }
-            (None, None) => {
-                let text = String::from_utf8_lossy(cell).into_owned();
-                if self.any_number || text.parse::<f64>().is_ok() {
-                    let expected = expected_number(true).into();
-                    return Err(Word {
-                        place,
-                        text,
-                        expected,
-                    });
-                }
-                // only empty cells so far: this may be a column of words
-                let mut cells = TextCells::default();
-                for _ in 0..self.numbers.len() {
-                    cells.push("");
-                }
-                cells.push(&text);
-                self.numbers = Vec::new();
-                self.words = Some(Words {
-                    place,
-                    first: text,
-                    cells,
-                });
-                Ok(())
-            }
-            (Some(words), Some(number)) if !number.is_nan() => Err(Word {
-                place: words.place,
-                text: words.first.clone(),
-                expected: format!("a number, as {number} of {place}"),
-            }),
-            (Some(words), _) => {
-                words.cells.push(&String::from_utf8_lossy(cell));
-                Ok(())
-            }
-        }
-    }
-}
-
-fn expected_number(blank: bool) -> &'static str {
-    if blank {
-        "a finite number or an empty cell"
-    } else {
-        "a finite number"
-    }
-}
-
-/// How a message shows a cell.
-fn shown(cell: &[u8]) -> String {
-    const MOST: usize = 40;
-    let cell: &str = &String::from_utf8_lossy(cell);
-    match cell {
-        "" => "an empty cell".into(),
-        _ if cell.chars().count() > MOST => {
-            let start: String = cell.chars().take(MOST).collect();
-            format!("{start:?}...")
-        }
-        _ if cell.parse::<f64>().is_ok() => cell.into(),
-        _ => format!("{cell:?}"),
-    }
-}
-
-fn number(cell: &[u8], blank: bool) -> Option<f64> {
-    if cell.is_empty() {
-        return blank.then_some(f64::NAN);
-    }
-    let number: f64 = std::str::from_utf8(cell).ok()?.parse().ok()?;
-    (number.is_finite() || (blank && number.is_nan())).then_some(number)
-}
-
-fn integer(cell: &[u8]) -> Option<i64> {
-    let text = std::str::from_utf8(cell).ok()?;
-    text.parse()
-        .ok()
-        .or_else(|| text.parse().ok().and_then(whole))
-}
-
-/// A number without a fraction, as some programs write whole numbers ("3.0").
-fn whole(number: f64) -> Option<i64> {
-    /// 2^53: every whole number up to it has a double of its own.
-    const EXACT: f64 = 9_007_199_254_740_992.0;
-    #[expect(
-        clippy::cast_possible_truncation,
-        reason = "whole and within 2^53, so exact"
-    )]
-    (number.fract() == 0.0 && number.abs() <= EXACT).then_some(number as i64)
-}
-
-/// A table that was read, before its values are judged.
-#[derive(Debug)]
-pub(crate) struct RawTable {
-    pub(crate) file: String,
-    numbers: BTreeMap<String, Vec<f64>>,
-    integers: BTreeMap<String, Vec<i64>>,
-    pub(crate) channels: BTreeMap<String, Vec<f64>>,
-    pub(crate) extra: Vec<ExtraColumn>,
-    pub(crate) pixels: Option<PixelBlock>,
-    places: Places,
-    source_names: BTreeMap<String, String>,
-}
-
-impl RawTable {
-    /// A column that the layout requires.
-    pub(crate) fn numbers(&mut self, name: &str) -> Vec<f64> {
-        self.numbers.remove(name).unwrap_or_default()
-    }
-
-    /// A column that may be absent.
-    pub(crate) fn optional(&mut self, name: &str) -> Option<Vec<f64>> {
-        self.numbers.remove(name)
-    }
-
-    /// Three columns that come together, or not at all.
-    pub(crate) fn triple(&mut self, names: [&str; 3]) -> Option<[Vec<f64>; 3]> {
-        let [a, b, c] = names.map(|name| self.optional(name));
-        Some([a?, b?, c?])
-    }
-
-    /// A column of whole numbers that the layout requires.
-    pub(crate) fn integers(&mut self, name: &str) -> Vec<i64> {
-        self.integers.remove(name).unwrap_or_default()
-    }
-
-    /// Line or row of a row counted from 0.
-    pub(crate) fn place(&self, row: usize) -> Place {
-        self.places.of(row)
-    }
-
-    /// An error in a row, in columns by our names.
-    pub(crate) fn error(
-        &self,
-        row: usize,
-        columns: &[&str],
-        expected: impl Into<String>,
-        found: impl Into<String>,
-    ) -> TelemetryError {
-        let theirs = |name: &&str| {
-            let source = self.source_names.get(*name);
-            source.map_or_else(|| (*name).to_owned(), Clone::clone)
-        };
-        let columns: Vec<String> = columns.iter().map(theirs).collect();
-        TelemetryError::cell(
-            &self.file,
-            self.place(row),
-            columns.join(", "),
-            expected,
-            found,
-        )
-    }
 }
