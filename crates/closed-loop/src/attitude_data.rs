@@ -84,6 +84,30 @@ pub(crate) struct AttitudeEvidence<'a> {
 }
 
 impl AttitudeEvidence<'_> {
+    /// Residuals with each fold's own constants and amplitudes, as the whitening
+    /// filter wants them, arcsec.
+    pub(crate) fn generalised(
+        &self,
+        folds: &Folds,
+        candidates: &[&dyn Candidate],
+        amplitudes: &Amplitudes,
+    ) -> [Vec<f64>; 3] {
+        let n = self.data.t_s.len();
+        let raw = self.raw(0..n, candidates);
+        let mut out = self.data.theta.clone();
+        for (f, frames) in folds.fold_ranges().into_iter().enumerate() {
+            let (constant, beta) = (&amplitudes.nuisance[f], &amplitudes.candidates[f]);
+            for (axis, series) in out.iter_mut().enumerate() {
+                for k in frames.clone() {
+                    let row = raw.row(axis * n + k);
+                    let shift: f64 = (0..beta.len()).map(|j| row[3 + j] * beta[j]).sum();
+                    series[k] -= constant[axis] + shift;
+                }
+            }
+        }
+        out
+    }
+
     /// Constants and candidates of `rows`, arcsec, x then y then z of every row.
     fn raw(&self, rows: Range<usize>, candidates: &[&dyn Candidate]) -> DMatrix<f64> {
         let n = rows.len();

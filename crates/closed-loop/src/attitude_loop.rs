@@ -1,24 +1,22 @@
 //! The loop at attitude level: the tracker's own attitude against a reference.
 //!
-//! The noise of each axis is fitted twice: on the before residual, which lets a
-//! slow effect pass for noise and is the cautious start, and again with the
-//! found effects taken out.
-//!
 //! Not physics: the order of the steps.
 
 use effects::{Candidate, Scene};
 
+use crate::attitude_search;
 use crate::attitude_data::{AttitudeData, AttitudeEvidence};
 use crate::close::{Closed, catalogue_candidates};
 use crate::coloured::Coloured;
-use crate::empirical::{EMPIRICAL, Empirical, Variable};
+use crate::empirical::{Empirical, Variable};
 use crate::error::CloseError;
 use crate::evidence::{Evidence, Residuals};
 use crate::figures;
 use crate::fit::Fits;
 use crate::folds::Folds;
+use crate::motion;
 use crate::robust;
-use crate::search::{Found, amplitudes, borrowed, fit, search};
+use crate::search::{Found, amplitudes, borrowed, fit};
 use crate::situation::Situation;
 use crate::star_data::median_step;
 use focal_plane::{AttitudeSource, Series};
@@ -27,8 +25,6 @@ use telemetry::report::{Errors, Report, Rows};
 
 /// Fewest frames from which an effect and its noise can both be had.
 const MIN_FRAMES: usize = 20;
-/// Searches with ever better noise.
-const NOISE_ROUNDS: usize = 2;
 
 pub(crate) fn run(situation: &Situation<'_>, progress: &dyn Fn(&str)) -> Result<Closed, CloseError> {
     let table = situation.bundle.attitude.as_ref().ok_or(CloseError::NothingToCompare("no attitude"))?;
@@ -44,31 +40,31 @@ pub(crate) fn run(situation: &Situation<'_>, progress: &dyn Fn(&str)) -> Result<
         });
     }
     let folds = Folds::cut(data.t_s.len());
-    let motion: &dyn AttitudeSource = reference;
+    let motion = resolved_motion(situation);
+    if motion.is_none() {
+        data.rate = std::array::from_fn(|_| vec![0.0; data.t_s.len()]);
+    }
     progress("residuals of the declared model");
     let before = settle(&mut data, situation, &folds, motion)?;
 
-    let scene = scene(situation, &data);
-    let mut noise = fit_noise(&data, &before);
-    let mut outcome = None;
-    for _ in 0..NOISE_ROUNDS {
-        progress("searching for causes");
-        let evidence = evidence(&data, situation, noise, motion);
-        let mut candidates = catalogue_candidates(&scene);
-        candidates.retain(|c| c.acts_on_attitude());
-        candidates.extend(leftover_terms(situation, &data));
-        let found = search(&evidence, &folds, candidates, &|c| c.id() != EMPIRICAL)?;
-        let after = residuals(&evidence, &folds, &found, &found.selection.chosen)?;
-        noise = fit_noise(&data, &after);
-        let settled = found.selection.chosen.is_empty();
-        outcome = Some((found, after));
-        if settled {
-            break;
-        }
-    }
-    let (found, after) = outcome.ok_or(CloseError::Singular)?;
+    progress("searching for causes");
+    let mut candidates = catalogue_candidates(&scene(situation, &data));
+    candidates.retain(|c| c.acts_on_attitude());
+    candidates.extend(leftover_terms(situation, &data));
+    let with_noise = |noise: [Coloured; 3]| evidence(&data, situation, noise, motion);
+    let start = fit_noise(&data, &before);
+    let (found, noise) = attitude_search::search(&with_noise, &data, &folds, candidates, start)?;
+    let after = residuals(&with_noise(noise), &folds, &found, &found.selection.chosen)?;
     progress("figures");
     finish(situation, &data, &folds, noise, motion, &found, before, after)
+}
+
+/// The reference as a motion, where its samples resolve one.
+pub(crate) fn resolved_motion<'a>(situation: &'a Situation<'_>) -> Option<&'a dyn AttitudeSource> {
+    let reference = situation.reference.as_ref()?;
+    // Rates that were measured do not come from differences.
+    let known = situation.bundle.reference.as_ref().is_some_and(|r| r.rates_rad_s.is_some());
+    (known || motion::resolved(reference.quaternions())).then_some(reference as &dyn AttitudeSource)
 }
 
 /// The before residual, with outliers marked per axis.
@@ -76,7 +72,7 @@ fn settle(
     data: &mut AttitudeData,
     situation: &Situation<'_>,
     folds: &Folds,
-    motion: &dyn AttitudeSource,
+    motion: Option<&dyn AttitudeSource>,
 ) -> Result<Residuals, CloseError> {
     let white = [Coloured::WHITE; 3];
     loop {
@@ -98,7 +94,7 @@ fn evidence<'a>(
     data: &'a AttitudeData,
     situation: &Situation<'_>,
     noise: [Coloured; 3],
-    motion: &'a dyn AttitudeSource,
+    motion: Option<&'a dyn AttitudeSource>,
 ) -> AttitudeEvidence<'a> {
     AttitudeEvidence {
         data,
@@ -108,7 +104,7 @@ fn evidence<'a>(
             .bias_arcsec
             .map_or([f64::INFINITY; 3], |b| b.map(|s| if s > 0.0 { s } else { f64::INFINITY })),
         noise,
-        motion: Some(motion),
+        motion,
     }
 }
 
@@ -178,7 +174,7 @@ fn finish(
     data: &AttitudeData,
     folds: &Folds,
     noise: [Coloured; 3],
-    motion: &dyn AttitudeSource,
+    motion: Option<&dyn AttitudeSource>,
     found: &Found,
     before: Residuals,
     after: Residuals,

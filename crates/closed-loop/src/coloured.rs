@@ -44,8 +44,14 @@ impl Coloured {
         let (r, s) = (self.white * self.white, self.slow * self.slow);
         let mut variance = s;
         let mut out = Vec::with_capacity(t_s.len());
+        // Steps repeat: one exponential serves them all.
+        let mut known = (f64::NAN, 0.0_f64);
         for k in 0..t_s.len() {
-            let decay = if k == 0 { 0.0 } else { (-(t_s[k] - t_s[k - 1]) / self.tau_s).exp() };
+            let step = if k == 0 { f64::INFINITY } else { t_s[k] - t_s[k - 1] };
+            if step.to_bits() != known.0.to_bits() {
+                known = (step, (-step / self.tau_s).exp());
+            }
+            let decay = known.1;
             variance = decay * decay * variance + s * (1.0 - decay * decay);
             if masked[k] {
                 out.push([decay, 0.0, 0.0]);
@@ -60,7 +66,7 @@ impl Coloured {
     }
 
     /// Log-likelihood of `y`, nats.
-    fn log_likelihood(&self, t_s: &[f64], y: &[f64], masked: &[bool]) -> f64 {
+    pub(crate) fn log_likelihood(&self, t_s: &[f64], y: &[f64], masked: &[bool]) -> f64 {
         let mut mean = 0.0;
         let mut total = 0.0;
         for (k, [decay, gain, weight]) in self.gains(t_s, masked).into_iter().enumerate() {
@@ -93,29 +99,28 @@ impl Coloured {
         }
         let problem = Likelihood { t_s, y, masked, rms, bounds: [0.5 * step, 3.0 * span] };
         // A likelihood in the correlation time has more than one hill: start on each.
-        let starts = [3.0 * step, (step * span).sqrt(), 0.1 * span];
-        let mut best = (white.log_likelihood(t_s, y, masked), white);
-        for tau in starts {
-            let at = vec![0.7_f64.ln(), 0.7_f64.ln(), tau.ln()];
-            let mut simplex = vec![at.clone()];
-            for k in 0..3 {
-                let mut corner = at.clone();
-                corner[k] += if k == 2 { 1.0 } else { -0.7 };
-                simplex.push(corner);
-            }
-            let Ok(solver) = NelderMead::new(simplex).with_sd_tolerance(1e-4) else { continue };
-            let Ok(result) = Executor::new(&problem, solver).configure(|s| s.max_iters(200)).run() else {
-                continue;
-            };
-            let Some(p) = result.state.best_param else { continue };
-            let noise = problem.at(&p);
-            let found = noise.log_likelihood(t_s, y, masked);
-            // Two more parameters must earn their keep (Akaike).
-            if found > best.0 + 2.0 * f64::from(u8::from(best.1.slow <= 0.0)) {
-                best = (found, noise);
-            }
+        let best = [3.0 * step, (step * span).sqrt(), 0.1 * span]
+            .into_iter()
+            .filter_map(|tau| problem.climb([0.7_f64.ln(), 0.7_f64.ln(), tau.ln()], -0.7))
+            .max_by(|a, b| a.0.total_cmp(&b.0));
+        // Two more parameters must earn their keep (Akaike).
+        match best {
+            Some((found, noise)) if found > white.log_likelihood(t_s, y, masked) + 2.0 => noise,
+            _ => white,
         }
-        best.1
+    }
+
+    /// The noise of a similar series, started from this one.
+    pub(crate) fn refit(&self, t_s: &[f64], y: &[f64], masked: &[bool]) -> Self {
+        if self.slow <= 0.0 {
+            return Self::fit(t_s, y, masked);
+        }
+        let Some(step) = crate::star_data::median_step(t_s) else { return *self };
+        let span = t_s[t_s.len() - 1] - t_s[0];
+        let problem = Likelihood { t_s, y, masked, rms: 1.0, bounds: [0.5 * step, 3.0 * span] };
+        problem
+            .climb([self.white.ln(), self.slow.ln(), self.tau_s.ln()], -0.3)
+            .map_or(*self, |(_, noise)| noise)
     }
 
     /// Whitens a series in place: independent, unit variance; masked rows are 0.
@@ -148,10 +153,27 @@ struct Likelihood<'a> {
 impl Likelihood<'_> {
     fn at(&self, p: &[f64]) -> Coloured {
         Coloured {
-            white: self.rms * p[0].clamp(-9.0, 3.0).exp(),
-            slow: self.rms * p[1].clamp(-9.0, 3.0).exp(),
+            white: self.rms * p[0].clamp(-20.0, 20.0).exp(),
+            slow: self.rms * p[1].clamp(-20.0, 20.0).exp(),
             tau_s: p[2].exp().clamp(self.bounds[0], self.bounds[1]),
         }
+    }
+}
+
+impl Likelihood<'_> {
+    /// Climbs from `start` (logarithms) with first steps of `step`; the height
+    /// and the noise there.
+    fn climb(&self, start: [f64; 3], step: f64) -> Option<(f64, Coloured)> {
+        let mut simplex = vec![start.to_vec()];
+        for k in 0..3 {
+            let mut corner = start.to_vec();
+            corner[k] += if k == 2 { -1.4 * step } else { step };
+            simplex.push(corner);
+        }
+        let solver = NelderMead::new(simplex).with_sd_tolerance(1e-3).ok()?;
+        let result = Executor::new(self, solver).configure(|s| s.max_iters(120)).run().ok()?;
+        let noise = self.at(&result.state.best_param?);
+        Some((noise.log_likelihood(self.t_s, self.y, self.masked), noise))
     }
 }
 

@@ -86,12 +86,15 @@ impl Empirical {
             Variable::Star(ids) => 2 * ids.len(),
             Variable::Phase(_) => 4,
             Variable::Position(_) => 2 * ORDERS,
+            // A polynomial in time is only good outside its fold if it is straight.
+            Variable::Time if stars => 4,
+            Variable::Time => 3,
             Variable::Rate | Variable::Acceleration => 4,
             _ if stars => 4 * ORDERS,
             _ => 3 * ORDERS,
         };
         let coefficients =
-            (0..count).map(|k| Coefficient::new(format!("c{k}"), "arcsec", 1.0)).collect();
+            (0..count).map(|k| Coefficient::new(format!("c{k}"), "arcsec", f64::INFINITY)).collect();
         Some(Self { variable, middle: 0.5 * (range[0] + range[1]), half, coefficients })
     }
 
@@ -140,8 +143,9 @@ impl Candidate for Empirical {
                 out.y[k * n + i] = dy * per_arcsec[1];
             };
             let (x, y) = (rows.x_px[i] / half[0], rows.y_px[i] / half[1]);
+            let orders = self.coefficients.len() / 4;
             let mut fields = |g: [f64; ORDERS]| {
-                for (k, g) in g.into_iter().enumerate() {
+                for (k, g) in g.into_iter().enumerate().take(orders) {
                     put(4 * k, g, 0.0);
                     put(4 * k + 1, 0.0, g);
                     put(4 * k + 2, -y * g, x * g);
@@ -213,7 +217,7 @@ impl Candidate for Empirical {
                     }
                     _ => return false,
                 };
-                for (k, g) in legendre(z).into_iter().enumerate() {
+                for (k, g) in legendre(z).into_iter().enumerate().take(self.coefficients.len() / 3) {
                     axis[(3 * k + a) * n + i] = g * rad;
                 }
             }

@@ -45,7 +45,8 @@ pub(crate) fn effects_found(
         let (values, covariance) = amplitudes_of(found, g, &set, &estimate);
         let reported = effects::reported(candidate, &values, covariance.as_view(), surroundings)?;
         let judged = &found.selection.judged[g];
-        let selectors = candidate.selectors();
+        // the realised effect's: an estimate may have turned signs round
+        let selectors = candidate.realise(&values, surroundings)?.selectors();
         let mut parameters = BTreeMap::new();
         let mut written = BTreeMap::new();
         for (parameter, sigma) in reported {

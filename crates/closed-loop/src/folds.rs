@@ -45,6 +45,22 @@ impl Folds {
         }
     }
 
+    /// The frames of each fold.
+    pub(crate) fn fold_ranges(&self) -> Vec<Range<usize>> {
+        (0..self.count)
+            .map(|f| {
+                let mut of = self.blocks.iter().zip(&self.fold_of_block).filter(|(_, g)| **g == f);
+                let first = of.next().map_or(0..0, |(b, _)| b.clone());
+                first.start..of.last().map_or(first.end, |(b, _)| b.end)
+            })
+            .collect()
+    }
+
+    /// One fold of everything, for what is not predicted.
+    pub(crate) fn whole(frames: usize) -> Self {
+        Self { blocks: vec![0..frames], fold_of_block: vec![0], count: 1 }
+    }
+
     /// The fold of each frame as tables have it.
     pub(crate) fn column(&self) -> Vec<u32> {
         let narrow = |f| u32::try_from(f).unwrap_or(u32::MAX);

@@ -9,6 +9,7 @@
 
 mod attitude_data;
 mod attitude_loop;
+mod attitude_search;
 mod close;
 mod coloured;
 mod declared;
@@ -22,6 +23,7 @@ mod folds;
 mod gram;
 mod image_level;
 mod images;
+mod motion;
 mod nuisance;
 mod robust;
 mod search;

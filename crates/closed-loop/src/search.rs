@@ -9,7 +9,7 @@
 //! Source: variable projection (Golub & Pereyra 1973): linear amplitudes are
 //! solved for at every trial value of the non-linear ones.
 
-use effects::Candidate;
+use effects::{Candidate, Coefficient};
 use nalgebra::DVector;
 
 use crate::error::CloseError;
@@ -22,6 +22,8 @@ use crate::selection::{Group, Selection, columns_of, select};
 /// Share of a column's squared length that must survive the nuisance for its
 /// amplitude to be called observable.
 const OBSERVABLE_SHARE: f64 = 1e-7;
+/// Amplitudes beyond this many plausible sigmas are not credible.
+const CREDIBLE: f64 = 20.0;
 /// Values of a non-linear parameter tried at once, and how often the scan shrinks.
 const SCAN: usize = 9;
 const SCAN_ROUNDS: usize = 3;
@@ -67,16 +69,28 @@ pub(crate) fn fit(
     let mut column = 0;
     for candidate in candidates {
         let p = candidate.coefficients().len();
-        let columns = (column..column + p)
+        let columns: Vec<usize> = (column..column + p)
             .filter(|&c| {
                 let raw = whole[(first + c, first + c)];
                 raw > 0.0 && fits.information(c) > OBSERVABLE_SHARE * raw
             })
             .collect();
-        groups.push(Group { columns, family: family(*candidate) });
+        let bounds = columns.iter().map(|c| credible(&candidate.coefficients()[c - column])).collect();
+        groups.push(Group {
+            columns,
+            bounds,
+            choices: candidate.choices(),
+            family: family(*candidate),
+        });
         column += p;
     }
     Ok(Fitted { fits, groups, scalars, variance })
+}
+
+/// Sizes of a coefficient that are still credible.
+fn credible(coefficient: &Coefficient) -> [f64; 2] {
+    let most = CREDIBLE * coefficient.plausible;
+    [coefficient.lower.max(-most), most]
 }
 
 /// Forms of one cause: one id with one selector of what it acts on.
@@ -129,7 +143,7 @@ pub(crate) fn borrowed(candidates: &[Box<dyn Candidate>]) -> Vec<&dyn Candidate>
 }
 
 /// Improves each chosen candidate beside the others.
-fn polish(
+pub(crate) fn polish(
     evidence: &dyn Evidence,
     folds: &Folds,
     candidates: &mut [Box<dyn Candidate>],

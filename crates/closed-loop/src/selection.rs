@@ -11,6 +11,9 @@
 //! rank = delta loglik - (p/2) ln n
 //! ```
 //!
+//! A group whose estimate is of a size that nature does not make is not eligible:
+//! its columns are a proxy for something else.
+//!
 //! After each addition all chosen groups are judged again beside the others and
 //! those that no longer stand are dropped.
 //!
@@ -27,6 +30,11 @@ pub(crate) struct Group {
     /// Positions among the candidate columns; those that the data cannot show are
     /// not among them.
     pub(crate) columns: Vec<usize>,
+    /// Least and largest credible amplitude of each of `columns`.
+    pub(crate) bounds: Vec<[f64; 2]>,
+    /// Choices among discrete forms that the group stands for, each paid for like
+    /// a parameter.
+    pub(crate) choices: usize,
     /// Groups of one family are forms of one cause: at most one is chosen.
     pub(crate) family: String,
 }
@@ -38,8 +46,20 @@ pub(crate) struct Judgement {
     pub(crate) delta_loglik: f64,
     /// Corrected for the number of groups tried, at most 1.
     pub(crate) p_value: f64,
+    /// The amplitudes are of a size that nature makes.
+    pub(crate) credible: bool,
     /// The columns can be told from the nuisance and from the chosen.
     pub(crate) observable: bool,
+}
+
+impl Judgement {
+    /// Nothing can be said of it.
+    pub(crate) const UNSEEN: Self = Self { delta_loglik: 0.0, p_value: 1.0, credible: false, observable: false };
+
+    /// It may be claimed.
+    pub(crate) fn stands(&self) -> bool {
+        self.observable && self.credible && self.delta_loglik > 0.0 && self.p_value < FAMILY_ALPHA
+    }
 }
 
 /// The outcome of the search.
@@ -72,11 +92,8 @@ pub(crate) fn select(fits: &Fits, groups: &[Group], may: &[bool], scalars: f64) 
             .filter_map(|g| {
                 let judgement = judge(fits, groups, &chosen, g, base.as_ref()?, tried);
                 let rank = judgement.delta_loglik
-                    - 0.5 * groups[g].columns.len() as f64 * scalars.max(2.0).ln();
-                let eligible = judgement.observable
-                    && judgement.delta_loglik > 0.0
-                    && judgement.p_value < FAMILY_ALPHA;
-                eligible.then_some((g, rank))
+                    - 0.5 * (groups[g].columns.len() + groups[g].choices) as f64 * scalars.max(2.0).ln();
+                judgement.stands().then_some((g, rank))
             })
             .max_by(|a, b| a.1.total_cmp(&b.1));
         let Some((added, _)) = best else { break };
@@ -88,7 +105,7 @@ pub(crate) fn select(fits: &Fits, groups: &[Group], may: &[bool], scalars: f64) 
             let others: Vec<usize> = chosen.iter().copied().filter(|&c| c != g).collect();
             match out_of_fold(fits, groups, &others) {
                 Some(base) => judge(fits, groups, &others, g, &base, tried),
-                None => Judgement { delta_loglik: 0.0, p_value: 1.0, observable: false },
+                None => Judgement::UNSEEN,
             }
         })
         .collect();
@@ -102,9 +119,7 @@ fn prune(fits: &Fits, groups: &[Group], chosen: &mut Vec<usize>, banned: &mut [b
             let others: Vec<usize> = chosen.iter().copied().filter(|&c| c != g).collect();
             out_of_fold(fits, groups, &others).is_some_and(|base| {
                 let judgement = judge(fits, groups, &others, g, &base, tried);
-                !judgement.observable
-                    || judgement.delta_loglik <= 0.0
-                    || judgement.p_value >= FAMILY_ALPHA
+                !judgement.stands()
             })
         });
         let Some(g) = fallen else { return };
@@ -122,14 +137,19 @@ fn judge(fits: &Fits, groups: &[Group], others: &[usize], g: usize, base: &OutOf
     let first = set.len();
     set.extend(&groups[g].columns);
     if set.len() == first {
-        return Judgement { delta_loglik: 0.0, p_value: 1.0, observable: false };
+        return Judgement::UNSEEN;
     }
     let which: Vec<usize> = (first..set.len()).collect();
     let (Some(with), Some(estimate)) = (fits.out_of_fold(&set), fits.estimate(&set)) else {
-        return Judgement { delta_loglik: 0.0, p_value: 1.0, observable: false };
+        return Judgement::UNSEEN;
     };
     Judgement {
         delta_loglik: with.total_loglik() - base.total_loglik(),
+        credible: groups[g]
+            .bounds
+            .iter()
+            .zip(&which)
+            .all(|([low, high], &i)| (*low..=*high).contains(&estimate.value[i])),
         p_value: (estimate.p_value(&which) * tried as f64).min(1.0),
         observable: true,
     }

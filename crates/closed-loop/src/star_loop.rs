@@ -14,7 +14,7 @@ use focal_plane::{AttitudeSource, Points, rotation_vector};
 use telemetry::report::{Errors, Report, Rows};
 use telemetry::{AttitudeResiduals, DarkMap, StarResiduals};
 
-use crate::attitude_loop::channels_of_interest;
+use crate::attitude_loop::{channels_of_interest, resolved_motion};
 use crate::close::{Closed, catalogue_candidates};
 use crate::declared;
 use crate::empirical::{EMPIRICAL, Empirical, Variable};
@@ -24,6 +24,7 @@ use crate::figures;
 use crate::folds::Folds;
 use crate::image_level::{self, ImageLevel, Level};
 use crate::images::{self, Formed};
+use crate::motion;
 use crate::nuisance::StarNuisance;
 use crate::robust;
 use crate::search::{Found, amplitudes, borrowed, fit, search};
@@ -63,9 +64,9 @@ pub(crate) fn run(situation: &Situation<'_>, progress: &dyn Fn(&str)) -> Result<
 
     let own = data.own_motion();
     let motion: Option<&dyn AttitudeSource> = match (&situation.reference, &own) {
-        (Some(reference), _) => Some(reference),
-        (None, Some(own)) => Some(own),
-        (None, None) => None,
+        (Some(_), _) => resolved_motion(situation),
+        (None, Some(own)) if motion::resolved(&data.attitude) => Some(own),
+        _ => None,
     };
     let measured = evidence(&data, situation, vec![data.measured_residual()], motion);
 

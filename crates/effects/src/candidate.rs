@@ -171,6 +171,11 @@ pub trait Candidate: Debug + Send + Sync {
     fn nonlinear(&self) -> Vec<Nonlinear> {
         Vec::new()
     }
+    /// How many discrete choices this candidate has made that the data has to decide (signs that the
+    /// bundle leaves open); each is to be paid for like a coefficient.
+    fn choices(&self) -> usize {
+        0
+    }
     /// The same candidate with other values of [`nonlinear`](Self::nonlinear), in its order; `None`
     /// when a value is out of range or there is nothing to change.
     fn with_nonlinear(&self, values: &[f64]) -> Option<Box<dyn Candidate>> {

@@ -21,8 +21,9 @@
 //!
 //! Quaternion axis k of the files may point along or against axis k of the frame of the vectors
 //! (`quaternion_signs`): the k-th component of theta carries that sign. Where the bundle does not know
-//! the signs, they are selectors (`"+-+"`), and the candidates are the four patterns that differ by
-//! more than the sign of `scale`; a negative estimate turns all signs round.
+//! the signs, they are selectors (`"0+-"`), where 0 claims nothing on an axis: its quaternion may not
+//! be given in that frame at all. The candidates are the patterns that differ by more than the sign of
+//! `scale` (a negative estimate turns all signs round) on the axes where the arm lets anything show.
 //!
 //! Without channels, an orbit makes the velocity: circular, of `speed_m_s` and `period_s`, with the
 //! argument of latitude `phase_rad` at t = 0:
@@ -245,22 +246,28 @@ impl Level {
         let Some(arm) = arm(surroundings) else {
             return Vec::new();
         };
-        [
-            [1.0, 1.0, 1.0],
-            [1.0, 1.0, -1.0],
-            [1.0, -1.0, 1.0],
-            [1.0, -1.0, -1.0],
-        ]
-        .into_iter()
-        .map(|signs| (Self::Cameras { arm, signs }, true))
-        .collect()
+        let mut patterns = Vec::new();
+        for code in 0..27_u32 {
+            let signs = [code / 9, code / 3 % 3, code % 3].map(|digit| f64::from(digit) - 1.0);
+            // of two patterns that differ in all signs, the one whose first claim is positive
+            let first = signs.iter().find(|s| **s != 0.0);
+            let idle = (0..3).any(|k| signs[k] != 0.0 && !axis_shows(&arm, k));
+            if first == Some(&1.0) && !idle {
+                patterns.push((Self::Cameras { arm, signs }, true));
+            }
+        }
+        patterns
     }
 
     fn selectors(&self) -> BTreeMap<String, String> {
         match self {
             Self::Cameras { signs, .. } => {
                 let text = signs
-                    .map(|s| if s < 0.0 { '-' } else { '+' })
+                    .map(|s| match s {
+                        s if s < 0.0 => '-',
+                        s if s > 0.0 => '+',
+                        _ => '0',
+                    })
                     .iter()
                     .collect();
                 BTreeMap::from([("quaternion_signs".to_owned(), text)])
@@ -281,12 +288,19 @@ fn arm(surroundings: &Surroundings<'_>) -> Option<Vector3<f64>> {
     Some(tracker - frames.reference_boresight?.normalize())
 }
 
+/// Whether arm x v has a component along axis `k` for any v: it needs an arm across that axis.
+fn axis_shows(arm: &Vector3<f64>, k: usize) -> bool {
+    let across = arm[(k + 1) % 3].hypot(arm[(k + 2) % 3]);
+    across > 1e-3 * arm.norm()
+}
+
 fn parse_signs(text: &str) -> Result<[f64; 3], EffectError> {
     let signs: Vec<f64> = text
         .chars()
         .filter_map(|c| match c {
             '+' => Some(1.0),
             '-' => Some(-1.0),
+            '0' => Some(0.0),
             _ => None,
         })
         .collect();
@@ -296,7 +310,7 @@ fn parse_signs(text: &str) -> Result<[f64; 3], EffectError> {
         .ok_or(EffectError::WrongType {
             effect: ID,
             name: "quaternion_signs".to_owned(),
-            expected: "three of + and -, for instance \"+-+\"",
+            expected: "three of +, - and 0, for instance \"0+-\"",
         })
 }
 
@@ -400,6 +414,14 @@ impl Candidate for AberrationCandidate {
     }
     fn coefficients(&self) -> &[Coefficient] {
         &self.coefficients
+    }
+    fn choices(&self) -> usize {
+        match &self.level {
+            Level::Cameras { signs, .. } if self.signs_free => {
+                signs.iter().filter(|s| **s != 0.0).count()
+            }
+            _ => 0,
+        }
     }
     fn acts_on_stars(&self) -> bool {
         true

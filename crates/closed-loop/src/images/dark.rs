@@ -10,11 +10,13 @@
 //! with the spot's shape, and the marginal variance is
 //!
 //! ```text
-//! var D(p) = v(p) + v(p)^2 sum_i c_ip^T M_i^-1 c_ip,   M_i = Q_i - sum_p v(p) c_ip c_ip^T
-//! c_ip = sum over the windows of star i on p of  w F taps
+//! var(D(p) - mean D) = v(p) + sum_i u_ip^T M_i^-1 u_ip,   u_ip = v(p) c_ip - mean_p v c_i
+//! M_i = Q_i - sum_p v(p) c_ip c_ip^T,       c_ip = sum over the windows of star i on p of  w F taps
 //! ```
 //!
-//! with Q_i the spot's own precision. Units: those of the scaled windows.
+//! with Q_i the spot's own precision and means over the pixels that star i covers: a
+//! uniform level there is a pedestal of the spot or a background as well, and has no
+//! size of its own. Units: those of the scaled windows.
 //!
 //! Source: linear least squares with blocks eliminated (Schur complement); MacKay
 //! 1992 for tau.
@@ -76,8 +78,8 @@ impl Dark {
     }
 }
 
-/// What the uncertainty of one star's spot adds to the variance of each pixel.
-/// `precision` is Q of the spot, `variance` v by pixel.
+/// What the uncertainty of one star's spot adds to the variance of each pixel
+/// against the mean of those that the star covers. `precision` is Q of the spot, `variance` v by pixel.
 pub(crate) fn variance_from_spot(
     grid: &Grid,
     sample: &Sample,
@@ -123,20 +125,27 @@ pub(crate) fn variance_from_spot(
     };
     let runs = || values.chunk_by(|a, b| a[0] == b[0]);
     let mut c = vec![0.0; order];
+    let mut mean = vec![0.0; order];
+    let mut pixels = 0.0;
     for run in runs() {
         coupling(run, &mut c);
         let v = variance[run[0][0]];
+        pixels += 1.0;
         for i in 0..order {
             let k = v * c[i];
             if k == 0.0 {
                 continue;
             }
+            mean[i] += k;
             for (t, q) in dense[i * order + i..(i + 1) * order].iter_mut().zip(&c[i..]) {
                 *t -= k * q;
             }
         }
     }
-    let mut matrix = Banded { order, width: order - 1, entries: vec![0.0; order * order] };
+    for m in &mut mean {
+        *m /= f64::max(pixels, 1.0);
+    }
+    let mut matrix = Banded::zeros(order, order - 1);
     for i in 0..order {
         let row = &dense[i * order + i..(i + 1) * order];
         matrix.entries[i * order..i * order + row.len()].copy_from_slice(row);
@@ -145,7 +154,11 @@ pub(crate) fn variance_from_spot(
     runs()
         .map(|run| {
             coupling(run, &mut c);
-            (run[0][0], variance[run[0][0]].powi(2) * factor.quadratic(&mut c))
+            let v = variance[run[0][0]];
+            for (c, m) in c.iter_mut().zip(&mean) {
+                *c = v * *c - m;
+            }
+            (run[0][0], factor.quadratic(&mut c))
         })
         .collect()
 }
