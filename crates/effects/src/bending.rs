@@ -8,7 +8,7 @@
 //! The coefficients are ordered axis by axis, and within an axis by k. As a residual of the attitude,
 //! theta is the error `log(q_meas q_ref^-1)` itself: `v_meas = v + theta x v`.
 //!
-//! Source: [M23] Section 4.3 for why the frame bends; the Jacobian is that of `focal_plane::Camera`.
+//! Source: \[M23\] Section 4.3 for why the frame bends; the Jacobian is that of `focal_plane::Camera`.
 
 use core::fmt::Debug;
 use std::collections::BTreeMap;

@@ -1,4 +1,6 @@
 //! The list of effects.
+//!
+//! Not physics: a list.
 
 use crate::parameters::nearest;
 use crate::{

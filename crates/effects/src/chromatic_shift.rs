@@ -6,7 +6,7 @@
 //!
 //! outward for red stars when positive. 0.6 is a sunlike star; a star of unknown colour does not move.
 //!
-//! Source: [M23] Section 2.1 names chromatic refraction among the causes of LSFE; lateral colour is
+//! Source: \[M23\] Section 2.1 names chromatic refraction among the causes of LSFE; lateral colour is
 //! proportional to the field angle in the paraxial limit.
 
 use star_tracker::StarView;

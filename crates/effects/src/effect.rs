@@ -1,4 +1,6 @@
 //! An effect with its numbers, and the kind it is of.
+//!
+//! Not physics: interfaces.
 
 use std::collections::BTreeMap;
 

@@ -8,12 +8,12 @@
 //!
 //! Odd orders of s cancel because the exposure is centred on t: at constant image velocity nothing
 //! moves, and the leading term is the acceleration of the image, largest where the motion reverses
-//! (the turn-around error of [M23] Section 4.2.1). The shift grows with T squared, so T^2 is the
+//! (the turn-around error of \[M23\] Section 4.2.1). The shift grows with T squared, so T^2 is the
 //! coefficient that is fitted (it cannot be negative) and `exposure_s`, its root, is what is reported.
 //! T0 is the exposure about which the columns are taken: where the motion turns within the exposure
 //! the leading term is not enough, and the estimate is re-linearised about itself.
 //!
-//! Source: [M23] Section 4.2.1 names the effect; the series is that of the mean of a path.
+//! Source: \[M23\] Section 4.2.1 names the effect; the series is that of the mean of a path.
 
 use focal_plane::{Camera, PointsMut, VectorsMut, rotation_vector};
 use nalgebra::Vector3;

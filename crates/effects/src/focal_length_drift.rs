@@ -9,7 +9,7 @@
 //! common gain of all centroids cannot be told from the focal length itself. Where the channel is not
 //! known it counts as its mean.
 //!
-//! Source: [M23] Section 2.1 names thermal scaling and focal length changes among the causes of LSFE.
+//! Source: \[M23\] Section 2.1 names thermal scaling and focal length changes among the causes of LSFE.
 
 use std::collections::BTreeMap;
 

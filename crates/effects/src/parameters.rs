@@ -1,4 +1,7 @@
 //! Parameters and selectors of an effect, as model files give them and reports write them.
+//!
+//! Not physics: names and values (the distance between names is that of Levenshtein,
+//! Soviet Physics Doklady 10 (1966) 707).
 
 use std::collections::BTreeMap;
 

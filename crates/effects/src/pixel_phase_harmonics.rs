@@ -8,7 +8,7 @@
 //! at the same distorted, noise-free position. As regressors the sine and the cosine of each order are
 //! two coefficients (amplitude cos phase, amplitude sin phase); amplitude and phase are reported.
 //!
-//! Source: [M23] Eq. 9-11, Step 3, with another periodic function in place of the triangle.
+//! Source: \[M23\] Eq. 9-11, Step 3, with another periodic function in place of the triangle.
 
 use focal_plane::Camera;
 use star_tracker::{Stages, StarView};

@@ -6,7 +6,7 @@
 //!
 //! It has no regressors: it moves no centroid.
 //!
-//! Source: [M23] Table 1 quotes the random error at 0.1 deg/s.
+//! Source: \[M23\] Table 1 quotes the random error at 0.1 deg/s.
 
 use star_tracker::{Disturbance, Stages, StarView};
 

@@ -9,7 +9,7 @@
 //! whoever simulates a reference adds it there ([`crate::Effect::reference_wander`]). It has no
 //! regressors: coloured noise is judged by its spectrum.
 //!
-//! Source: [M23] Eq. 15-17 in the consistent one-sided convention (erratum E6).
+//! Source: \[M23\] Eq. 15-17 in the consistent one-sided convention (erratum E6).
 
 use star_tracker::{Disturbance, Stages};
 

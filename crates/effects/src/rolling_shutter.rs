@@ -7,7 +7,7 @@
 //!
 //! Re-linearised about an estimate, the columns follow the path to that t'.
 //!
-//! Source: [M23] Section 4.2.1 names the effect; a frame's time is the middle of the exposure of row
+//! Source: \[M23\] Section 4.2.1 names the effect; a frame's time is the middle of the exposure of row
 //! y = 0 (conventions of `focal_plane`).
 
 use focal_plane::{Camera, PointsMut, VectorsMut};

@@ -1,4 +1,6 @@
 //! What an effect may look at: camera, time span, housekeeping, frames, stars.
+//!
+//! Not physics: what is on hand, nothing computed.
 
 use std::collections::BTreeMap;
 

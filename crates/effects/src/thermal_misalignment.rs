@@ -16,7 +16,7 @@
 //! Only channels ending in `_c`, `_k` (temperatures) and `_on` (switches) bend a frame: velocities
 //! belong to `velocity_aberration`.
 //!
-//! Source: [M23] Section 4.3.2: heaters cycled every 3 min (0.0055 Hz) deform the frame between tracker
+//! Source: \[M23\] Section 4.3.2: heaters cycled every 3 min (0.0055 Hz) deform the frame between tracker
 //! and camera. First-order lag of a square wave: elementary.
 
 use std::collections::BTreeMap;

@@ -615,7 +615,7 @@ mod tests {
         assert!((v + Vector3::new(0.0, 0.0, 7500.0)).norm() < 1e-8);
     }
 
-    /// [M23]-like field: a star across the velocity moves by v/c toward it, 20.5 arcsec at 29.8 km/s.
+    /// \[M23\]-like field: a star across the velocity moves by v/c toward it, 20.5 arcsec at 29.8 km/s.
     #[test]
     fn stars_move_toward_the_velocity() {
         let camera = Camera::from_fov_deg([1024, 1024], [20.0, 20.0]).unwrap();

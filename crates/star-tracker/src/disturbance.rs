@@ -15,7 +15,7 @@
 //! A disturbance says in [`Disturbance::stages`] where it acts; the pipeline asks it nowhere else, so
 //! a model without disturbances runs the plain kernels only.
 //!
-//! Source: the stages are Steps 1-4 of [M23] Fig. 4 with the omissions its Sections 2.2 and 4.2.1 name
+//! Source: the stages are Steps 1-4 of \[M23\] Fig. 4 with the omissions its Sections 2.2 and 4.2.1 name
 //! (finite exposure, shutter, alignment) put at the point where they arise.
 
 use core::fmt::Debug;

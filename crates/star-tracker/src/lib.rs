@@ -1,6 +1,6 @@
 //! The physics-based star tracker model: truth attitude in, centroids and attitude out.
 //!
-//! - [`Pbm`]: distortion, centroid error, noise and QUEST over a batch of frames ([M23] Fig. 4), one
+//! - [`Pbm`]: distortion, centroid error, noise and QUEST over a batch of frames (\[M23\] Fig. 4), one
 //!   frame being a batch of one; [`Rows`] in, [`Measured`] out, all memory the caller's;
 //! - [`Disturbance`], [`Stages`]: the places where an effect may act, in the order of the light;
 //! - [`StarField`], [`CatalogueTracking`]: which stars are tracked;
@@ -40,9 +40,9 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! [M23]: Miller et al. 2023, star-tracker error models validated on DART and PSP data.
+//! \[M23\]: Miller et al. 2023, star-tracker error models validated on DART and PSP data.
 //!
-//! Source: [M23] Section 2; each module names its own.
+//! Source: \[M23\] Section 2; each module names its own.
 #![forbid(unsafe_code)]
 
 mod disturbance;

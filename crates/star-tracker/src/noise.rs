@@ -7,11 +7,11 @@
 //! `slope` is 0 for a constant sigma, 1 where photons of the star dominate (flux F falls by 10^-0.4 per
 //! magnitude and sigma ~ F^-1/2), 2 where background and read noise do (sigma ~ F^-1). `k omega`
 //! is growth with the star's rate across the detector: specifications quote NEA at 0.1 deg/s
-//! ([M23] Table 1).
+//! (\[M23\] Table 1).
 //!
-//! [M23] Step 4 states the constant form with a *per-star circular* sigma; see [`crate::sigma`].
+//! \[M23\] Step 4 states the constant form with a *per-star circular* sigma; see [`crate::sigma`].
 //!
-//! Source: [M23] Step 4 and Table 1.
+//! Source: \[M23\] Step 4 and Table 1.
 
 use crate::TrackerError;
 use crate::sigma::per_axis_from_circular;
@@ -46,7 +46,7 @@ impl TemporalNoise {
         })
     }
 
-    /// Constant noise from the per-star circular sigma, arcsec, as [M23] Step 4 means it.
+    /// Constant noise from the per-star circular sigma, arcsec, as \[M23\] Step 4 means it.
     ///
     /// # Errors
     /// When it is negative or not finite.

@@ -16,7 +16,7 @@
 //! A row whose exposure is not wholly inside the span of the truth is left out (NaN), never
 //! extrapolated.
 //!
-//! Source: [M23] Section 2.6 and Fig. 4. Eq. 12 is minimised (Eq. 13 has the frames reversed,
+//! Source: \[M23\] Section 2.6 and Fig. 4. Eq. 12 is minimised (Eq. 13 has the frames reversed,
 //! erratum E3).
 
 use std::sync::Arc;

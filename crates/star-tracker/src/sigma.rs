@@ -6,18 +6,18 @@
 //! roll:        sigma_roll = sigma_star / (sqrt M rho)        rho = rms sine of the angle off the boresight
 //! ```
 //!
-//! [M23] Step 4 scales an angular sigma by `f / sqrt M` to get a per-star one; the inverse is right:
+//! \[M23\] Step 4 scales an angular sigma by `f / sqrt M` to get a per-star one; the inverse is right:
 //! a per-star sigma is `sqrt M` *larger* than the attitude's (erratum E5). The printed scaling is kept
 //! as [`star_from_cross_axis_as_printed`], because the paper's numbers may have been made with it.
 //!
-//! [M23] Section 4.1 feeds the sigmas fitted on the *boresight attitude* into the model as *per-star
+//! \[M23\] Section 4.1 feeds the sigmas fitted on the *boresight attitude* into the model as *per-star
 //! circular* sigmas (erratum E14); [`star_per_axis_from_roll`] is what would have closed that loop for
 //! white noise.
 //!
 //! The triangle's peak, per-axis and circular rms (erratum E2) are converted in the `centroid` crate.
 //! Lengths of all angles cancel, so any angular unit may be used as long as it is kept.
 //!
-//! Source: [M23] Step 4 and Eq. 14 with errata E2, E5, E14.
+//! Source: \[M23\] Step 4 and Eq. 14 with errata E2, E5, E14.
 
 use focal_plane::Camera;
 
@@ -45,7 +45,7 @@ pub fn star_from_cross_axis(cross_axis: f64, stars: usize) -> f64 {
     cross_axis * (stars as f64).sqrt()
 }
 
-/// The scaling as [M23] Step 4 prints it, `sigma / sqrt M`: wrong by a factor M (erratum E5).
+/// The scaling as \[M23\] Step 4 prints it, `sigma / sqrt M`: wrong by a factor M (erratum E5).
 pub fn star_from_cross_axis_as_printed(cross_axis: f64, stars: usize) -> f64 {
     cross_axis / (stars as f64).sqrt()
 }

@@ -1,6 +1,6 @@
 //! Which stars are tracked: a generated sky, or a catalogue.
 //!
-//! The generated sky follows [M23] Step 1. A star that leaves the field is replaced by a new one drawn
+//! The generated sky follows \[M23\] Step 1. A star that leaves the field is replaced by a new one drawn
 //! uniformly inside a box:
 //!
 //! ```text
@@ -18,7 +18,7 @@
 //! Catalogue stars are chosen by [`CatalogueTracking`]: a tracked star is kept for as long as it is in
 //! the field, and a free slot takes the brightest star that is not tracked.
 //!
-//! Source: [M23] Section 2.6, Step 1. Magnitudes and colours of the generated stars are an assumption:
+//! Source: \[M23\] Section 2.6, Step 1. Magnitudes and colours of the generated stars are an assumption:
 //! counts rise as 10^(0.5 m) up to the limit, B - V is normal (0.6, 0.5) clipped to [-0.3, 2.0].
 
 use focal_plane::{Camera, Catalogue, Pixel};
@@ -168,7 +168,7 @@ impl StarField {
     }
 }
 
-/// The box of [M23] Step 1 for a new star, given where the remaining stars are: `[x, y]` ranges, px.
+/// The box of \[M23\] Step 1 for a new star, given where the remaining stars are: `[x, y]` ranges, px.
 pub fn replacement_box(camera: &Camera, remaining: &[Pixel]) -> [[f64; 2]; 2] {
     let half = camera.half_size_px();
     if remaining.len() < 2 {
