@@ -15,6 +15,7 @@ use effects::{AttitudeRows, Candidate};
 use focal_plane::{ARCSEC_PER_RAD, AttitudeSeries, AttitudeSource, VectorsMut, rotation_vector};
 use nalgebra::{DMatrix, UnitQuaternion};
 
+use crate::bins::Bins;
 use crate::coloured::Coloured;
 use crate::evidence::{Amplitudes, Evidence, Residuals};
 use crate::folds::Folds;
@@ -30,6 +31,10 @@ pub(crate) struct AttitudeData {
     pub(crate) rate: [Vec<f64>; 3],
     /// Rows left out, per axis.
     pub(crate) outlier: [Vec<bool>; 3],
+    /// How the rows are averaged for the search.
+    pub(crate) bins: Bins,
+    /// Rows that count in each bin, per axis; fresh after [`Self::rebin`].
+    pub(crate) count: [Vec<f64>; 3],
     /// Rows set aside because the reference does not cover them.
     pub(crate) outside_reference: usize,
 }
@@ -42,6 +47,8 @@ impl AttitudeData {
             theta: Default::default(),
             rate: Default::default(),
             outlier: Default::default(),
+            bins: Bins::cut(&[], &Folds::cut(0)),
+            count: Default::default(),
             outside_reference: 0,
         };
         for (&t, q) in t_s.iter().zip(q) {
@@ -59,6 +66,25 @@ impl AttitudeData {
             }
         }
         data
+    }
+
+    /// Cuts the bins and counts what counts in them.
+    pub(crate) fn rebin(&mut self, folds: &Folds) {
+        self.bins = Bins::cut(&self.t_s, folds);
+        self.count = std::array::from_fn(|axis| {
+            let kept = |rows: &Range<usize>| rows.clone().filter(|&k| !self.outlier[axis][k]).count();
+            self.bins.rows.iter().map(|rows| kept(rows) as f64).collect()
+        });
+    }
+
+    /// Means over the bins of one axis of a series of rows; 0 where nothing counts.
+    pub(crate) fn binned(&self, axis: usize, values: &[f64]) -> Vec<f64> {
+        let mean = |rows: &Range<usize>, count: f64| {
+            let sum: f64 =
+                rows.clone().filter(|&k| !self.outlier[axis][k]).map(|k| values[k]).sum();
+            if count > 0.0 { sum / count } else { 0.0 }
+        };
+        self.bins.rows.iter().zip(&self.count[axis]).map(|(rows, &count)| mean(rows, count)).collect()
     }
 
     /// Rows as effects see them.
@@ -84,22 +110,23 @@ pub(crate) struct AttitudeEvidence<'a> {
 }
 
 impl AttitudeEvidence<'_> {
-    /// Residuals with each fold's own constants and amplitudes, as the whitening
-    /// filter wants them, arcsec.
+    /// Binned residuals with each fold's own constants and amplitudes, as the
+    /// whitening filter wants them, arcsec.
     pub(crate) fn generalised(
         &self,
         folds: &Folds,
         candidates: &[&dyn Candidate],
         amplitudes: &Amplitudes,
     ) -> [Vec<f64>; 3] {
-        let n = self.data.t_s.len();
-        let raw = self.raw(0..n, candidates);
-        let mut out = self.data.theta.clone();
-        for (f, frames) in folds.fold_ranges().into_iter().enumerate() {
+        let m = self.data.bins.rows.len();
+        let raw = self.binned(candidates);
+        let mut out: [Vec<f64>; 3] =
+            std::array::from_fn(|axis| self.data.binned(axis, &self.data.theta[axis]));
+        for (f, bins) in folds.fold_ranges().into_iter().enumerate() {
             let (constant, beta) = (&amplitudes.nuisance[f], &amplitudes.candidates[f]);
             for (axis, series) in out.iter_mut().enumerate() {
-                for k in frames.clone() {
-                    let row = raw.row(axis * n + k);
+                for k in bins.clone() {
+                    let row = raw.row(axis * m + k);
                     let shift: f64 = (0..beta.len()).map(|j| row[3 + j] * beta[j]).sum();
                     series[k] -= constant[axis] + shift;
                 }
@@ -141,7 +168,24 @@ impl AttitudeEvidence<'_> {
     }
 }
 
-/// Whitened columns of the whole series, handed out by rows.
+impl AttitudeEvidence<'_> {
+    /// Constants and candidates averaged over the bins.
+    fn binned(&self, candidates: &[&dyn Candidate]) -> DMatrix<f64> {
+        let (n, m) = (self.data.t_s.len(), self.data.bins.rows.len());
+        let raw = self.raw(0..n, candidates);
+        let mut out = DMatrix::zeros(3 * m, raw.ncols());
+        for (j, column) in raw.column_iter().enumerate() {
+            for axis in 0..3 {
+                let rows = &column.as_slice()[axis * n..(axis + 1) * n];
+                let means = self.data.binned(axis, rows);
+                out.view_mut((axis * m, j), (m, 1)).copy_from_slice(&means);
+            }
+        }
+        out
+    }
+}
+
+/// Whitened columns of the whole binned series, handed out by bins.
 struct WhitenedDesign<'a> {
     data: &'a AttitudeData,
     columns: DMatrix<f64>,
@@ -153,12 +197,12 @@ impl Design for WhitenedDesign<'_> {
     }
 
     fn fill(&self, rows: Range<usize>, out: &mut DMatrix<f64>) -> usize {
-        let (n, all) = (rows.len(), self.data.t_s.len());
+        let (n, all) = (rows.len(), self.data.bins.rows.len());
         *out = DMatrix::zeros(3 * n, self.width());
         let mut scalars = 0;
         for axis in 0..3 {
             out.rows_mut(axis * n, n).copy_from(&self.columns.rows(axis * all + rows.start, n));
-            scalars += rows.clone().filter(|&k| !self.data.outlier[axis][k]).count();
+            scalars += rows.clone().filter(|&k| self.data.count[axis][k] > 0.0).count();
         }
         scalars
     }
@@ -178,17 +222,16 @@ impl Evidence for AttitudeEvidence<'_> {
     }
 
     fn design<'a>(&'a self, candidates: &'a [&'a dyn Candidate]) -> Box<dyn Design + 'a> {
-        let n = self.data.t_s.len();
-        let mut columns = self.raw(0..n, candidates);
+        let m = self.data.bins.rows.len();
+        let mut columns = self.binned(candidates);
         let width = columns.ncols();
         columns = columns.insert_column(width, 0.0);
         for axis in 0..3 {
-            for k in 0..n {
-                columns[(axis * n + k, width)] = self.data.theta[axis][k];
-            }
+            let theta = self.data.binned(axis, &self.data.theta[axis]);
+            columns.view_mut((axis * m, width), (m, 1)).copy_from_slice(&theta);
             for mut column in columns.column_iter_mut() {
-                let slice = &mut column.as_mut_slice()[axis * n..(axis + 1) * n];
-                self.noise[axis].whiten(&self.data.t_s, &self.data.outlier[axis], &mut [slice]);
+                let slice = &mut column.as_mut_slice()[axis * m..(axis + 1) * m];
+                self.noise[axis].whiten(&self.data.bins.t_s, &self.data.count[axis], &mut [slice]);
             }
         }
         Box::new(WhitenedDesign { data: self.data, columns })

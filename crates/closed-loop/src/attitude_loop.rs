@@ -12,7 +12,6 @@ use crate::empirical::{Empirical, Variable};
 use crate::error::CloseError;
 use crate::evidence::{Evidence, Residuals};
 use crate::figures;
-use crate::fit::Fits;
 use crate::folds::Folds;
 use crate::motion;
 use crate::robust;
@@ -53,7 +52,8 @@ pub(crate) fn run(situation: &Situation<'_>, progress: &dyn Fn(&str)) -> Result<
     candidates.extend(leftover_terms(situation, &data));
     let with_noise = |noise: [Coloured; 3]| evidence(&data, situation, noise, motion);
     let start = fit_noise(&data, &before);
-    let (found, noise) = attitude_search::search(&with_noise, &data, &folds, candidates, start)?;
+    let bins = &data.bins.folds;
+    let (found, noise) = attitude_search::search(&with_noise, &data, bins, candidates, start)?;
     let after = residuals(&with_noise(noise), &folds, &found, &found.selection.chosen)?;
     progress("figures");
     finish(situation, &data, &folds, noise, motion, &found, before, after)
@@ -76,8 +76,9 @@ fn settle(
 ) -> Result<Residuals, CloseError> {
     let white = [Coloured::WHITE; 3];
     loop {
+        data.rebin(folds);
         let evidence = evidence(data, situation, white, motion);
-        let fitted = fit(&evidence, folds, &[])?;
+        let fitted = fit(&evidence, &data.bins.folds, &[])?;
         let amplitudes = amplitudes(&fitted, folds, &[], 0).ok_or(CloseError::Singular)?;
         let before = evidence.residuals(folds, &[], &amplitudes);
         let group = vec![0; data.t_s.len()];
@@ -109,7 +110,23 @@ fn evidence<'a>(
 }
 
 fn fit_noise(data: &AttitudeData, residual: &Residuals) -> [Coloured; 3] {
-    std::array::from_fn(|axis| Coloured::fit(&data.t_s, &residual.axes[axis], &data.outlier[axis]))
+    std::array::from_fn(|axis| {
+        let means = data.binned(axis, &residual.axes[axis]);
+        Coloured::fit(&data.bins.t_s, &means, &data.count[axis])
+    })
+}
+
+/// Log-likelihood of all rows a row, under the noise that suits them best, nats.
+fn loglik_per_frame(data: &AttitudeData, residual: &Residuals) -> f64 {
+    let total: f64 = (0..3)
+        .map(|axis| {
+            let count: Vec<f64> =
+                data.outlier[axis].iter().map(|out| f64::from(u8::from(!out))).collect();
+            let series = &residual.axes[axis];
+            Coloured::fit(&data.t_s, series, &count).log_likelihood(&data.t_s, series, &count)
+        })
+        .sum();
+    total / data.t_s.len() as f64
 }
 
 fn residuals(
@@ -196,14 +213,14 @@ fn finish(
     let mut model = situation.model.clone();
     model.effects.extend(entries);
     let unattributed = figures::unattributed(found, last / whole);
-    let errors = |r: &Residuals, set: &[usize]| Errors {
+    let errors = |r: &Residuals| Errors {
         star_rms_arcsec: None,
         attitude_rms_arcsec: Some(std::array::from_fn(|a| {
             figures::rms(&r.axes[a], &data.outlier[a]).unwrap_or(f64::NAN)
         })),
         log_psd_cost: None,
         chi2_per_dof: None,
-        loglik_per_frame: loglik_per_frame(&found.fitted.fits, found, set, data.t_s.len()),
+        loglik_per_frame: Some(loglik_per_frame(data, r)),
     };
     let outliers: Vec<bool> =
         (0..data.t_s.len()).map(|k| (0..3).any(|a| data.outlier[a][k])).collect();
@@ -217,8 +234,8 @@ fn finish(
             outliers: count,
             outside_reference: data.outside_reference,
         },
-        before: errors(&before, &[]),
-        after: errors(&after, chosen),
+        before: errors(&before),
+        after: errors(&after),
         effects,
         considered: figures::considered(found, 0.0),
         unattributed,
@@ -239,9 +256,4 @@ fn finish(
         dark_map: None,
         rivals: Vec::new(),
     })
-}
-
-fn loglik_per_frame(fits: &Fits, found: &Found, chosen: &[usize], frames: usize) -> Option<f64> {
-    let set = crate::selection::columns_of(&found.fitted.groups, chosen);
-    fits.out_of_fold(&set).map(|o| o.total_loglik() / frames as f64)
 }

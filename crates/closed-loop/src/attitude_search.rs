@@ -151,7 +151,7 @@ impl Trial<'_, '_> {
             let estimate = fitted.fits.estimate(&set)?;
             let residual = self.left(&evidence, &candidates, &fitted, &set, &estimate.value);
             noise = std::array::from_fn(|axis| {
-                noise[axis].refit(&self.data.t_s, &residual[axis], &self.data.outlier[axis])
+                noise[axis].refit(&self.data.bins.t_s, &residual[axis], &self.data.count[axis])
             });
             let credible = fitted.groups.iter().all(|group| {
                 group.columns.iter().zip(&group.bounds).all(|(c, [low, high])| {
@@ -184,7 +184,7 @@ impl Trial<'_, '_> {
         for (i, &c) in set.iter().enumerate() {
             beta[c] = value[i];
         }
-        let one = Folds::whole(self.data.t_s.len());
+        let one = Folds::whole(self.data.bins.rows.len());
         let amplitudes = Amplitudes {
             nuisance: vec![fitted.fits.nuisance(None, set, value)],
             candidates: vec![beta],
@@ -194,7 +194,7 @@ impl Trial<'_, '_> {
 
     fn loglik(&self, noise: &[Coloured; 3], residual: &[Vec<f64>; 3]) -> f64 {
         (0..3)
-            .map(|a| noise[a].log_likelihood(&self.data.t_s, &residual[a], &self.data.outlier[a]))
+            .map(|a| noise[a].log_likelihood(&self.data.bins.t_s, &residual[a], &self.data.count[a]))
             .sum()
     }
 }

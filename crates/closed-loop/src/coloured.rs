@@ -6,6 +6,7 @@
 //! b_k+1 = a b_k + n_k     a = exp(-dt/tau),  n ~ N(0, s_b^2 (1 - a^2))
 //! ```
 //!
+//! A row may be the mean of `count` measurements: its white variance is s_w^2/count.
 //! The scalar Kalman filter of this model turns the series into independent
 //! unit-variance innovations, at any spacing and across gaps. It is linear and
 //! its gains depend on the times alone, so that regressors go through the same
@@ -38,9 +39,9 @@ impl Coloured {
     /// Nothing known: rows count alike and stay as they are.
     pub(crate) const WHITE: Self = Self { white: 1.0, slow: 0.0, tau_s: 1.0 };
 
-    /// The filter's gain and 1/sqrt(innovation variance) at each row; a masked
-    /// row has gain 0 and weight 0.
-    fn gains(&self, t_s: &[f64], masked: &[bool]) -> Vec<[f64; 3]> {
+    /// The filter's decay, gain and 1/sqrt(innovation variance) at each row; a row
+    /// that counts for nothing has gain 0 and weight 0.
+    fn gains(&self, t_s: &[f64], count: &[f64]) -> Vec<[f64; 3]> {
         let (r, s) = (self.white * self.white, self.slow * self.slow);
         let mut variance = s;
         let mut out = Vec::with_capacity(t_s.len());
@@ -53,11 +54,11 @@ impl Coloured {
             }
             let decay = known.1;
             variance = decay * decay * variance + s * (1.0 - decay * decay);
-            if masked[k] {
+            if count[k] <= 0.0 {
                 out.push([decay, 0.0, 0.0]);
                 continue;
             }
-            let innovation = variance + r;
+            let innovation = variance + r / count[k];
             let gain = variance / innovation;
             out.push([decay, gain, 1.0 / innovation.sqrt()]);
             variance *= 1.0 - gain;
@@ -66,12 +67,12 @@ impl Coloured {
     }
 
     /// Log-likelihood of `y`, nats.
-    pub(crate) fn log_likelihood(&self, t_s: &[f64], y: &[f64], masked: &[bool]) -> f64 {
+    pub(crate) fn log_likelihood(&self, t_s: &[f64], y: &[f64], count: &[f64]) -> f64 {
         let mut mean = 0.0;
         let mut total = 0.0;
-        for (k, [decay, gain, weight]) in self.gains(t_s, masked).into_iter().enumerate() {
+        for (k, [decay, gain, weight]) in self.gains(t_s, count).into_iter().enumerate() {
             mean *= decay;
-            if masked[k] {
+            if count[k] <= 0.0 {
                 continue;
             }
             let e = y[k] - mean;
@@ -83,9 +84,10 @@ impl Coloured {
 
     /// Noise of greatest likelihood for a series about zero. With too few rows
     /// to tell a correlation, white noise.
-    pub(crate) fn fit(t_s: &[f64], y: &[f64], masked: &[bool]) -> Self {
-        let kept: Vec<f64> = (0..y.len()).filter(|&k| !masked[k]).map(|k| y[k]).collect();
-        let variance = kept.iter().map(|v| v * v).sum::<f64>() / kept.len().max(1) as f64;
+    pub(crate) fn fit(t_s: &[f64], y: &[f64], count: &[f64]) -> Self {
+        let kept: Vec<usize> = (0..y.len()).filter(|&k| count[k] > 0.0).collect();
+        let variance =
+            kept.iter().map(|&k| y[k] * y[k] * count[k]).sum::<f64>() / kept.len().max(1) as f64;
         let rms = variance.sqrt().max(1e-12);
         let white = Self { white: rms, slow: 0.0, tau_s: 1.0 };
         let (Some(step), Some((first, last))) =
@@ -97,7 +99,7 @@ impl Coloured {
         if kept.len() < 30 || step <= 0.0 {
             return white;
         }
-        let problem = Likelihood { t_s, y, masked, rms, bounds: [0.5 * step, 3.0 * span] };
+        let problem = Likelihood { t_s, y, count, rms, bounds: [0.5 * step, 3.0 * span] };
         // A likelihood in the correlation time has more than one hill: start on each.
         let best = [3.0 * step, (step * span).sqrt(), 0.1 * span]
             .into_iter()
@@ -105,32 +107,32 @@ impl Coloured {
             .max_by(|a, b| a.0.total_cmp(&b.0));
         // Two more parameters must earn their keep (Akaike).
         match best {
-            Some((found, noise)) if found > white.log_likelihood(t_s, y, masked) + 2.0 => noise,
+            Some((found, noise)) if found > white.log_likelihood(t_s, y, count) + 2.0 => noise,
             _ => white,
         }
     }
 
     /// The noise of a similar series, started from this one.
-    pub(crate) fn refit(&self, t_s: &[f64], y: &[f64], masked: &[bool]) -> Self {
+    pub(crate) fn refit(&self, t_s: &[f64], y: &[f64], count: &[f64]) -> Self {
         if self.slow <= 0.0 {
-            return Self::fit(t_s, y, masked);
+            return Self::fit(t_s, y, count);
         }
         let Some(step) = crate::star_data::median_step(t_s) else { return *self };
         let span = t_s[t_s.len() - 1] - t_s[0];
-        let problem = Likelihood { t_s, y, masked, rms: 1.0, bounds: [0.5 * step, 3.0 * span] };
+        let problem = Likelihood { t_s, y, count, rms: 1.0, bounds: [0.5 * step, 3.0 * span] };
         problem
             .climb([self.white.ln(), self.slow.ln(), self.tau_s.ln()], -0.3)
             .map_or(*self, |(_, noise)| noise)
     }
 
     /// Whitens a series in place: independent, unit variance; masked rows are 0.
-    pub(crate) fn whiten(&self, t_s: &[f64], masked: &[bool], columns: &mut [&mut [f64]]) {
-        let gains = self.gains(t_s, masked);
+    pub(crate) fn whiten(&self, t_s: &[f64], count: &[f64], columns: &mut [&mut [f64]]) {
+        let gains = self.gains(t_s, count);
         for column in columns {
             let mut mean = 0.0;
             for (k, [decay, gain, weight]) in gains.iter().enumerate() {
                 mean *= decay;
-                if masked[k] {
+                if count[k] <= 0.0 {
                     column[k] = 0.0;
                     continue;
                 }
@@ -145,7 +147,7 @@ impl Coloured {
 struct Likelihood<'a> {
     t_s: &'a [f64],
     y: &'a [f64],
-    masked: &'a [bool],
+    count: &'a [f64],
     rms: f64,
     bounds: [f64; 2],
 }
@@ -173,7 +175,7 @@ impl Likelihood<'_> {
         let solver = NelderMead::new(simplex).with_sd_tolerance(1e-3).ok()?;
         let result = Executor::new(self, solver).configure(|s| s.max_iters(120)).run().ok()?;
         let noise = self.at(&result.state.best_param?);
-        Some((noise.log_likelihood(self.t_s, self.y, self.masked), noise))
+        Some((noise.log_likelihood(self.t_s, self.y, self.count), noise))
     }
 }
 
@@ -182,7 +184,7 @@ impl CostFunction for &Likelihood<'_> {
     type Output = f64;
 
     fn cost(&self, p: &Vec<f64>) -> Result<f64, argmin::core::Error> {
-        Ok(-self.at(p).log_likelihood(self.t_s, self.y, self.masked))
+        Ok(-self.at(p).log_likelihood(self.t_s, self.y, self.count))
     }
 }
 
@@ -216,8 +218,7 @@ mod tests {
         let t_s: Vec<f64> =
             (0..20_000).map(|k| f64::from(k) + if k > 9000 { 500.0 } else { 0.0 }).collect();
         let mut y = series(&noise, &t_s, 11);
-        let masked = vec![false; y.len()];
-        noise.whiten(&t_s, &masked, &mut [&mut y]);
+        noise.whiten(&t_s, &vec![1.0; y.len()], &mut [&mut y]);
         let n = y.len() as f64;
         let square = y.iter().map(|v| v * v).sum::<f64>() / n;
         let lag = y.windows(2).map(|w| w[0] * w[1]).sum::<f64>() / n;
@@ -232,7 +233,7 @@ mod tests {
         let truth = Coloured { white: 0.5, slow: 1.5, tau_s: 40.0 };
         let t_s: Vec<f64> = (0..20_000).map(f64::from).collect();
         let y = series(&truth, &t_s, 5);
-        let found = Coloured::fit(&t_s, &y, &vec![false; y.len()]);
+        let found = Coloured::fit(&t_s, &y, &vec![1.0; y.len()]);
         assert!((found.slow / truth.slow - 1.0).abs() < 5.0 * 0.045, "{found:?}");
         assert!((found.tau_s / truth.tau_s - 1.0).abs() < 5.0 * 0.09, "{found:?}");
         assert!((found.white / truth.white - 1.0).abs() < 0.1, "{found:?}");
@@ -243,7 +244,7 @@ mod tests {
         let truth = Coloured { white: 2.0, slow: 0.0, tau_s: 1.0 };
         let t_s: Vec<f64> = (0..5000).map(f64::from).collect();
         let y = series(&truth, &t_s, 3);
-        let found = Coloured::fit(&t_s, &y, &vec![false; y.len()]);
+        let found = Coloured::fit(&t_s, &y, &vec![1.0; y.len()]);
         let total = found.white.hypot(found.slow);
         assert!((total / 2.0 - 1.0).abs() < 5.0 * (0.5 / 5000.0_f64).sqrt() + 0.02, "{found:?}");
         assert!(found.slow < 0.5 || found.tau_s < 2.0, "{found:?}");

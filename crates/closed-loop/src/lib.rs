@@ -10,6 +10,7 @@
 mod attitude_data;
 mod attitude_loop;
 mod attitude_search;
+mod bins;
 mod close;
 mod coloured;
 mod declared;

@@ -26,6 +26,8 @@ const NAMES: [&str; 6] = [
     "z_sin_arcsec",
 ];
 
+/// A line goes round at least twice in the data: what does not is a drift.
+const FEWEST_CYCLES: u32 = 2;
 /// Frequencies that the catalogue proposes: the first harmonics of the span. A line above them is
 /// found in a spectrum, and [`line_at`] makes its candidate.
 const HARMONICS: u32 = 24;
@@ -72,7 +74,7 @@ impl EffectKind for Kind {
         if !scene.sees_misalignment() || span <= 0.0 {
             return Vec::new();
         }
-        (1..=HARMONICS)
+        (FEWEST_CYCLES..=HARMONICS)
             .map(|k| f64::from(k) / span)
             .take_while(|f| *f < 0.5 / scene.step_s)
             .map(|f| line_at(f, span))
@@ -86,7 +88,7 @@ impl EffectKind for Kind {
 /// wrong frequency would pass for another line.
 pub fn line_at(frequency_hz: f64, span_s: f64) -> Box<dyn Candidate> {
     let bin = 1.0 / span_s;
-    let range = [(frequency_hz - bin).max(0.1 * bin), frequency_hz + bin];
+    let range = [(frequency_hz - bin).max(1.5 * bin), frequency_hz + bin];
     BendingCandidate::boxed(Line {
         frequency_hz,
         range,
