@@ -2,10 +2,29 @@
 //!
 //! Not physics: the interface of the modules below.
 
+use std::collections::HashMap;
+
+use focal_plane::Pixel;
+use rayon::prelude::*;
 use telemetry::WindowTable;
 
 use crate::folds::Folds;
 use crate::star_data::StarData;
+
+use learn::Learned;
+use sample::{Entry, Sample};
+use spline::Grid;
+use window_fit::Pixels;
+
+mod banded;
+mod dark;
+mod geometry;
+mod learn;
+mod pixel_noise;
+mod sample;
+mod spline;
+mod spot;
+mod window_fit;
 
 /// Id of the effect in the catalogue.
 pub(crate) const DARK_MAP: &str = "dark_map";
@@ -16,27 +35,27 @@ pub(crate) const DARK_MAP_FILE: &str = "dark_map.csv";
 
 /// One pixel of a dark map.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct DarkPixel {
+pub(crate) struct DarkPixel {
     /// Centre of the pixel, centred px.
-    pub x_px: f64,
+    pub(crate) x_px: f64,
     /// Centre of the pixel, centred px.
-    pub y_px: f64,
+    pub(crate) y_px: f64,
     /// What it adds to every read-out, in the unit of the windows.
-    pub dn: f64,
+    pub(crate) dn: f64,
     /// 1 sigma of that.
-    pub sigma_dn: f64,
+    pub(crate) sigma_dn: f64,
 }
 
 /// What each detector pixel under the windows adds, by itself, to every read-out.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct DarkMap {
+pub(crate) struct DarkMap {
     /// Every pixel that a window has covered.
-    pub pixels: Vec<DarkPixel>,
+    pub(crate) pixels: Vec<DarkPixel>,
 }
 
 impl DarkMap {
     /// Root mean square of the map about its mean: only contrasts mean anything.
-    pub fn rms_dn(&self) -> f64 {
+    pub(crate) fn rms_dn(&self) -> f64 {
         let n = self.pixels.len().max(1) as f64;
         let mean = self.pixels.iter().map(|p| p.dn).sum::<f64>() / n;
         (self.pixels.iter().map(|p| (p.dn - mean).powi(2)).sum::<f64>() / n).sqrt()
@@ -59,9 +78,130 @@ pub(crate) struct Formed {
     pub(crate) fallback_rows: usize,
 }
 
+/// Knots of a spot, px: fine enough for the sharpest spot that a window samples.
+const KNOTS_PX: f64 = 0.4;
+/// Room beside the largest offset of a pixel from its star, px.
+const MARGIN_PX: f64 = 0.5;
+/// Fewest frames to learn from.
+const MIN_FRAMES: usize = 30;
+
+/// The MAD of a Gaussian times this is its standard deviation.
+pub(crate) const MAD_SCALE: f64 = 1.482_602_218_505_602;
+
+/// Median of the finite values.
+pub(crate) fn robust_median(mut values: Vec<f64>) -> Option<f64> {
+    crate::robust::median(&mut values)
+}
+
 /// Learns dark map and spots from the windows, outside each fold and on all
 /// data, and forms the centroids anew. `None` where the windows do not belong to
 /// the star rows or are too few to learn from.
-pub(crate) fn form(_data: &StarData, _windows: &WindowTable, _folds: &Folds) -> Option<Formed> {
-    None
+pub(crate) fn form(data: &StarData, windows: &WindowTable, folds: &Folds) -> Option<Formed> {
+    let frames = entries(data, windows);
+    if frames.iter().filter(|f| !f.is_empty()).count() < MIN_FRAMES {
+        return None;
+    }
+    let sample = Sample::collect(data.stars.len(), windows.size, &windows.unread, &frames)?;
+    let grid = Grid::new(sample.reach_px() + MARGIN_PX, KNOTS_PX);
+    let length_px = 0.5 * f64::from(data.camera.pixels()[0]);
+    let fold = folds.fold_of_frame();
+    let mut learned: Vec<Learned> = (0..=folds.count)
+        .into_par_iter()
+        .map(|k| {
+            let taken: Vec<usize> = (0..fold.len()).filter(|&f| fold[f] != k).collect();
+            learn::learn(&sample, &taken, grid, length_px, k == folds.count)
+        })
+        .collect();
+    let mut formed = Formed {
+        moments: Vec::new(),
+        fitted: Vec::new(),
+        map: DarkMap::default(),
+        fwhm_px: Vec::new(),
+        fallback_rows: 0,
+    };
+    let table = [data.frames.x_px.clone(), data.frames.y_px.clone()];
+    for one in &learned {
+        let mut pixels = Pixels::default();
+        let (mut moments, mut fitted) = (table.clone(), table.clone());
+        let mut without = data.t_s.len() - sample.windows();
+        for w in 0..sample.windows() {
+            let row = sample.row[w];
+            match (one.moment(&sample, w), one.fitted(&sample, w, &mut pixels)) {
+                (Some(m), Some(f)) => {
+                    for axis in 0..2 {
+                        moments[axis][row] = m[axis];
+                        fitted[axis][row] = f[axis];
+                    }
+                }
+                _ => without += 1,
+            }
+        }
+        formed.fallback_rows = formed.fallback_rows.max(without);
+        formed.moments.push(moments);
+        formed.fitted.push(fitted);
+    }
+    let all = learned.pop()?;
+    formed.fwhm_px = all
+        .spots
+        .iter()
+        .map(|s| if s.psi.is_empty() { f64::NAN } else { spot::fwhm_px(&grid, &s.psi) })
+        .collect();
+    formed.map = map(&sample, &all);
+    Some(formed)
+}
+
+/// The pixels that the windows of all data have seen, in the windows' unit.
+fn map(sample: &Sample, learned: &Learned) -> DarkMap {
+    let pixels = (0..sample.centre.len())
+        .filter(|&p| learned.dark.seen[p])
+        .map(|p| DarkPixel {
+            x_px: sample.centre[p][0],
+            y_px: sample.centre[p][1],
+            dn: learned.dark.value[p] * sample.unit,
+            sigma_dn: learned.dark_sigma[p] * sample.unit,
+        })
+        .collect();
+    DarkMap { pixels }
+}
+
+/// The windows of the star rows, frame by frame; a row without one has no entry.
+fn entries<'a>(data: &StarData, windows: &'a WindowTable) -> Vec<Vec<Entry<'a>>> {
+    let key = |t_s: f64, slot: i32| (t_s.to_bits(), slot);
+    let at: HashMap<(u64, i32), usize> =
+        windows.t_s.iter().zip(&windows.slot).enumerate().map(|(i, (&t, &s))| (key(t, s), i)).collect();
+    // A star hardly moves across the field: one Jacobian serves all its rows.
+    let mean = |star: usize, positions: &[f64]| {
+        let of: Vec<f64> =
+            (0..positions.len()).filter(|&r| data.star[r] == star).map(|r| positions[r]).collect();
+        of.iter().sum::<f64>() / of.len().max(1) as f64
+    };
+    let jacobian: Vec<[[f64; 3]; 2]> = (0..data.stars.len())
+        .map(|s| {
+            let centre = Pixel { x: mean(s, &data.projected[0]), y: mean(s, &data.projected[1]) };
+            data.camera.rotation_jacobian(centre)
+        })
+        .collect();
+    let size = windows.size[0] * windows.size[1];
+    (0..data.frames.frames())
+        .map(|k| {
+            data.frames
+                .rows_of(k)
+                .filter(|&row| !data.outlier[row])
+                .filter_map(|row| {
+                    let i = *at.get(&key(data.t_s[row], data.frames.slot[row]))?;
+                    Some(Entry {
+                        row,
+                        star: data.star[row],
+                        start: [data.frames.x_px[row], data.frames.y_px[row]],
+                        flux: data.frames.flux.as_ref().map(|f| f[row]),
+                        base: [data.projected[0][row], data.projected[1][row]],
+                        jacobian: jacobian[data.star[row]],
+                        corner: [windows.x0_px[i], windows.y0_px[i]],
+                        background: windows.background[i],
+                        values: &windows.pixels[i * size..(i + 1) * size],
+                    })
+                })
+                .collect()
+        })
+        .collect()
 }
