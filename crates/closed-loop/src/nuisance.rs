@@ -4,7 +4,7 @@
 //! misalignment   dx = J(P) theta                    three angles, prior: declared bias, or free
 //! distortion     dx = sum_jk a_jk (x^j y^k - m_jk)  (j,k) != (0,0), m_jk the mean over the field,
 //!                                                   the same for y; prior N(0, s^2) each
-//! directions     dx = f/Z-projection of q (e a + n b)   two angles a star, free
+//! directions     dx = f/Z-projection of q (e a + n b)   two angles a star, prior: a pixel
 //! ```
 //!
 //! The distortion's draw is N(0,1) scaled to sigma_LSF, so the spread of its
@@ -35,6 +35,10 @@ pub(crate) struct StarNuisance {
     distortion: Option<(usize, f64)>,
     /// Stars whose direction is unknown: all or none.
     directions: usize,
+    /// 1 sigma of what the solved directions are off by, arcsec: a pixel. With free
+    /// attitudes some patterns of directions are rotations but for their second
+    /// order; without a bound they run away by tens of pixels on noise alone.
+    direction_sigma: f64,
     moments: Vec<f64>,
 }
 
@@ -55,6 +59,7 @@ impl StarNuisance {
             }),
             distortion,
             directions: if data.free_directions { data.stars.len() } else { 0 },
+            direction_sigma: data.camera.arcsec_per_px()[0],
             moments,
         }
     }
@@ -68,7 +73,8 @@ impl StarNuisance {
         if let Some((_, sigma)) = self.distortion {
             precision.extend(std::iter::repeat_n(1.0 / (sigma * sigma), 2 * (self.moments.len() - 1)));
         }
-        precision.extend(std::iter::repeat_n(0.0, 2 * self.directions));
+        let direction = 1.0 / (self.direction_sigma * self.direction_sigma);
+        precision.extend(std::iter::repeat_n(direction, 2 * self.directions));
         precision
     }
 

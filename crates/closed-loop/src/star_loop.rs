@@ -111,7 +111,8 @@ pub(crate) fn run(situation: &Situation<'_>, progress: &dyn Fn(&str)) -> Result<
     };
     let candidates = || {
         let mut list = catalogue_candidates(&scene);
-        list.retain(|c| c.acts_on_stars());
+        // With raw windows a warm pixel is the dark map's business.
+        list.retain(|c| c.acts_on_stars() && !(formed.is_some() && c.id() == "hot_pixel"));
         list.extend(leftover_terms(situation, &data));
         list
     };

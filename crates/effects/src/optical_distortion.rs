@@ -8,7 +8,8 @@
 //!
 //! The coefficients have no unit (focal length 1). As regressors, k1, k2, p1, p2 enter about the
 //! boresight; to first order a displaced centre of a radial term is itself a decentring one, so cx, cy
-//! are not fitted.
+//! are not fitted. Short star tracks do not tell r^2 from r^4: the candidates are nested sets of terms,
+//! and the data decides how many it supports.
 //!
 //! Source: Brown, "Decentering distortion of lenses", Photogrammetric Engineering 32 (1966) 444.
 
@@ -24,6 +25,9 @@ use crate::{
 
 const ID: &str = "optical_distortion";
 const TERMS: [&str; 4] = ["k1", "k2", "p1", "p2"];
+
+/// Sets of terms that are tried, as indices into [`TERMS`].
+const SETS: [&[usize]; 5] = [&[0], &[2, 3], &[0, 2, 3], &[0, 1], &[0, 1, 2, 3]];
 
 /// Shift at the edge of the field that would not surprise, arcsec.
 const PLAUSIBLE_ARCSEC: f64 = 10.0;
@@ -52,7 +56,7 @@ impl EffectKind for Kind {
     ) -> Result<Box<dyn Effect>, EffectError> {
         let known = ["k1", "k2", "p1", "p2", "cx_px", "cy_px"];
         let reader = Reader::new(ID, parameters, &known)?;
-        let values = reader.axes(TERMS)?;
+        let values = reader.axes(TERMS)?; // terms not given are zero
         let centre = Pixel {
             x: reader.number_or("cx_px", 0.0)?,
             y: reader.number_or("cy_px", 0.0)?,
@@ -60,6 +64,7 @@ impl EffectKind for Kind {
         let brown = Brown {
             camera: surroundings.camera.clone(),
             centre,
+            terms: &[0, 1, 2, 3],
         };
         Ok(Box::new(Shifted::new(brown, values.to_vec())))
     }
@@ -67,11 +72,15 @@ impl EffectKind for Kind {
         if !scene.has_stars {
             return Vec::new();
         }
-        let camera = scene.surroundings.camera.clone();
-        vec![ShiftCandidate::boxed(Brown {
-            camera,
-            centre: Pixel::default(),
-        })]
+        SETS.into_iter()
+            .map(|terms| {
+                ShiftCandidate::boxed(Brown {
+                    camera: scene.surroundings.camera.clone(),
+                    centre: Pixel::default(),
+                    terms,
+                })
+            })
+            .collect()
     }
 }
 
@@ -79,6 +88,8 @@ impl EffectKind for Kind {
 struct Brown {
     camera: Camera,
     centre: Pixel,
+    /// Which of [`TERMS`] it has.
+    terms: &'static [usize],
 }
 
 impl Shift for Brown {
@@ -94,10 +105,9 @@ impl Shift for Brown {
             size / edge.powi(2),
             size / edge.powi(2),
         ];
-        TERMS
-            .into_iter()
-            .zip(plausible)
-            .map(|(n, p)| Coefficient::new(n, "", p))
+        self.terms
+            .iter()
+            .map(|&k| Coefficient::new(TERMS[k], "", plausible[k]))
             .collect()
     }
     fn terms(&self, star: &StarView, out: &mut [[f64; 2]]) {
@@ -109,16 +119,22 @@ impl Shift for Brown {
         let (x, y) = (t.x, t.y);
         let r2 = x * x + y * y;
         let [fx, fy] = self.camera.focal_length_px();
-        out[0] = [fx * x * r2, fy * y * r2];
-        out[1] = [fx * x * r2 * r2, fy * y * r2 * r2];
-        out[2] = [fx * 2.0 * x * y, fy * (r2 + 2.0 * y * y)];
-        out[3] = [fx * (r2 + 2.0 * x * x), fy * 2.0 * x * y];
+        let all = [
+            [fx * x * r2, fy * y * r2],
+            [fx * x * r2 * r2, fy * y * r2 * r2],
+            [fx * 2.0 * x * y, fy * (r2 + 2.0 * y * y)],
+            [fx * (r2 + 2.0 * x * x), fy * 2.0 * x * y],
+        ];
+        for (out, &k) in out.iter_mut().zip(self.terms) {
+            *out = all[k];
+        }
     }
     fn parameters(&self, values: &[f64]) -> Vec<Parameter> {
-        let mut all: Vec<Parameter> = TERMS
-            .into_iter()
+        let mut all: Vec<Parameter> = self
+            .terms
+            .iter()
             .zip(values)
-            .map(|(n, &v)| Parameter::new(n, v, ""))
+            .map(|(&k, &v)| Parameter::new(TERMS[k], v, ""))
             .collect();
         all.push(Parameter::new("cx_px", self.centre.x, "px"));
         all.push(Parameter::new("cy_px", self.centre.y, "px"));
