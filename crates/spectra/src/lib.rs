@@ -1,0 +1,2 @@
+//! Power spectra, coherence and Allan deviation of error series.
+#![forbid(unsafe_code)]
