@@ -14,6 +14,7 @@ use std::ops::Range;
 use effects::{AttitudeRows, Candidate};
 use focal_plane::{ARCSEC_PER_RAD, AttitudeSeries, AttitudeSource, VectorsMut, rotation_vector};
 use nalgebra::{DMatrix, UnitQuaternion};
+use star_tracker::Disturbance;
 
 use crate::bins::Bins;
 use crate::coloured::Coloured;
@@ -68,6 +69,19 @@ impl AttitudeData {
         data
     }
 
+    /// Takes off what a declared effect does to the attitude as a whole.
+    pub(crate) fn subtract(&mut self, effect: &dyn Disturbance) {
+        if !effect.stages().attitude {
+            return;
+        }
+        for (k, &t) in self.t_s.iter().enumerate() {
+            let theta = effect.misalignment_rad(t) * ARCSEC_PER_RAD;
+            for axis in 0..3 {
+                self.theta[axis][k] -= theta[axis];
+            }
+        }
+    }
+
     /// Cuts the bins and counts what counts in them.
     pub(crate) fn rebin(&mut self, folds: &Folds) {
         self.bins = Bins::cut(&self.t_s, folds);
@@ -111,15 +125,15 @@ pub(crate) struct AttitudeEvidence<'a> {
 
 impl AttitudeEvidence<'_> {
     /// Binned residuals with each fold's own constants and amplitudes, as the
-    /// whitening filter wants them, arcsec.
+    /// whitening filter wants them, arcsec. `raw` is [`Self::binned`] of the
+    /// candidates that the amplitudes belong to.
     pub(crate) fn generalised(
         &self,
         folds: &Folds,
-        candidates: &[&dyn Candidate],
+        raw: &DMatrix<f64>,
         amplitudes: &Amplitudes,
     ) -> [Vec<f64>; 3] {
         let m = self.data.bins.rows.len();
-        let raw = self.binned(candidates);
         let mut out: [Vec<f64>; 3] =
             std::array::from_fn(|axis| self.data.binned(axis, &self.data.theta[axis]));
         for (f, bins) in folds.fold_ranges().into_iter().enumerate() {
@@ -169,8 +183,26 @@ impl AttitudeEvidence<'_> {
 }
 
 impl AttitudeEvidence<'_> {
-    /// Constants and candidates averaged over the bins.
-    fn binned(&self, candidates: &[&dyn Candidate]) -> DMatrix<f64> {
+    /// Whitens binned columns, with the residual as the last.
+    pub(crate) fn whitened(&self, binned: &DMatrix<f64>) -> Box<dyn Design + '_> {
+        let (m, width) = (self.data.bins.rows.len(), binned.ncols());
+        let mut columns = binned.clone().insert_column(width, 0.0);
+        for axis in 0..3 {
+            let theta = self.data.binned(axis, &self.data.theta[axis]);
+            columns.view_mut((axis * m, width), (m, 1)).copy_from_slice(&theta);
+            let mut slices: Vec<&mut [f64]> = columns
+                .as_mut_slice()
+                .chunks_exact_mut(3 * m)
+                .map(|column| &mut column[axis * m..(axis + 1) * m])
+                .collect();
+            self.noise[axis].whiten(&self.data.bins.t_s, &self.data.count[axis], &mut slices);
+        }
+        Box::new(WhitenedDesign { data: self.data, columns })
+    }
+
+    /// Constants and candidates averaged over the bins: x, y, z of every bin by
+    /// three constants and the candidates' columns, arcsec.
+    pub(crate) fn binned(&self, candidates: &[&dyn Candidate]) -> DMatrix<f64> {
         let (n, m) = (self.data.t_s.len(), self.data.bins.rows.len());
         let raw = self.raw(0..n, candidates);
         let mut out = DMatrix::zeros(3 * m, raw.ncols());
@@ -222,19 +254,7 @@ impl Evidence for AttitudeEvidence<'_> {
     }
 
     fn design<'a>(&'a self, candidates: &'a [&'a dyn Candidate]) -> Box<dyn Design + 'a> {
-        let m = self.data.bins.rows.len();
-        let mut columns = self.binned(candidates);
-        let width = columns.ncols();
-        columns = columns.insert_column(width, 0.0);
-        for axis in 0..3 {
-            let theta = self.data.binned(axis, &self.data.theta[axis]);
-            columns.view_mut((axis * m, width), (m, 1)).copy_from_slice(&theta);
-            for mut column in columns.column_iter_mut() {
-                let slice = &mut column.as_mut_slice()[axis * m..(axis + 1) * m];
-                self.noise[axis].whiten(&self.data.bins.t_s, &self.data.count[axis], &mut [slice]);
-            }
-        }
-        Box::new(WhitenedDesign { data: self.data, columns })
+        self.whitened(&self.binned(candidates))
     }
 
     /// The constants of the figures are plain means over the other folds: those

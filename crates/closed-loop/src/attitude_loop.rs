@@ -6,7 +6,8 @@ use effects::{Candidate, Scene};
 
 use crate::attitude_search;
 use crate::attitude_data::{AttitudeData, AttitudeEvidence};
-use crate::close::{Closed, catalogue_candidates};
+use crate::close::{Closed, Rival, catalogue_candidates};
+use crate::declared;
 use crate::coloured::Coloured;
 use crate::empirical::{Empirical, Variable};
 use crate::error::CloseError;
@@ -20,8 +21,13 @@ use crate::situation::Situation;
 use crate::star_data::median_step;
 use focal_plane::{AttitudeSource, Series};
 use telemetry::AttitudeResiduals;
-use telemetry::report::{Errors, Report, Rows};
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+use telemetry::report::{Dependence, Errors, Report, Rows, Unattributed};
 
+/// A correlated part below this share of the variance, or that the likelihood
+/// hardly sees, is not worth a word.
+const SLOW_SHARE: f64 = 0.1;
+const SLOW_GAIN: f64 = 20.0;
 /// Fewest frames from which an effect and its noise can both be had.
 const MIN_FRAMES: usize = 20;
 
@@ -37,6 +43,9 @@ pub(crate) fn run(situation: &Situation<'_>, progress: &dyn Fn(&str)) -> Result<
             need: MIN_FRAMES,
             why: "the others lie outside the reference or in its gaps",
         });
+    }
+    for effect in declared::effects(situation)? {
+        data.subtract(effect.as_ref());
     }
     let folds = Folds::cut(data.t_s.len());
     let motion = resolved_motion(situation);
@@ -55,8 +64,31 @@ pub(crate) fn run(situation: &Situation<'_>, progress: &dyn Fn(&str)) -> Result<
     let bins = &data.bins.folds;
     let (found, noise) = attitude_search::search(&with_noise, &data, bins, candidates, start)?;
     let after = residuals(&with_noise(noise), &folds, &found, &found.selection.chosen)?;
+    let mut rivals = Vec::new();
+    for (set, gain) in attitude_search::rivals(&with_noise, &data, bins, &found, noise) {
+        let residual = residuals(&with_noise(noise), &folds, &found, &set)?;
+        rivals.push(Rival {
+            what: names(&found, &set),
+            rms_arcsec: (0..3)
+                .map(|a| figures::rms(&residual.axes[a], &data.outlier[a]).unwrap_or(f64::NAN))
+                .collect(),
+            delta_loglik: gain,
+        });
+    }
     progress("figures");
-    finish(situation, &data, &folds, noise, motion, &found, before, after)
+    finish(situation, &data, &folds, noise, motion, &found, before, after, rivals)
+}
+
+/// What a set of candidates is called.
+fn names(found: &Found, set: &[usize]) -> String {
+    let name = |&g: &usize| {
+        let candidate = &found.candidates[g];
+        candidate.selectors().get("variable").cloned().unwrap_or_else(|| candidate.id().to_owned())
+    };
+    if set.is_empty() {
+        return "declared model".to_owned();
+    }
+    set.iter().map(name).collect::<Vec<_>>().join(" + ")
 }
 
 /// The reference as a motion, where its samples resolve one.
@@ -186,6 +218,41 @@ pub(crate) fn channels_of_interest(
         .map(|(name, series)| (name.clone(), series))
 }
 
+/// A slowly varying part that no term predicts is left too: it shows as noise that
+/// is correlated in time, which the declared model does not have.
+fn slow_leftover(
+    data: &AttitudeData,
+    after: &Residuals,
+    unattributed: &mut Unattributed,
+    left: f64,
+) {
+    let (mut slow, mut whole, mut gain) = (0.0, 0.0, 0.0);
+    for axis in 0..3 {
+        let means = data.binned(axis, &after.axes[axis]);
+        let noise = Coloured::fit(&data.bins.t_s, &means, &data.count[axis]);
+        let white = Coloured { slow: 0.0, white: noise.white.hypot(noise.slow), ..noise };
+        let loglik = |n: &Coloured| n.log_likelihood(&data.bins.t_s, &means, &data.count[axis]);
+        slow += noise.slow * noise.slow;
+        whole += figures::rms(&after.axes[axis], &data.outlier[axis]).map_or(0.0, |r| r * r);
+        gain += (loglik(&noise) - loglik(&white)).max(0.0);
+    }
+    let share = (slow / whole).min(1.0);
+    if share < SLOW_SHARE || gain < SLOW_GAIN {
+        return;
+    }
+    unattributed.present = true;
+    unattributed.variance_fraction = Some(unattributed.variance_fraction.unwrap_or(0.0).max(share * left));
+    unattributed.depends_on.retain(|d| d.variable != "time");
+    let entry = Dependence {
+        variable: "time".to_owned(),
+        variance_explained: share,
+        // two parameters an axis: Wilks
+        p_value: ChiSquared::new(6.0).map_or(1.0, |law| law.sf(2.0 * gain)),
+    };
+    unattributed.depends_on.insert(0, entry);
+    unattributed.depends_on.sort_by(|a, b| b.variance_explained.total_cmp(&a.variance_explained));
+}
+
 fn finish(
     situation: &Situation<'_>,
     data: &AttitudeData,
@@ -195,6 +262,7 @@ fn finish(
     found: &Found,
     before: Residuals,
     after: Residuals,
+    rivals: Vec<Rival>,
 ) -> Result<Closed, CloseError> {
     let chosen = &found.selection.chosen;
     let evidence = evidence(data, situation, noise, motion);
@@ -212,7 +280,10 @@ fn finish(
     let (effects, entries) = figures::effects_found(found, &explained, &situation.surroundings())?;
     let mut model = situation.model.clone();
     model.effects.extend(entries);
-    let unattributed = figures::unattributed(found, last / whole);
+    let mut unattributed = figures::unattributed(found, last / whole);
+    if situation.model.hem.is_none() {
+        slow_leftover(data, &after, &mut unattributed, last / whole);
+    }
     let errors = |r: &Residuals| Errors {
         star_rms_arcsec: None,
         attitude_rms_arcsec: Some(std::array::from_fn(|a| {
@@ -254,6 +325,6 @@ fn finish(
             outlier: outliers,
         }),
         dark_map: None,
-        rivals: Vec::new(),
+        rivals,
     })
 }

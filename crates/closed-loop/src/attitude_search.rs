@@ -15,6 +15,7 @@
 //! Source: Wilks 1938 (likelihood ratio); Cochrane & Orcutt 1949 (the alternation).
 
 use effects::Candidate;
+use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
@@ -24,7 +25,7 @@ use crate::empirical::EMPIRICAL;
 use crate::error::CloseError;
 use crate::evidence::Amplitudes;
 use crate::folds::Folds;
-use crate::search::{Found, Fitted, amplitudes, borrowed, fit, polish};
+use crate::search::{Fitted, Found, amplitudes, borrowed, fit, fit_design, polish};
 use crate::selection::{Judgement, Selection, columns_of};
 
 /// Rounds of generalised least squares and noise fit.
@@ -60,8 +61,15 @@ pub(crate) fn search<'d>(
     let mut banned = vec![false; candidates.len()];
     let mut noise = start;
     loop {
-        let fitted = fit(&with_noise(noise), folds, &borrowed(&candidates))?;
-        let trial = Trial { with_noise, data, folds, fitted: &fitted, candidates: &candidates, noise };
+        let binned = with_noise(noise).binned(&borrowed(&candidates));
+        let fitted = fit_design(
+            &with_noise(noise),
+            with_noise(noise).whitened(&binned).as_ref(),
+            folds,
+            &borrowed(&candidates),
+        )?;
+        let trial =
+            Trial { with_noise, data, folds, fitted: &fitted, candidates: &candidates, binned, noise };
         let base = trial.score(&chosen).ok_or(CloseError::Singular)?;
         let judged: Vec<Judgement> = (0..candidates.len())
             .into_par_iter()
@@ -98,6 +106,48 @@ pub(crate) fn search<'d>(
     }
 }
 
+/// How `first` compares with each housekeeping channel as the cause: alone, and
+/// beside the best of them. Groups of candidates with their out-of-fold gain over
+/// the declared model, nats; the first entry is that model itself.
+pub(crate) fn rivals(
+    with_noise: &WithNoise<'_>,
+    data: &AttitudeData,
+    folds: &Folds,
+    found: &Found,
+    noise: [Coloured; 3],
+) -> Vec<(Vec<usize>, f64)> {
+    let candidates = &found.candidates;
+    let binned = with_noise(noise).binned(&borrowed(candidates));
+    let trial =
+        Trial { with_noise, data, folds, fitted: &found.fitted, candidates, binned, noise };
+    let mut sets: Vec<Vec<usize>> = vec![Vec::new()];
+    sets.extend(found.selection.chosen.first().map(|&g| vec![g]));
+    let channels = (0..candidates.len()).filter(|&g| {
+        candidates[g].id() == EMPIRICAL
+            && candidates[g].selectors().get("variable").is_some_and(|v| v.starts_with("housekeeping:"))
+            && !found.fitted.groups[g].columns.is_empty()
+    });
+    sets.extend(channels.map(|g| vec![g]));
+    let mut scored: Vec<(Vec<usize>, f64)> = sets
+        .into_par_iter()
+        .filter_map(|set| trial.score(&set).map(|s| (set, s.out_of_fold)))
+        .collect();
+    let best = scored
+        .iter()
+        .filter(|(set, _)| set.first().is_some_and(|&g| candidates[g].id() == EMPIRICAL))
+        .max_by(|a, b| a.1.total_cmp(&b.1))
+        .map(|(set, _)| set.clone());
+    if let (Some(&first), Some(best)) = (found.selection.chosen.first(), best) {
+        let both = vec![first, best[0]];
+        scored.extend(trial.score(&both).map(|s| (both, s.out_of_fold)));
+    }
+    let zero = scored.first().map_or(0.0, |s| s.1);
+    for entry in &mut scored {
+        entry.1 -= zero;
+    }
+    scored
+}
+
 /// One list of candidates, ready to be tried in any combination.
 struct Trial<'a, 'd> {
     with_noise: &'a WithNoise<'d>,
@@ -105,6 +155,8 @@ struct Trial<'a, 'd> {
     folds: &'a Folds,
     fitted: &'a Fitted,
     candidates: &'a [Box<dyn Candidate>],
+    /// Columns of all candidates, averaged over the bins.
+    binned: DMatrix<f64>,
     noise: [Coloured; 3],
 }
 
@@ -142,14 +194,16 @@ impl Trial<'_, '_> {
             chosen.iter().map(|&g| self.candidates[g].as_ref()).collect();
         let columns = candidates.iter().map(|c| c.coefficients().len()).sum();
         let all: Vec<usize> = (0..candidates.len()).collect();
+        let binned = self.columns(chosen);
         let mut noise = self.noise;
         let mut last = None;
         for _ in 0..ALTERNATIONS {
             let evidence = (self.with_noise)(noise);
-            let fitted = fit(&evidence, self.folds, &candidates).ok()?;
+            let design = evidence.whitened(&binned);
+            let fitted = fit_design(&evidence, design.as_ref(), self.folds, &candidates).ok()?;
             let set = columns_of(&fitted.groups, &all);
             let estimate = fitted.fits.estimate(&set)?;
-            let residual = self.left(&evidence, &candidates, &fitted, &set, &estimate.value);
+            let residual = self.left(&evidence, &binned, &fitted, &set, &estimate.value);
             noise = std::array::from_fn(|axis| {
                 noise[axis].refit(&self.data.bins.t_s, &residual[axis], &self.data.count[axis])
             });
@@ -164,23 +218,33 @@ impl Trial<'_, '_> {
         }
         let (loglik, credible) = last?;
         let evidence = (self.with_noise)(noise);
-        let fitted = fit(&evidence, self.folds, &candidates).ok()?;
+        let design = evidence.whitened(&binned);
+        let fitted = fit_design(&evidence, design.as_ref(), self.folds, &candidates).ok()?;
         let amplitudes = amplitudes(&fitted, self.folds, &all, columns)?;
-        let predicted = evidence.generalised(self.folds, &candidates, &amplitudes);
+        let predicted = evidence.generalised(self.folds, &binned, &amplitudes);
         Some(Scored { noise, loglik, out_of_fold: self.loglik(&noise, &predicted), credible })
+    }
+
+    /// Binned columns of some candidates, constants first.
+    fn columns(&self, chosen: &[usize]) -> DMatrix<f64> {
+        let mut pick = vec![0, 1, 2];
+        for &g in chosen {
+            let before: usize = self.candidates[..g].iter().map(|c| c.coefficients().len()).sum();
+            pick.extend((0..self.candidates[g].coefficients().len()).map(|j| 3 + before + j));
+        }
+        self.binned.select_columns(&pick)
     }
 
     /// What is left in sample.
     fn left(
         &self,
         evidence: &AttitudeEvidence<'_>,
-        candidates: &[&dyn Candidate],
+        binned: &DMatrix<f64>,
         fitted: &Fitted,
         set: &[usize],
-        value: &nalgebra::DVector<f64>,
+        value: &DVector<f64>,
     ) -> [Vec<f64>; 3] {
-        let columns = candidates.iter().map(|c| c.coefficients().len()).sum();
-        let mut beta = nalgebra::DVector::zeros(columns);
+        let mut beta = DVector::zeros(binned.ncols() - 3);
         for (i, &c) in set.iter().enumerate() {
             beta[c] = value[i];
         }
@@ -189,7 +253,7 @@ impl Trial<'_, '_> {
             nuisance: vec![fitted.fits.nuisance(None, set, value)],
             candidates: vec![beta],
         };
-        evidence.generalised(&one, candidates, &amplitudes)
+        evidence.generalised(&one, binned, &amplitudes)
     }
 
     fn loglik(&self, noise: &[Coloured; 3], residual: &[Vec<f64>; 3]) -> f64 {

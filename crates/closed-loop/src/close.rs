@@ -33,17 +33,17 @@ pub struct Closed {
     pub attitude: Option<AttitudeResiduals>,
     /// The dark map, where one was estimated and adopted.
     pub dark_map: Option<DarkMap>,
-    /// How rival explanations at image level compare, where there are images.
+    /// How rival explanations of the same leftover compare, each by itself.
     pub rivals: Vec<Rival>,
 }
 
-/// One explanation of an image-level leftover beside others.
+/// One explanation of a leftover beside others.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rival {
     /// What was tried: one effect, or several joined by `+`.
     pub what: String,
-    /// Out-of-fold star rms along x and y, arcsec.
-    pub star_rms_arcsec: [f64; 2],
+    /// Out-of-fold rms of each axis, arcsec: x and y of stars, or X, Y, Z of attitudes.
+    pub rms_arcsec: Vec<f64>,
     /// Gain in out-of-fold log-likelihood over the declared model, nats.
     pub delta_loglik: f64,
 }

@@ -92,7 +92,7 @@ fn rivals_of(
         let residual = level.evidence.residuals(folds, &borrowed(phase), &amplitudes);
         rivals.push(Rival {
             what,
-            star_rms_arcsec: figures::star_rms(&residual, data),
+            rms_arcsec: figures::star_rms(&residual, data).to_vec(),
             delta_loglik: loglik,
         });
         Ok(())

@@ -17,13 +17,19 @@ use spline::Grid;
 use window_fit::Pixels;
 
 mod banded;
+mod coupling;
 mod dark;
 mod geometry;
 mod learn;
+mod map;
 mod pixel_noise;
 mod sample;
 mod spline;
 mod spot;
+#[cfg(test)]
+mod synthetic;
+#[cfg(test)]
+mod tests;
 mod window_fit;
 
 /// Id of the effect in the catalogue.
@@ -42,7 +48,7 @@ pub(crate) struct DarkPixel {
     pub(crate) y_px: f64,
     /// What it adds to every read-out, in the unit of the windows.
     pub(crate) dn: f64,
-    /// 1 sigma of that.
+    /// 1 sigma of the pixel against the mean of its surroundings.
     pub(crate) sigma_dn: f64,
 }
 
@@ -103,7 +109,7 @@ pub(crate) fn form(data: &StarData, windows: &WindowTable, folds: &Folds) -> Opt
     }
     let sample = Sample::collect(data.stars.len(), windows.size, &windows.unread, &frames)?;
     let grid = Grid::new(sample.reach_px() + MARGIN_PX, KNOTS_PX);
-    let length_px = 0.5 * f64::from(data.camera.pixels()[0]);
+    let length_px = data.camera.half_size_px().into_iter().fold(0.0, f64::max);
     let fold = folds.fold_of_frame();
     let mut learned: Vec<Learned> = (0..=folds.count)
         .into_par_iter()
@@ -146,22 +152,8 @@ pub(crate) fn form(data: &StarData, windows: &WindowTable, folds: &Folds) -> Opt
         .iter()
         .map(|s| if s.psi.is_empty() { f64::NAN } else { spot::fwhm_px(&grid, &s.psi) })
         .collect();
-    formed.map = map(&sample, &all);
+    formed.map = map::of(&sample, &learned, &all);
     Some(formed)
-}
-
-/// The pixels that the windows of all data have seen, in the windows' unit.
-fn map(sample: &Sample, learned: &Learned) -> DarkMap {
-    let pixels = (0..sample.centre.len())
-        .filter(|&p| learned.dark.seen[p])
-        .map(|p| DarkPixel {
-            x_px: sample.centre[p][0],
-            y_px: sample.centre[p][1],
-            dn: learned.dark.value[p] * sample.unit,
-            sigma_dn: learned.dark_sigma[p] * sample.unit,
-        })
-        .collect();
-    DarkMap { pixels }
 }
 
 /// The windows of the star rows, frame by frame; a row without one has no entry.
@@ -169,36 +161,28 @@ fn entries<'a>(data: &StarData, windows: &'a WindowTable) -> Vec<Vec<Entry<'a>>>
     let key = |t_s: f64, slot: i32| (t_s.to_bits(), slot);
     let at: HashMap<(u64, i32), usize> =
         windows.t_s.iter().zip(&windows.slot).enumerate().map(|(i, (&t, &s))| (key(t, s), i)).collect();
-    // A star hardly moves across the field: one Jacobian serves all its rows.
-    let mean = |star: usize, positions: &[f64]| {
-        let of: Vec<f64> =
-            (0..positions.len()).filter(|&r| data.star[r] == star).map(|r| positions[r]).collect();
-        of.iter().sum::<f64>() / of.len().max(1) as f64
-    };
-    let jacobian: Vec<[[f64; 3]; 2]> = (0..data.stars.len())
-        .map(|s| {
-            let centre = Pixel { x: mean(s, &data.projected[0]), y: mean(s, &data.projected[1]) };
-            data.camera.rotation_jacobian(centre)
-        })
-        .collect();
-    let size = windows.size[0] * windows.size[1];
+    // With directions of its own every star's constant is free, and a distortion
+    // fitted fold by fold would only add steps between the folds.
+    let base = if data.free_directions { &data.projected } else { &data.modelled };
+    // Outliers are kept: a warm pixel that few windows cross looks like one, and
+    // particle hits are left out pixel by pixel.
     (0..data.frames.frames())
         .map(|k| {
             data.frames
                 .rows_of(k)
-                .filter(|&row| !data.outlier[row])
                 .filter_map(|row| {
                     let i = *at.get(&key(data.t_s[row], data.frames.slot[row]))?;
+                    let centre = Pixel { x: base[0][row], y: base[1][row] };
                     Some(Entry {
                         row,
                         star: data.star[row],
                         start: [data.frames.x_px[row], data.frames.y_px[row]],
                         flux: data.frames.flux.as_ref().map(|f| f[row]),
-                        base: [data.projected[0][row], data.projected[1][row]],
-                        jacobian: jacobian[data.star[row]],
+                        base: [centre.x, centre.y],
+                        jacobian: data.camera.rotation_jacobian(centre),
                         corner: [windows.x0_px[i], windows.y0_px[i]],
                         background: windows.background[i],
-                        values: &windows.pixels[i * size..(i + 1) * size],
+                        values: windows.window(i),
                     })
                 })
                 .collect()

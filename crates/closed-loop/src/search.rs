@@ -16,7 +16,7 @@ use crate::error::CloseError;
 use crate::evidence::{Amplitudes, Evidence};
 use crate::fit::{Fits, Layout};
 use crate::folds::Folds;
-use crate::gram::BlockGrams;
+use crate::gram::{BlockGrams, Design};
 use crate::selection::{Group, Selection, columns_of, select};
 
 /// Share of a column's squared length that must survive the nuisance for its
@@ -37,8 +37,6 @@ pub(crate) struct Fitted {
     pub(crate) groups: Vec<Group>,
     /// Independent scalars in the data.
     pub(crate) scalars: f64,
-    /// Noise variance of a scalar without any candidate.
-    pub(crate) variance: f64,
 }
 
 /// Accumulates and eliminates; the noise variance that weighs the priors is
@@ -48,8 +46,17 @@ pub(crate) fn fit(
     folds: &Folds,
     candidates: &[&dyn Candidate],
 ) -> Result<Fitted, CloseError> {
-    let design = evidence.design(candidates);
-    let grams = BlockGrams::accumulate(design.as_ref(), folds);
+    fit_design(evidence, evidence.design(candidates).as_ref(), folds, candidates)
+}
+
+/// As [`fit`], on columns that are there already.
+pub(crate) fn fit_design(
+    evidence: &dyn Evidence,
+    design: &dyn Design,
+    folds: &Folds,
+    candidates: &[&dyn Candidate],
+) -> Result<Fitted, CloseError> {
+    let grams = BlockGrams::accumulate(design, folds);
     let layout = Layout {
         nuisance_precision: evidence.precision(),
         candidates: candidates.iter().map(|c| c.coefficients().len()).sum(),
@@ -84,7 +91,7 @@ pub(crate) fn fit(
         });
         column += p;
     }
-    Ok(Fitted { fits, groups, scalars, variance })
+    Ok(Fitted { fits, groups, scalars })
 }
 
 /// Sizes of a coefficient that are still credible.

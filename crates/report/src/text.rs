@@ -124,16 +124,18 @@ fn rivals(out: &mut String, closed: &Closed) {
     if closed.rivals.is_empty() {
         return;
     }
-    line!(out, "{:<52}{:>9}{:>9}{:>12}", "Rival explanations of the images, out of fold", "x, \"", "y, \"", "gain, nats");
+    let axes: &[&str] = if closed.stars.is_some() { &["x", "y"] } else { &["X", "Y", "Z"] };
+    let mut row = format!("{:<52}", "Rival explanations, rms in arcsec out of fold");
+    for axis in axes {
+        let _ = write!(row, "{axis:>9}");
+    }
+    line!(out, "{row}{:>12}", "gain, nats");
     for rival in &closed.rivals {
-        line!(
-            out,
-            "  {:<50}{:>9.4}{:>9.4}{:>12.1}",
-            rival.what,
-            rival.star_rms_arcsec[0],
-            rival.star_rms_arcsec[1],
-            rival.delta_loglik
-        );
+        let mut row = format!("  {:<50}", rival.what);
+        for rms in &rival.rms_arcsec {
+            let _ = write!(row, "{rms:>9.4}");
+        }
+        line!(out, "{row}{:>12.1}", rival.delta_loglik);
     }
     line!(out);
 }

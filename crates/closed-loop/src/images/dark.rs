@@ -22,9 +22,7 @@
 //! 1992 for tau.
 
 use super::banded::Banded;
-use super::sample::Sample;
-use super::spline::{Grid, ORDER};
-use super::spot::WindowTaps;
+use super::coupling::Coupling;
 use super::robust_median;
 
 /// A dark map under construction.
@@ -49,8 +47,10 @@ impl Dark {
         }
     }
 
-    /// The next map from `sum w (z - B - F psi)` and `sum w` of every pixel.
-    pub(crate) fn update(&mut self, moment: &[f64], weight: &[f64]) {
+    /// The next map from `sum w (z - B - F psi)` and `sum w` of every pixel;
+    /// returns the largest change in units of sqrt(v).
+    pub(crate) fn update(&mut self, moment: &[f64], weight: &[f64]) -> f64 {
+        let mut change = 0.0_f64;
         let prior = 1.0 / self.spread;
         let mut power = 0.0;
         let mut values = Vec::new();
@@ -58,14 +58,16 @@ impl Dark {
             self.seen[p] = weight[p] > 0.0;
             if self.seen[p] {
                 let precision = weight[p] + prior;
-                self.value[p] = (moment[p] / precision).max(0.0);
+                let value = (moment[p] / precision).max(0.0);
+                change = change.max((value - self.value[p]).abs() * precision.sqrt());
+                self.value[p] = value;
                 self.variance[p] = 1.0 / precision;
                 power += self.value[p].powi(2) + self.variance[p];
                 values.push(self.value[p]);
             }
         }
         if values.is_empty() {
-            return;
+            return 0.0;
         }
         self.spread = power / values.len() as f64;
         let typical = robust_median(values).unwrap_or(0.0);
@@ -75,90 +77,50 @@ impl Dark {
                 self.variance[p] = self.spread;
             }
         }
+        change
     }
 }
 
 /// What the uncertainty of one star's spot adds to the variance of each pixel
-/// against the mean of those that the star covers. `precision` is Q of the spot, `variance` v by pixel.
+/// against the mean of those that the star covers. `precision` is Q of the spot,
+/// `variance` v by pixel.
 pub(crate) fn variance_from_spot(
-    grid: &Grid,
-    sample: &Sample,
-    windows: &[usize],
-    flux: &[f64],
-    at: &[[f64; 2]],
-    weight: &[f64],
+    coupling: &Coupling,
     mut precision: Banded,
     variance: &[f64],
 ) -> Vec<(usize, f64)> {
-    // indices of the star's values, by detector pixel
-    let mut values: Vec<[usize; 3]> = Vec::new();
-    for &w in windows {
-        for (k, i) in sample.cells_of(w).enumerate() {
-            if weight[i] > 0.0 {
-                values.push([sample.pixel[i], w, k]);
-            }
-        }
-    }
-    values.sort_unstable();
-    let order = grid.len();
-    let mut dense = vec![0.0; order * order];
+    let order = precision.order;
+    let mut matrix = Banded::zeros(order, order - 1);
     for row in 0..order {
         for offset in 0..=precision.width.min(order - 1 - row) {
-            dense[row * order + row + offset] = *precision.at(row, offset);
+            *matrix.at(row, offset) = *precision.at(row, offset);
         }
     }
-    let mut taps = WindowTaps::default();
-    let mut coupling = |run: &[[usize; 3]], c: &mut [f64]| {
-        c.fill(0.0);
-        for &[_, w, k] in run {
-            taps.set(grid, sample, w, at[w]);
-            let [column, row] = sample.cells[k];
-            let v = weight[sample.cells_of(w).start + k] * flux[w];
-            let (x, y) = (&taps.x[column], &taps.y[row]);
-            for a in 0..ORDER {
-                let start = (x.first + a) * grid.side + y.first;
-                for (t, q) in c[start..start + ORDER].iter_mut().zip(&y.value) {
-                    *t += v * x.value[a] * q;
-                }
-            }
-        }
-    };
-    let runs = || values.chunk_by(|a, b| a[0] == b[0]);
-    let mut c = vec![0.0; order];
     let mut mean = vec![0.0; order];
-    let mut pixels = 0.0;
-    for run in runs() {
-        coupling(run, &mut c);
-        let v = variance[run[0][0]];
-        pixels += 1.0;
-        for i in 0..order {
-            let k = v * c[i];
-            if k == 0.0 {
-                continue;
-            }
-            mean[i] += k;
-            for (t, q) in dense[i * order + i..(i + 1) * order].iter_mut().zip(&c[i..]) {
-                *t -= k * q;
+    let pixels = coupling.pixel.len();
+    for (k, &p) in coupling.pixel.iter().enumerate() {
+        let (index, value) = coupling.row(k);
+        for (n, (&i, vi)) in index.iter().zip(value).enumerate() {
+            let c = variance[p] * vi;
+            mean[i] += c / pixels as f64;
+            for (&j, vj) in index[n..].iter().zip(&value[n..]) {
+                *matrix.at(i, j - i) -= c * vj;
             }
         }
-    }
-    for m in &mut mean {
-        *m /= f64::max(pixels, 1.0);
-    }
-    let mut matrix = Banded::zeros(order, order - 1);
-    for i in 0..order {
-        let row = &dense[i * order + i..(i + 1) * order];
-        matrix.entries[i * order..i * order + row.len()].copy_from_slice(row);
     }
     let Some(factor) = matrix.factor() else { return Vec::new() };
-    runs()
-        .map(|run| {
-            coupling(run, &mut c);
-            let v = variance[run[0][0]];
-            for (c, m) in c.iter_mut().zip(&mean) {
-                *c = v * *c - m;
+    let mut u = vec![0.0; order];
+    (0..pixels)
+        .map(|k| {
+            let p = coupling.pixel[k];
+            for (u, m) in u.iter_mut().zip(&mean) {
+                *u = -m;
             }
-            (run[0][0], factor.quadratic(&mut c))
+            let (index, value) = coupling.row(k);
+            for (&j, v) in index.iter().zip(value) {
+                u[j] += variance[p] * v;
+            }
+            (p, factor.quadratic(&mut u))
         })
         .collect()
 }

@@ -14,20 +14,23 @@
 
 use rayon::prelude::*;
 
-use super::banded::Banded;
+use super::banded::Factor;
+use super::coupling::{self, Coupling};
 use super::dark::{self, Dark};
 use super::geometry::Geometry;
 use super::pixel_noise::{self, MIN_READ_VARIANCE};
 use super::sample::Sample;
 use super::spline::Grid;
-use super::spot;
+use super::spot::{self, Normal};
 use super::window_fit::{self, Fitted, Known, PixelNoise, Pixels};
 use super::{MAD_SCALE, robust_median};
 
 /// Rounds of everything.
 const OUTER: usize = 5;
-/// Rounds of spots and map at fixed positions.
-const INNER: usize = 2;
+/// Most rounds of spots and map at fixed positions, and the change of the map in
+/// its own sigmas that ends them.
+const INNER: usize = 60;
+const STANDS_STILL: f64 = 0.01;
 /// Gauss-Newton steps of a window while learning, and when all else is frozen.
 const LEARNING_STEPS: usize = 3;
 const FINAL_STEPS: usize = 8;
@@ -62,8 +65,8 @@ pub(crate) struct Learned {
     pub(crate) noise: PixelNoise,
     /// Pixels left out as particle hits in the last round.
     pub(crate) clipped: usize,
-    /// 1 sigma of the map with the spots unknown; empty unless asked for.
-    pub(crate) dark_sigma: Vec<f64>,
+    /// Variance of the map with the spots unknown; empty unless asked for.
+    pub(crate) dark_variance: Vec<f64>,
 }
 
 /// State of the alternation, by window and by value.
@@ -84,9 +87,10 @@ pub(crate) fn learn(
     taken: &[usize],
     grid: Grid,
     length_px: f64,
-    with_sigma: bool,
+    with_variance: bool,
 ) -> Learned {
     let windows = usable(sample, taken);
+    let ordered: Vec<_> = windows.par_iter().map(|list| coupling::by_pixel(sample, list)).collect();
     let n = sample.windows();
     let mut state = State {
         fitted: (0..n)
@@ -108,15 +112,15 @@ pub(crate) fn learn(
             b: 1.0,
         },
         clipped: 0,
-        dark_sigma: Vec::new(),
+        dark_variance: Vec::new(),
     };
     let mut star_weight = vec![1.0; sample.stars];
     for outer in 0..OUTER {
         place(sample, taken, &mut state, &star_weight, length_px);
         weigh(sample, &windows, &mut state, learned.noise);
-        let normals = learned.learn_spots_and_dark(sample, &windows, &state);
-        if with_sigma && outer == OUTER - 1 {
-            learned.dark_sigma = learned.marginal_sigma(sample, &windows, &state, &normals);
+        let sums = learned.learn_spots_and_dark(sample, &windows, &ordered, &state);
+        if with_variance && outer == OUTER - 1 {
+            learned.dark_variance = learned.marginal_variance(&sums);
         }
         let weights = learned.fit_windows(sample, &windows, &mut state);
         learned.learn_noise(sample, &windows, &state);
@@ -179,75 +183,58 @@ fn weigh(sample: &Sample, windows: &[Vec<usize>], state: &mut State, noise: Pixe
 }
 
 impl Learned {
-    /// Spots at the given map, the map at these spots, and so on. Returns the
-    /// spots' precisions.
+    /// Spots at the given map, the map at these spots, until both stand still.
+    /// Returns the sums they were made of.
     fn learn_spots_and_dark(
         &mut self,
         sample: &Sample,
         windows: &[Vec<usize>],
+        ordered: &[Vec<[usize; 3]>],
         state: &State,
-    ) -> Vec<Option<Banded>> {
-        let grid = self.grid;
-        let normals: Vec<_> = windows
+    ) -> Vec<(Normal, Coupling)> {
+        let (grid, level) = (self.grid, |w: usize| state.fitted[w].background);
+        let (flux, at, weight) = (&state.flux, &state.at, &state.weight);
+        let sums: Vec<(Normal, Coupling)> = windows
             .par_iter()
-            .map(|list| spot::normal(&grid, sample, list, &state.flux, &state.at, &state.weight))
+            .zip(ordered)
+            .map(|(list, ordered)| {
+                (
+                    spot::normal(&grid, sample, list, flux, at, weight, level),
+                    Coupling::new(&grid, sample, ordered, flux, at, weight, level),
+                )
+            })
             .collect();
-        for inner in 0..INNER {
-            let dark = &self.dark.value;
-            self.spots.par_iter_mut().zip(&normals).zip(windows).for_each(|((spot, normal), list)| {
-                if list.is_empty() {
-                    return;
-                }
-                let mut psi = spot::moment(
-                    &grid, sample, list, &state.flux, &state.at, &state.weight,
-                    |w, i| sample.z[i] - state.fitted[w].background - dark[sample.pixel[i]],
-                );
-                let Some(factor) = normal.factor(&grid, spot.roughness) else { return };
-                factor.solve(&mut psi);
-                if inner + 1 == INNER {
-                    spot.roughness = spot::next_rho(&grid, &factor, &psi);
-                }
-                spot.psi = psi;
-            });
-            self.learn_dark(sample, windows, state);
-        }
-        normals
-            .iter()
-            .zip(&self.spots)
-            .zip(windows)
-            .map(|((n, s), list)| (!list.is_empty()).then(|| n.penalised(&grid, s.roughness)))
-            .collect()
-    }
-
-    fn learn_dark(&mut self, sample: &Sample, windows: &[Vec<usize>], state: &State) {
-        let grid = self.grid;
-        let excess: Vec<Vec<f64>> = windows
+        let factors: Vec<Option<Factor>> = self
+            .spots
             .par_iter()
-            .zip(&self.spots)
-            .map(|(list, spot)| {
-                let mut taps = spot::WindowTaps::default();
-                let mut out = Vec::with_capacity(list.len() * sample.cells.len());
-                for &w in list {
-                    taps.set(&grid, sample, w, state.at[w]);
-                    for (i, &[c, r]) in sample.cells_of(w).zip(&sample.cells) {
-                        let light = state.flux[w] * grid.value(&spot.psi, &taps.x[c], &taps.y[r]);
-                        out.push(sample.z[i] - state.fitted[w].background - light);
-                    }
-                }
-                out
+            .zip(&sums)
+            .map(|(spot, (normal, _))| {
+                let present = !spot.psi.is_empty();
+                present.then(|| normal.factor(&grid, spot.roughness)).flatten()
             })
             .collect();
         let mut moment = vec![0.0; sample.centre.len()];
-        let mut weight = vec![0.0; sample.centre.len()];
-        // in the order of stars and windows, whatever ran first above
-        for (list, excess) in windows.iter().zip(&excess) {
-            let values = list.iter().flat_map(|&w| sample.cells_of(w));
-            for (i, e) in values.zip(excess) {
-                moment[sample.pixel[i]] += state.weight[i] * e;
-                weight[sample.pixel[i]] += state.weight[i];
+        let mut total = vec![0.0; sample.centre.len()];
+        for _ in 0..INNER {
+            moment.fill(0.0);
+            total.fill(0.0);
+            for ((spot, factor), (normal, coupling)) in self.spots.iter_mut().zip(&factors).zip(&sums) {
+                let Some(factor) = factor else { continue };
+                spot.psi.copy_from_slice(&normal.moment);
+                coupling.take_off_dark(&self.dark.value, &mut spot.psi);
+                factor.solve(&mut spot.psi);
+                coupling.tell_pixels(&spot.psi, &mut moment, &mut total);
+            }
+            if self.dark.update(&moment, &total) < STANDS_STILL {
+                break;
             }
         }
-        self.dark.update(&moment, &weight);
+        self.spots.par_iter_mut().zip(&factors).for_each(|(spot, factor)| {
+            if let Some(factor) = factor {
+                spot.roughness = spot::next_rho(&grid, factor, &spot.psi);
+            }
+        });
+        sums
     }
 
     /// Fits every window; returns the stars' weights in the attitude.
@@ -329,36 +316,25 @@ impl Learned {
         }
     }
 
-    /// 1 sigma of the map, uncertainty of the spots included.
-    fn marginal_sigma(
-        &self,
-        sample: &Sample,
-        windows: &[Vec<usize>],
-        state: &State,
-        precisions: &[Option<Banded>],
-    ) -> Vec<f64> {
-        let added: Vec<Vec<(usize, f64)>> = windows
+    /// Variance of the map, uncertainty of the spots included.
+    fn marginal_variance(&self, sums: &[(Normal, Coupling)]) -> Vec<f64> {
+        let added: Vec<Vec<(usize, f64)>> = self
+            .spots
             .par_iter()
-            .zip(precisions)
-            .map(|(list, precision)| match precision {
-                Some(precision) => dark::variance_from_spot(
-                    &self.grid,
-                    sample,
-                    list,
-                    &state.flux,
-                    &state.at,
-                    &state.weight,
-                    precision.clone(),
-                    &self.dark.variance,
-                ),
-                None => Vec::new(),
+            .zip(sums)
+            .map(|(spot, (normal, coupling))| {
+                if spot.psi.is_empty() {
+                    return Vec::new();
+                }
+                let precision = normal.penalised(&self.grid, spot.roughness);
+                dark::variance_from_spot(coupling, precision, &self.dark.variance)
             })
             .collect();
         let mut variance = self.dark.variance.clone();
         for (pixel, extra) in added.iter().flatten() {
             variance[*pixel] += extra;
         }
-        variance.iter().map(|v| v.sqrt()).collect()
+        variance
     }
 
     fn known<'a>(&'a self, star: usize, dark_variance: Option<&'a [f64]>) -> Known<'a> {

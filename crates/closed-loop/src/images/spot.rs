@@ -44,14 +44,17 @@ impl WindowTaps {
     }
 }
 
-/// Sums behind one star's spot: they do not depend on the dark map.
+/// Sums behind one star's spot.
 #[derive(Clone, Debug)]
 pub(crate) struct Normal {
     /// A, bandwidth 3 side + 3.
     band: Banded,
+    /// `sum w F taps (z - B)`.
+    pub(crate) moment: Vec<f64>,
 }
 
-/// Accumulates A over windows of one star. `weight` is 0 for pixels left out.
+/// Accumulates the sums over windows of one star. `weight` is 0 for pixels left
+/// out; `background` by window.
 pub(crate) fn normal(
     grid: &Grid,
     sample: &Sample,
@@ -59,7 +62,9 @@ pub(crate) fn normal(
     flux: &[f64],
     at: &[[f64; 2]],
     weight: &[f64],
+    background: impl Fn(usize) -> f64,
 ) -> Normal {
+    let mut moment = vec![0.0; grid.len()];
     let n = grid.side;
     let last = ORDER - 1;
     // three spare entries before the diagonal take the lower half of the blocks
@@ -69,13 +74,16 @@ pub(crate) fn normal(
     for &w in windows {
         taps.set(grid, sample, w, at[w]);
         let f2 = flux[w] * flux[w];
+        let level = background(w);
         for (i, &[c, r]) in sample.cells_of(w).zip(&sample.cells) {
             let (x, y) = (&taps.x[c], &taps.y[r]);
             let v = weight[i] * f2;
+            let m = weight[i] * flux[w] * (sample.z[i] - level);
             for a in 0..ORDER {
                 for b in 0..ORDER {
                     let vab = v * x.value[a] * y.value[b];
                     let row = (x.first + a) * n + y.first + b;
+                    moment[row] += m * x.value[a] * y.value[b];
                     for c in a..ORDER {
                         let start = row * stride + (c - a) * n + last - b;
                         let k = vab * x.value[c];
@@ -94,36 +102,7 @@ pub(crate) fn normal(
             *band.at(row, offset) = wide[row * stride + last + offset];
         }
     }
-    Normal { band }
-}
-
-/// The right hand side: `sum w F taps t`.
-pub(crate) fn moment(
-    grid: &Grid,
-    sample: &Sample,
-    windows: &[usize],
-    flux: &[f64],
-    at: &[[f64; 2]],
-    weight: &[f64],
-    target: impl Fn(usize, usize) -> f64,
-) -> Vec<f64> {
-    let mut sum = vec![0.0; grid.len()];
-    let mut taps = WindowTaps::default();
-    for &w in windows {
-        taps.set(grid, sample, w, at[w]);
-        for (i, &[c, r]) in sample.cells_of(w).zip(&sample.cells) {
-            let v = weight[i] * flux[w] * target(w, i);
-            let (x, y) = (&taps.x[c], &taps.y[r]);
-            for a in 0..ORDER {
-                let k = v * x.value[a];
-                let start = (x.first + a) * grid.side + y.first;
-                for (t, q) in sum[start..start + ORDER].iter_mut().zip(&y.value) {
-                    *t += k * q;
-                }
-            }
-        }
-    }
-    sum
+    Normal { band, moment }
 }
 
 impl Normal {
