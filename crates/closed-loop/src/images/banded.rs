@@ -27,7 +27,11 @@ pub(crate) struct Factor {
 
 impl Banded {
     pub(crate) fn zeros(order: usize, width: usize) -> Self {
-        Self { order, width, entries: vec![0.0; order * (width + 1)] }
+        Self {
+            order,
+            width,
+            entries: vec![0.0; order * (width + 1)],
+        }
     }
 
     /// Entry of row `row` and column `row + offset`.
@@ -65,7 +69,10 @@ impl Banded {
             }
             row[1..=reach].copy_from_slice(&lower[..reach]);
         }
-        Some(Factor { width: self.width, entries: self.entries })
+        Some(Factor {
+            width: self.width,
+            entries: self.entries,
+        })
     }
 }
 
@@ -159,7 +166,11 @@ mod tests {
         let mut dense = DMatrix::zeros(n, n);
         for i in 0..n {
             for k in 0..=width.min(n - 1 - i) {
-                let v = if k == 0 { 6.0 + i as f64 * 0.1 } else { ((i * 7 + k * 3) as f64).sin() };
+                let v = if k == 0 {
+                    6.0 + i as f64 * 0.1
+                } else {
+                    ((i * 7 + k * 3) as f64).sin()
+                };
                 *band.at(i, k) = v;
                 dense[(i, i + k)] = v;
                 dense[(i + k, i)] = v;

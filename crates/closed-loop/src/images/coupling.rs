@@ -34,7 +34,12 @@ pub(crate) struct Coupling {
 pub(crate) fn by_pixel(sample: &Sample, windows: &[usize]) -> Vec<[usize; 3]> {
     let mut values: Vec<[usize; 3]> = windows
         .iter()
-        .flat_map(|&w| sample.cells_of(w).enumerate().map(move |(k, i)| [sample.pixel[i], w, k]))
+        .flat_map(|&w| {
+            sample
+                .cells_of(w)
+                .enumerate()
+                .map(move |(k, i)| [sample.pixel[i], w, k])
+        })
         .collect();
     values.sort_unstable();
     values
@@ -52,7 +57,10 @@ impl Coupling {
         weight: &[f64],
         background: impl Fn(usize) -> f64,
     ) -> Self {
-        let mut coupling = Self { first: vec![0], ..Self::default() };
+        let mut coupling = Self {
+            first: vec![0],
+            ..Self::default()
+        };
         let mut row = vec![0.0; grid.len()];
         for run in ordered.chunk_by(|a, b| a[0] == b[0]) {
             row.fill(0.0);

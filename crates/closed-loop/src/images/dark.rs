@@ -108,7 +108,9 @@ pub(crate) fn variance_from_spot(
             }
         }
     }
-    let Some(factor) = matrix.factor() else { return Vec::new() };
+    let Some(factor) = matrix.factor() else {
+        return Vec::new();
+    };
     let mut u = vec![0.0; order];
     (0..pixels)
         .map(|k| {

@@ -39,7 +39,10 @@ pub(crate) struct Geometry {
 fn brown(at: [f64; 2], length_px: f64) -> [[f64; 3]; 2] {
     let (x, y) = (at[0] / length_px, at[1] / length_px);
     let r2 = x * x + y * y;
-    [[2.0 * x * y, r2 + 2.0 * x * x, x * r2], [r2 + 2.0 * y * y, 2.0 * x * y, y * r2]]
+    [
+        [2.0 * x * y, r2 + 2.0 * x * x, x * r2],
+        [r2 + 2.0 * y * y, 2.0 * x * y, y * r2],
+    ]
 }
 
 impl Geometry {
@@ -132,8 +135,9 @@ impl Geometry {
                 let b = brown(sample.base[w], self.length_px);
                 let o = brown(self.origin[s], self.length_px);
                 for axis in 0..2 {
-                    let bent: f64 =
-                        (0..3).map(|k| (b[axis][k] - o[axis][k]) * self.distortion[k]).sum();
+                    let bent: f64 = (0..3)
+                        .map(|k| (b[axis][k] - o[axis][k]) * self.distortion[k])
+                        .sum();
                     residual[w][axis] =
                         at[w][axis] - sample.base[w][axis] - self.constant[s][axis] - bent;
                 }
@@ -157,7 +161,9 @@ impl Geometry {
         }
         // Two of three rotations move the image thousands of times more than the
         // third, and with one star the three cannot be told apart.
-        let size = normal.diagonal().map(|v| if v > 0.0 { v.sqrt() } else { 1.0 });
+        let size = normal
+            .diagonal()
+            .map(|v| if v > 0.0 { v.sqrt() } else { 1.0 });
         for i in 0..3 {
             for j in 0..3 {
                 normal[(i, j)] /= size[i] * size[j];
@@ -165,7 +171,9 @@ impl Geometry {
             normal[(i, i)] += 1e-9;
             moment[i] /= size[i];
         }
-        let Some(factor) = normal.cholesky() else { return };
+        let Some(factor) = normal.cholesky() else {
+            return;
+        };
         let rotation = factor.solve(&moment).component_div(&size);
         for w in sample.windows_of(f) {
             for axis in 0..2 {
@@ -189,5 +197,7 @@ fn means(sample: &Sample, taken: &[usize], f: impl Fn(usize) -> [f64; 2]) -> Vec
             *s = [s[0] + v[0], s[1] + v[1], s[2] + 1.0];
         }
     }
-    sum.iter().map(|s| [s[0] / s[2].max(1.0), s[1] / s[2].max(1.0)]).collect()
+    sum.iter()
+        .map(|s| [s[0] / s[2].max(1.0), s[1] / s[2].max(1.0)])
+        .collect()
 }

@@ -90,11 +90,18 @@ pub(crate) fn learn(
     with_variance: bool,
 ) -> Learned {
     let windows = usable(sample, taken);
-    let ordered: Vec<_> = windows.par_iter().map(|list| coupling::by_pixel(sample, list)).collect();
+    let ordered: Vec<_> = windows
+        .par_iter()
+        .map(|list| coupling::by_pixel(sample, list))
+        .collect();
     let n = sample.windows();
     let mut state = State {
         fitted: (0..n)
-            .map(|w| Fitted { at: sample.start[w], flux: sample.flux[w], ..Fitted::default() })
+            .map(|w| Fitted {
+                at: sample.start[w],
+                flux: sample.flux[w],
+                ..Fitted::default()
+            })
             .collect(),
         flux: sample.flux.clone(),
         at: sample.start.clone(),
@@ -105,7 +112,10 @@ pub(crate) fn learn(
     };
     let mut learned = Learned {
         grid,
-        spots: windows.iter().map(|list| first_guess(sample, list, &mut state, &grid)).collect(),
+        spots: windows
+            .iter()
+            .map(|list| first_guess(sample, list, &mut state, &grid))
+            .collect(),
         dark: Dark::none(sample.centre.len()),
         noise: PixelNoise {
             a: (0.1 * robust_median(sample.z.clone()).unwrap_or(0.0)).max(0.0) + 1.0,
@@ -153,7 +163,11 @@ fn first_guess(sample: &Sample, list: &[usize], state: &mut State, grid: &Grid) 
         state.fitted[w].background = background;
     }
     Spot {
-        psi: if list.is_empty() { Vec::new() } else { vec![0.0; grid.len()] },
+        psi: if list.is_empty() {
+            Vec::new()
+        } else {
+            vec![0.0; grid.len()]
+        },
         roughness: ROUGHNESS,
         background,
         background_variance: BACKGROUND_VARIANCE,
@@ -174,10 +188,18 @@ fn place(sample: &Sample, taken: &[usize], state: &mut State, weight: &[f64], le
 
 /// Weights of the values: from the value itself until there is a model.
 fn weigh(sample: &Sample, windows: &[Vec<usize>], state: &mut State, noise: PixelNoise) {
-    let source = if state.model.is_empty() { &sample.z } else { &state.model };
+    let source = if state.model.is_empty() {
+        &sample.z
+    } else {
+        &state.model
+    };
     for &w in windows.iter().flatten() {
         for i in sample.cells_of(w) {
-            state.weight[i] = if state.good[i] { 1.0 / noise.variance(source[i]) } else { 0.0 };
+            state.weight[i] = if state.good[i] {
+                1.0 / noise.variance(source[i])
+            } else {
+                0.0
+            };
         }
     }
 }
@@ -210,7 +232,9 @@ impl Learned {
             .zip(&sums)
             .map(|(spot, (normal, _))| {
                 let present = !spot.psi.is_empty();
-                present.then(|| normal.factor(&grid, spot.roughness)).flatten()
+                present
+                    .then(|| normal.factor(&grid, spot.roughness))
+                    .flatten()
             })
             .collect();
         let mut moment = vec![0.0; sample.centre.len()];
@@ -218,7 +242,9 @@ impl Learned {
         for _ in 0..INNER {
             moment.fill(0.0);
             total.fill(0.0);
-            for ((spot, factor), (normal, coupling)) in self.spots.iter_mut().zip(&factors).zip(&sums) {
+            for ((spot, factor), (normal, coupling)) in
+                self.spots.iter_mut().zip(&factors).zip(&sums)
+            {
                 let Some(factor) = factor else { continue };
                 spot.psi.copy_from_slice(&normal.moment);
                 coupling.take_off_dark(&self.dark.value, &mut spot.psi);
@@ -229,11 +255,14 @@ impl Learned {
                 break;
             }
         }
-        self.spots.par_iter_mut().zip(&factors).for_each(|(spot, factor)| {
-            if let Some(factor) = factor {
-                spot.roughness = spot::next_rho(&grid, factor, &spot.psi);
-            }
-        });
+        self.spots
+            .par_iter_mut()
+            .zip(&factors)
+            .for_each(|(spot, factor)| {
+                if let Some(factor) = factor {
+                    spot.roughness = spot::next_rho(&grid, factor, &spot.psi);
+                }
+            });
         sums
     }
 
@@ -285,7 +314,10 @@ impl Learned {
                 .map(|(f, _)| (f.background - spot.background).powi(2) + f.background_variance);
             spot.background_variance =
                 (spread.sum::<f64>() / list.len() as f64).max(MIN_READ_VARIANCE * self.noise.a);
-            let variances = results.iter().flat_map(|(f, _)| f.position_variance).collect();
+            let variances = results
+                .iter()
+                .flat_map(|(f, _)| f.position_variance)
+                .collect();
             weights[star] = 1.0 / robust_median(variances).unwrap_or(1.0).max(1e-12);
         }
         balanced(weights, windows)
@@ -352,7 +384,12 @@ impl Learned {
     }
 
     /// Position of the star of window `w` by its spot, everything learned frozen.
-    pub(crate) fn fitted(&self, sample: &Sample, w: usize, pixels: &mut Pixels) -> Option<[f64; 2]> {
+    pub(crate) fn fitted(
+        &self,
+        sample: &Sample,
+        w: usize,
+        pixels: &mut Pixels,
+    ) -> Option<[f64; 2]> {
         let star = sample.star[w];
         if self.spots[star].psi.is_empty() {
             return None;

@@ -34,7 +34,9 @@ pub(crate) fn of(sample: &Sample, folds: &[Learned], all: &Learned) -> DarkMap {
     let excess = robust_median(ratios).map_or(1.0, |r| (r / median).max(1.0));
     let variance = |p: usize| {
         let pooled = excess * marginal[p];
-        scatter[p].map_or(pooled, |own| 0.5 * (own + pooled)).max(marginal[p])
+        scatter[p]
+            .map_or(pooled, |own| 0.5 * (own + pooled))
+            .max(marginal[p])
     };
     let pixels = (0..sample.centre.len())
         .filter(|&p| all.dark.seen[p])
@@ -54,7 +56,9 @@ fn jackknife(sample: &Sample, folds: &[Learned]) -> Vec<Option<f64>> {
     if folds.len() < 2 {
         return vec![None; pixels];
     }
-    let shared: Vec<bool> = (0..pixels).map(|p| folds.iter().all(|l| l.dark.seen[p])).collect();
+    let shared: Vec<bool> = (0..pixels)
+        .map(|p| folds.iter().all(|l| l.dark.seen[p]))
+        .collect();
     let owner = owners(sample);
     let maps: Vec<Vec<f64>> = folds
         .iter()
@@ -65,7 +69,9 @@ fn jackknife(sample: &Sample, folds: &[Learned]) -> Vec<Option<f64>> {
                 *s = [s[0] + learned.dark.value[p], s[1] + 1.0];
             }
             let level = |p: usize| sum[owner[p]][0] / f64::max(sum[owner[p]][1], 1.0);
-            (0..pixels).map(|p| learned.dark.value[p] - level(p)).collect()
+            (0..pixels)
+                .map(|p| learned.dark.value[p] - level(p))
+                .collect()
         })
         .collect();
     let n = maps.len() as f64;

@@ -40,8 +40,14 @@ pub(crate) fn fit(mut pairs: Vec<[f64; 2]>) -> Option<PixelNoise> {
     if points.is_empty() {
         return None;
     }
-    let mut weight: Vec<f64> = points.iter().map(|p| 1.0 / p[1].max(MIN_READ_VARIANCE)).collect();
-    let mut noise = PixelNoise { a: MIN_READ_VARIANCE, b: 0.0 };
+    let mut weight: Vec<f64> = points
+        .iter()
+        .map(|p| 1.0 / p[1].max(MIN_READ_VARIANCE))
+        .collect();
+    let mut noise = PixelNoise {
+        a: MIN_READ_VARIANCE,
+        b: 0.0,
+    };
     for _ in 0..REWEIGHTINGS {
         noise = line(&points, &weight);
         for (w, p) in weight.iter_mut().zip(&points) {
@@ -56,14 +62,21 @@ fn line(points: &[[f64; 2]], weight: &[f64]) -> PixelNoise {
     let mut s = [0.0; 5];
     for (p, w) in points.iter().zip(weight) {
         let v = w * w;
-        for (s, t) in s.iter_mut().zip([1.0, p[0], p[0] * p[0], p[1], p[0] * p[1]]) {
+        for (s, t) in s
+            .iter_mut()
+            .zip([1.0, p[0], p[0] * p[0], p[1], p[0] * p[1]])
+        {
             *s += v * t;
         }
     }
     let [n, x, xx, y, xy] = s;
     let determinant = n * xx - x * x;
     // one bin, or one level of light: no slope to be seen
-    let b = if determinant > 1e-12 * n * xx { (n * xy - x * y) / determinant } else { 0.0 };
+    let b = if determinant > 1e-12 * n * xx {
+        (n * xy - x * y) / determinant
+    } else {
+        0.0
+    };
     let b = b.max(0.0);
     let a = ((y - b * x) / n).max(MIN_READ_VARIANCE);
     PixelNoise { a, b }
@@ -71,8 +84,8 @@ fn line(points: &[[f64; 2]], weight: &[f64]) -> PixelNoise {
 
 #[cfg(test)]
 mod tests {
-    use rand_distr::{Distribution, StandardNormal};
     use rand_core::SeedableRng;
+    use rand_distr::{Distribution, StandardNormal};
     use rand_xoshiro::Xoshiro256PlusPlus;
 
     use super::*;

@@ -104,7 +104,10 @@ impl Sample {
             centre: Vec::new(),
             unit: 1.0,
         };
-        let table = frames.iter().flatten().all(|e| e.flux.is_some_and(|f| f.is_finite() && f > 0.0));
+        let table = frames
+            .iter()
+            .flatten()
+            .all(|e| e.flux.is_some_and(|f| f.is_finite() && f > 0.0));
         let mut pixels = Pixels::default();
         for frame in frames {
             for entry in frame {
@@ -114,7 +117,10 @@ impl Sample {
         }
         sample.centre = pixels.centre;
         let sums: Vec<f64> = (0..sample.windows()).map(|w| sample.sum(w)).collect();
-        let (unit, scale) = (robust_median(sums.clone())?, robust_median(sample.flux.clone())?);
+        let (unit, scale) = (
+            robust_median(sums.clone())?,
+            robust_median(sample.flux.clone())?,
+        );
         if !(unit > 0.0 && scale > 0.0) {
             return None;
         }
@@ -130,15 +136,28 @@ impl Sample {
 
     fn push(&mut self, entry: &Entry<'_>, table_flux: bool, pixels: &mut Pixels) {
         let numbers = [entry.start, entry.base, entry.corner];
-        let usable = numbers.as_flattened().iter().all(|v| v.abs() < MAX_PIXEL_INDEX)
+        let usable = numbers
+            .as_flattened()
+            .iter()
+            .all(|v| v.abs() < MAX_PIXEL_INDEX)
             && entry.jacobian.as_flattened().iter().all(|v| v.is_finite());
-        let values = || self.cells.iter().map(|&[c, r]| entry.values[r * self.size[0] + c]);
+        let values = || {
+            self.cells
+                .iter()
+                .map(|&[c, r]| entry.values[r * self.size[0] + c])
+        };
         let read = values().filter(|v| v.is_finite()).count();
         if !usable || 2 * read <= self.cells.len() {
             return;
         }
-        let lowest = values().filter(|v| v.is_finite()).fold(f64::INFINITY, f64::min);
-        let background = if entry.background.is_finite() { entry.background } else { lowest };
+        let lowest = values()
+            .filter(|v| v.is_finite())
+            .fold(f64::INFINITY, f64::min);
+        let background = if entry.background.is_finite() {
+            entry.background
+        } else {
+            lowest
+        };
         let values: Vec<f64> = values().collect();
         let corner = pixels.index(entry.corner);
         for (&[c, r], v) in self.cells.iter().zip(values) {
@@ -156,14 +175,19 @@ impl Sample {
         self.jacobian.push(entry.jacobian);
         self.corner.push(entry.corner);
         let flux = if table_flux { entry.flux } else { None };
-        self.flux.push(flux.unwrap_or_else(|| self.sum(self.row.len() - 1)));
+        self.flux
+            .push(flux.unwrap_or_else(|| self.sum(self.row.len() - 1)));
     }
 
     /// Light in window `w` above its background.
     fn sum(&self, w: usize) -> f64 {
         let cells = self.cells_of(w);
         let (z, valid) = (&self.z[cells.clone()], &self.valid[cells]);
-        z.iter().zip(valid).filter(|(_, v)| **v).map(|(z, _)| z - self.background[w]).sum()
+        z.iter()
+            .zip(valid)
+            .filter(|(_, v)| **v)
+            .map(|(z, _)| z - self.background[w])
+            .sum()
     }
 
     pub(crate) fn windows(&self) -> usize {
@@ -239,7 +263,8 @@ impl Pixels {
     fn number(&mut self, key: [i64; 2]) -> usize {
         let origin = self.origin.unwrap_or_default();
         *self.number.entry(key).or_insert_with(|| {
-            self.centre.push([origin[0] + key[0] as f64, origin[1] + key[1] as f64]);
+            self.centre
+                .push([origin[0] + key[0] as f64, origin[1] + key[1] as f64]);
             self.centre.len() - 1
         })
     }
@@ -271,7 +296,10 @@ mod tests {
             let frames = vec![
                 vec![entry([10.0 + half, -7.0 - half], &values)],
                 Vec::new(),
-                vec![entry([11.0 + half, -7.0 - half], &values), entry([f64::NAN, 0.0], &values)],
+                vec![
+                    entry([11.0 + half, -7.0 - half], &values),
+                    entry([f64::NAN, 0.0], &values),
+                ],
             ];
             let mut unread = vec![false; 6];
             unread[0] = true;
@@ -281,8 +309,14 @@ mod tests {
             assert_eq!(sample.cells, [[1, 0], [2, 0], [0, 1], [1, 1], [2, 1]]);
             // column 2 of the first window is column 1 of the second
             assert_eq!(sample.pixel[1], sample.pixel[5]);
-            assert_eq!(sample.centre[sample.pixel[1]].map(f64::to_bits), [12.0 + half, -7.0 - half].map(f64::to_bits));
-            assert_eq!(sample.valid, [true, true, true, true, false, true, true, true, true, false]);
+            assert_eq!(
+                sample.centre[sample.pixel[1]].map(f64::to_bits),
+                [12.0 + half, -7.0 - half].map(f64::to_bits)
+            );
+            assert_eq!(
+                sample.valid,
+                [true, true, true, true, false, true, true, true, true, false]
+            );
             // 2 + 3 + 4 + 5 above the background, scaled to 10^4
             assert!((sample.unit - 14.0 / FLUX_SCALE).abs() < 1e-15);
             assert!((sample.reach_px() - 1.0).abs() < 1e-12);

@@ -44,7 +44,11 @@ impl Grid {
             reason = "a few intervals: the half width is that of a window"
         )]
         let intervals = (2.0 * half_width_px / spacing_px).ceil() as usize;
-        Self { half_width_px, spacing_px, side: intervals.max(1) + ORDER - 1 }
+        Self {
+            half_width_px,
+            spacing_px,
+            side: intervals.max(1) + ORDER - 1,
+        }
     }
 
     /// Number of coefficients.
@@ -78,7 +82,11 @@ impl Grid {
             (4.0 * s - 3.0 * s * s) * k,
             t * t * k,
         ];
-        Taps { first, value, slope }
+        Taps {
+            first,
+            value,
+            slope,
+        }
     }
 
     /// Value and slope along x and y where two taps cross.
@@ -87,8 +95,10 @@ impl Grid {
         for a in 0..ORDER {
             let start = (x.first + a) * self.side + y.first;
             let g = &coefficients[start..start + ORDER];
-            let value = g[0] * y.value[0] + g[1] * y.value[1] + g[2] * y.value[2] + g[3] * y.value[3];
-            let slope = g[0] * y.slope[0] + g[1] * y.slope[1] + g[2] * y.slope[2] + g[3] * y.slope[3];
+            let value =
+                g[0] * y.value[0] + g[1] * y.value[1] + g[2] * y.value[2] + g[3] * y.value[3];
+            let slope =
+                g[0] * y.slope[0] + g[1] * y.slope[1] + g[2] * y.slope[2] + g[3] * y.slope[3];
             out[0] += x.value[a] * value;
             out[1] += x.slope[a] * value;
             out[2] += x.value[a] * slope;
@@ -102,7 +112,8 @@ impl Grid {
         for a in 0..ORDER {
             let start = (x.first + a) * self.side + y.first;
             let g = &coefficients[start..start + ORDER];
-            let value = g[0] * y.value[0] + g[1] * y.value[1] + g[2] * y.value[2] + g[3] * y.value[3];
+            let value =
+                g[0] * y.value[0] + g[1] * y.value[1] + g[2] * y.value[2] + g[3] * y.value[3];
             out += x.value[a] * value;
         }
         out
@@ -120,8 +131,9 @@ mod tests {
         let grid = Grid::new(3.3, 0.4);
         let f = |x: f64, y: f64| 0.7 + 0.3 * x - 1.1 * y;
         let knot = |j: usize| (j as f64 - 1.0) * grid.spacing_px - grid.half_width_px;
-        let coefficients: Vec<f64> =
-            (0..grid.len()).map(|k| f(knot(k / grid.side), knot(k % grid.side))).collect();
+        let coefficients: Vec<f64> = (0..grid.len())
+            .map(|k| f(knot(k / grid.side), knot(k % grid.side)))
+            .collect();
         for i in 0..50 {
             let (x, y) = (-3.3 + 0.132 * f64::from(i), 3.3 - 0.11 * f64::from(i));
             let [v, gx, gy] = grid.evaluate(&coefficients, &grid.taps(x), &grid.taps(y));
@@ -148,7 +160,10 @@ mod tests {
             }
         }
         let (edge, outside) = (grid.taps(2.0), grid.taps(9.0));
-        assert_eq!(outside.value.map(f64::to_bits), edge.value.map(f64::to_bits));
+        assert_eq!(
+            outside.value.map(f64::to_bits),
+            edge.value.map(f64::to_bits)
+        );
         assert!(outside.slope.iter().all(|s| *s == 0.0));
     }
 }

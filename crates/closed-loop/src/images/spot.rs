@@ -114,7 +114,9 @@ impl Normal {
         for row in 0..grid.len() {
             *band.at(row, 0) += ridge;
         }
-        for_roughness(grid, |row, offset, value| *band.at(row, offset) += value / rho);
+        for_roughness(grid, |row, offset, value| {
+            *band.at(row, offset) += value / rho
+        });
         band
     }
 
@@ -169,8 +171,9 @@ pub(crate) fn fwhm_px(grid: &Grid, psi: &[f64]) -> f64 {
         reason = "a few pixels in twentieths"
     )]
     let half = (grid.half_width_px / step) as usize;
-    let taps: Vec<Taps> =
-        (0..=2 * half).map(|i| grid.taps((i as f64 - half as f64) * step)).collect();
+    let taps: Vec<Taps> = (0..=2 * half)
+        .map(|i| grid.taps((i as f64 - half as f64) * step))
+        .collect();
     let values: Vec<f64> = taps
         .iter()
         .flat_map(|x| taps.iter().map(move |y| (x, y)))
@@ -199,7 +202,9 @@ mod tests {
             sum
         };
         let build = |f: &dyn Fn(f64, f64) -> f64| -> Vec<f64> {
-            (0..grid.len()).map(|k| f((k / n) as f64, (k % n) as f64)).collect()
+            (0..grid.len())
+                .map(|k| f((k / n) as f64, (k % n) as f64))
+                .collect()
         };
         let plane = build(&|x, y| 2.0 + 3.0 * x - y);
         assert!(quadratic(&plane).abs() < 1e-9);

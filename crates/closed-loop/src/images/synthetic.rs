@@ -52,7 +52,10 @@ pub(crate) fn all(_: usize, _: usize) -> bool {
 /// A slow dither, px.
 pub(crate) fn dither(k: usize) -> [f64; 2] {
     let t = k as f64;
-    [3.0 * (t * 0.0317).sin() + 0.8 * (t * 0.211).sin(), 2.6 * (t * 0.0233).cos() + 0.7 * (t * 0.173).cos()]
+    [
+        3.0 * (t * 0.0317).sin() + 0.8 * (t * 0.211).sin(),
+        2.6 * (t * 0.0233).cos() + 0.7 * (t * 0.173).cos(),
+    ]
 }
 
 /// A bundle's stars and windows, and the true positions of its rows.
@@ -82,15 +85,24 @@ impl Scenario<'_> {
                 let at = [star[0] + shift[0], star[1] + shift[1]];
                 let half = (self.size as f64 - 1.0) / 2.0;
                 let corner = at.map(|v| (v - half - self.pixel_centre).round() + self.pixel_centre);
-                let (first, place) =
-                    (Pixel { x: corner[0], y: corner[1] }, Pixel { x: at[0], y: at[1] });
+                let (first, place) = (
+                    Pixel {
+                        x: corner[0],
+                        y: corner[1],
+                    },
+                    Pixel { x: at[0], y: at[1] },
+                );
                 let brightness = FLUX * (1.0 - 0.15 * s as f64);
-                centroid::pixel_gaussian_into(first, self.size, place, SIGMA_PX, brightness, &mut spot)
-                    .unwrap();
+                centroid::pixel_gaussian_into(
+                    first, self.size, place, SIGMA_PX, brightness, &mut spot,
+                )
+                .unwrap();
                 let mut values = Vec::new();
                 for (i, light) in spot.iter().enumerate() {
-                    let centre =
-                        [corner[0] + (i % self.size) as f64, corner[1] + (i / self.size) as f64];
+                    let centre = [
+                        corner[0] + (i % self.size) as f64,
+                        corner[1] + (i / self.size) as f64,
+                    ];
                     let signal = light + BACKGROUND + (self.dark)(centre);
                     let e: f64 = StandardNormal.sample(&mut rng);
                     values.push(signal + (NOISE[0] + NOISE[1] * signal).sqrt() * e);
@@ -135,8 +147,16 @@ impl Scenario<'_> {
             phase: &CentroidError::None,
             effects: &[],
         });
-        assert_eq!(data.t_s.len(), truth[0].len(), "every frame has an attitude");
-        Made { data, windows, truth }
+        assert_eq!(
+            data.t_s.len(),
+            truth[0].len(),
+            "every frame has an attitude"
+        );
+        Made {
+            data,
+            windows,
+            truth,
+        }
     }
 }
 

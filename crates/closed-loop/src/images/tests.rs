@@ -2,12 +2,15 @@
 //!
 //! Not physics: tests.
 
-use super::synthetic::{
-    BACKGROUND, FLUX, Made, Scenario, all, dither, no_hit, nothing, rms,
-};
+use super::synthetic::{BACKGROUND, FLUX, Made, Scenario, all, dither, no_hit, nothing, rms};
 use super::*;
 
-const FIELD: [[f64; 2]; 4] = [[-210.3, 95.2], [180.7, 240.4], [30.1, -190.8], [-60.6, -20.9]];
+const FIELD: [[f64; 2]; 4] = [
+    [-210.3, 95.2],
+    [180.7, 240.4],
+    [30.1, -190.8],
+    [-60.6, -20.9],
+];
 
 fn scenario<'a>() -> Scenario<'a> {
     Scenario {
@@ -24,7 +27,12 @@ fn scenario<'a>() -> Scenario<'a> {
 }
 
 fn formed(made: &Made) -> Formed {
-    form(&made.data, &made.windows, &Folds::cut(made.data.frames.frames())).unwrap()
+    form(
+        &made.data,
+        &made.windows,
+        &Folds::cut(made.data.frames.frames()),
+    )
+    .unwrap()
 }
 
 /// Every row from the variant that was learned outside its fold.
@@ -58,7 +66,9 @@ fn pulls(made: &Made, map: &DarkMap, truth: &dyn Fn([f64; 2]) -> f64) -> Vec<f64
             let star = FIELD[*s];
             (p.x_px - star[0]).powi(2) + (p.y_px - star[1]).powi(2)
         };
-        (0..made.data.stars.len()).min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap()
+        (0..made.data.stars.len())
+            .min_by(|a, b| distance(a).total_cmp(&distance(b)))
+            .unwrap()
     };
     let mut out = Vec::new();
     for s in 0..made.data.stars.len() {
@@ -80,9 +90,18 @@ fn rms_of(values: &[f64]) -> f64 {
 
 #[test]
 fn probe() {
-    for (name, dark) in [("warm", &warm as &dyn Fn([f64; 2]) -> f64), ("none", &nothing)] {
+    for (name, dark) in [
+        ("warm", &warm as &dyn Fn([f64; 2]) -> f64),
+        ("none", &nothing),
+    ] {
         for seed in 0..3 {
-            let made = Scenario { dark, seed, frames: 800, ..scenario() }.make();
+            let made = Scenario {
+                dark,
+                seed,
+                frames: 800,
+                ..scenario()
+            }
+            .make();
             let f = formed(&made);
             let table = [made.data.frames.x_px.clone(), made.data.frames.y_px.clone()];
             let p = pulls(&made, &f.map, dark);
@@ -94,8 +113,13 @@ fn probe() {
                 rms(&made, &table, &|_| true),
                 rms(&made, &out_of_fold(&made, &f.moments), &|_| true),
                 rms(&made, &out_of_fold(&made, &f.fitted), &|_| true),
-                rms_of(&p), q[0], q[n / 2], q[n - 1],
-                f.map.rms_dn(), f.fwhm_px, f.fallback_rows
+                rms_of(&p),
+                q[0],
+                q[n / 2],
+                q[n - 1],
+                f.map.rms_dn(),
+                f.fwhm_px,
+                f.fallback_rows
             );
         }
     }

@@ -101,11 +101,14 @@ pub(crate) fn fit(
         let mut moment = Vector4::<f64>::zeros();
         for (k, (i, &[c, r])) in cells.clone().zip(&sample.cells).enumerate() {
             let [psi, gx, gy] =
-                known.grid.evaluate(known.psi, &pixels.taps.x[c], &pixels.taps.y[r]);
+                known
+                    .grid
+                    .evaluate(known.psi, &pixels.taps.x[c], &pixels.taps.y[r]);
             let dark = sample.pixel[i];
             let model = now.flux * psi + now.background + known.dark[dark];
             let residual = sample.z[i] - model;
-            let variance = known.noise.variance(model) + known.dark_variance.map_or(0.0, |v| v[dark]);
+            let variance =
+                known.noise.variance(model) + known.dark_variance.map_or(0.0, |v| v[dark]);
             pixels.model[k] = model;
             pixels.residual[k] = residual;
             if step > 0 {
