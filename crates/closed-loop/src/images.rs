@@ -22,6 +22,7 @@ mod dark;
 mod geometry;
 mod learn;
 mod map;
+mod moment_level;
 mod pixel_noise;
 mod sample;
 mod spline;
@@ -64,7 +65,13 @@ impl DarkMap {
     pub(crate) fn rms_dn(&self) -> f64 {
         let n = self.pixels.len().max(1) as f64;
         let mean = self.pixels.iter().map(|p| p.dn).sum::<f64>() / n;
-        (self.pixels.iter().map(|p| (p.dn - mean).powi(2)).sum::<f64>() / n).sqrt()
+        (self
+            .pixels
+            .iter()
+            .map(|p| (p.dn - mean).powi(2))
+            .sum::<f64>()
+            / n)
+            .sqrt()
     }
 }
 
@@ -150,7 +157,13 @@ pub(crate) fn form(data: &StarData, windows: &WindowTable, folds: &Folds) -> Opt
     formed.fwhm_px = all
         .spots
         .iter()
-        .map(|s| if s.psi.is_empty() { f64::NAN } else { spot::fwhm_px(&grid, &s.psi) })
+        .map(|s| {
+            if s.psi.is_empty() {
+                f64::NAN
+            } else {
+                spot::fwhm_px(&grid, &s.psi)
+            }
+        })
         .collect();
     formed.map = map::of(&sample, &learned, &all);
     Some(formed)
@@ -159,11 +172,20 @@ pub(crate) fn form(data: &StarData, windows: &WindowTable, folds: &Folds) -> Opt
 /// The windows of the star rows, frame by frame; a row without one has no entry.
 fn entries<'a>(data: &StarData, windows: &'a WindowTable) -> Vec<Vec<Entry<'a>>> {
     let key = |t_s: f64, slot: i32| (t_s.to_bits(), slot);
-    let at: HashMap<(u64, i32), usize> =
-        windows.t_s.iter().zip(&windows.slot).enumerate().map(|(i, (&t, &s))| (key(t, s), i)).collect();
+    let at: HashMap<(u64, i32), usize> = windows
+        .t_s
+        .iter()
+        .zip(&windows.slot)
+        .enumerate()
+        .map(|(i, (&t, &s))| (key(t, s), i))
+        .collect();
     // With directions of its own every star's constant is free, and a distortion
     // fitted fold by fold would only add steps between the folds.
-    let base = if data.free_directions { &data.projected } else { &data.modelled };
+    let base = if data.free_directions {
+        &data.projected
+    } else {
+        &data.modelled
+    };
     // Outliers are kept: a warm pixel that few windows cross looks like one, and
     // particle hits are left out pixel by pixel.
     (0..data.frames.frames())
@@ -172,7 +194,10 @@ fn entries<'a>(data: &StarData, windows: &'a WindowTable) -> Vec<Vec<Entry<'a>>>
                 .rows_of(k)
                 .filter_map(|row| {
                     let i = *at.get(&key(data.t_s[row], data.frames.slot[row]))?;
-                    let centre = Pixel { x: base[0][row], y: base[1][row] };
+                    let centre = Pixel {
+                        x: base[0][row],
+                        y: base[1][row],
+                    };
                     Some(Entry {
                         row,
                         star: data.star[row],

@@ -1,12 +1,16 @@
 //! What each detector pixel adds by itself.
 //!
 //! ```text
-//! D(p) = max(0, sum w (z - B - F psi) / (sum w + 1/tau^2)),   v(p) = 1/(sum w + 1/tau^2)
+//! D(p) = sum w (z - B - F psi) / (sum w + 1/tau^2) - level,   v(p) = 1/(sum w + 1/tau^2)
 //! tau^2 = mean(D^2 + v)     over the pixels seen
 //! ```
 //!
-//! over all windows that cover p, of whatever star. v is the variance with the
-//! spots known. They are not: a pixel that a spot sweeps over shares its signal
+//! over all windows that cover p, of whatever star. The level makes the mean of a
+//! group of pixels zero: a uniform level is a pedestal of the spots or a background
+//! as well, and left free it wanders off, pushed by whichever pixel is at the edge
+//! of what a detector can be. That no pixel is negative is for the finished map.
+//!
+//! v is the variance with the spots known. They are not: a pixel that a spot sweeps over shares its signal
 //! with the spot's shape, and the marginal variance is
 //!
 //! ```text
@@ -23,7 +27,7 @@
 
 use super::banded::Banded;
 use super::coupling::Coupling;
-use super::robust_median;
+use super::sample::{levelled, mean};
 
 /// A dark map under construction.
 #[derive(Clone, Debug)]
@@ -47,36 +51,33 @@ impl Dark {
         }
     }
 
-    /// The next map from `sum w (z - B - F psi)` and `sum w` of every pixel;
-    /// returns the largest change in units of sqrt(v).
-    pub(crate) fn update(&mut self, moment: &[f64], weight: &[f64]) -> f64 {
-        let mut change = 0.0_f64;
+    /// The next map from `sum w (z - B - F psi)` and `sum w` of every pixel of
+    /// groups `group`; returns the largest change in units of sqrt(v).
+    pub(crate) fn update(&mut self, moment: &[f64], weight: &[f64], group: &[usize]) -> f64 {
         let prior = 1.0 / self.spread;
-        let mut power = 0.0;
-        let mut values = Vec::new();
-        for p in 0..self.value.len() {
+        let mut next = vec![0.0; self.value.len()];
+        for p in 0..next.len() {
             self.seen[p] = weight[p] > 0.0;
             if self.seen[p] {
-                let precision = weight[p] + prior;
-                let value = (moment[p] / precision).max(0.0);
-                change = change.max((value - self.value[p]).abs() * precision.sqrt());
-                self.value[p] = value;
-                self.variance[p] = 1.0 / precision;
-                power += self.value[p].powi(2) + self.variance[p];
-                values.push(self.value[p]);
+                self.variance[p] = 1.0 / (weight[p] + prior);
+                next[p] = moment[p] * self.variance[p];
             }
         }
-        if values.is_empty() {
-            return 0.0;
+        next = levelled(&next, group, &self.seen, mean);
+        let (mut change, mut power, mut count) = (0.0_f64, 0.0, 0.0);
+        for p in (0..next.len()).filter(|&p| self.seen[p]) {
+            change = change.max((next[p] - self.value[p]).abs() / self.variance[p].sqrt());
+            power += next[p] * next[p] + self.variance[p];
+            count += 1.0;
         }
-        self.spread = power / values.len() as f64;
-        let typical = robust_median(values).unwrap_or(0.0);
-        for p in 0..self.value.len() {
-            if !self.seen[p] {
-                self.value[p] = typical;
-                self.variance[p] = self.spread;
-            }
+        if count > 0.0 {
+            self.spread = power / count;
         }
+        for p in (0..next.len()).filter(|&p| !self.seen[p]) {
+            next[p] = 0.0;
+            self.variance[p] = self.spread;
+        }
+        self.value = next;
         change
     }
 }

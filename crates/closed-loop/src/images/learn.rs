@@ -18,6 +18,7 @@ use super::banded::Factor;
 use super::coupling::{self, Coupling};
 use super::dark::{self, Dark};
 use super::geometry::Geometry;
+use super::moment_level;
 use super::pixel_noise::{self, MIN_READ_VARIANCE};
 use super::sample::Sample;
 use super::spline::Grid;
@@ -32,8 +33,8 @@ const OUTER: usize = 5;
 const INNER: usize = 60;
 const STANDS_STILL: f64 = 0.01;
 /// Gauss-Newton steps of a window while learning, and when all else is frozen.
-const LEARNING_STEPS: usize = 3;
-const FINAL_STEPS: usize = 8;
+const LEARNING_STEPS: usize = 4;
+const FINAL_STEPS: usize = 16;
 /// Starting values in the scaled unit, each far on the side of knowing nothing:
 /// variance of backgrounds, and variance of the second differences of a spot.
 const BACKGROUND_VARIANCE: f64 = 1e4;
@@ -54,6 +55,8 @@ pub(crate) struct Spot {
     pub(crate) background: f64,
     background_variance: f64,
     scale: f64,
+    /// What is taken off every pixel for a first moment.
+    level: f64,
 }
 
 /// What is learned from some frames.
@@ -136,6 +139,15 @@ pub(crate) fn learn(
         learned.learn_noise(sample, &windows, &state);
         star_weight = weights;
     }
+    let State { at, good, .. } = &state;
+    let level = |(star, list): (usize, &Vec<usize>)| {
+        let spot = &learned.spots[star];
+        moment_level::fit(sample, list, at, good, &learned.dark.value, spot.background)
+    };
+    let levels: Vec<f64> = windows.par_iter().enumerate().map(level).collect();
+    for (spot, level) in learned.spots.iter_mut().zip(levels) {
+        spot.level = level;
+    }
     learned.clipped = windows
         .iter()
         .flatten()
@@ -172,6 +184,7 @@ fn first_guess(sample: &Sample, list: &[usize], state: &mut State, grid: &Grid) 
         background,
         background_variance: BACKGROUND_VARIANCE,
         scale: 1.0,
+        level: background,
     }
 }
 
@@ -251,7 +264,7 @@ impl Learned {
                 factor.solve(&mut spot.psi);
                 coupling.tell_pixels(&spot.psi, &mut moment, &mut total);
             }
-            if self.dark.update(&moment, &total) < STANDS_STILL {
+            if self.dark.update(&moment, &total, &sample.group) < STANDS_STILL {
                 break;
             }
         }
@@ -404,7 +417,7 @@ impl Learned {
         window_fit::fit(&known, sample, w, &start, FINAL_STEPS, pixels).map(|f| f.at)
     }
 
-    /// First moment of window `w`, map and constant background taken off.
+    /// First moment of window `w`, map and a constant level taken off.
     pub(crate) fn moment(&self, sample: &Sample, w: usize) -> Option<[f64; 2]> {
         let spot = &self.spots[sample.star[w]];
         let cells = sample.cells_of(w);
@@ -413,7 +426,7 @@ impl Learned {
         }
         let mut sum = [0.0; 3];
         for (i, &[c, r]) in cells.zip(&sample.cells) {
-            let q = sample.z[i] - spot.background - self.dark.value[sample.pixel[i]];
+            let q = sample.z[i] - spot.level - self.dark.value[sample.pixel[i]];
             sum = [sum[0] + q, sum[1] + q * c as f64, sum[2] + q * r as f64];
         }
         let corner = sample.corner[w];

@@ -11,14 +11,15 @@
 //! switch nor spots that change in time; the jackknife over stretches of time sees
 //! both, with n - 1 degrees of freedom a pixel. k2 is what they say of all pixels
 //! together, and each pixel's own jackknife is drawn half way to it. All maps are
-//! taken against their mean over the pixels that belong to one star: a level there
-//! has no meaning of its own.
+//! taken against their mean over a group of pixels: a level has no meaning of its
+//! own. The finished map counts from the lowest pixels of each group; nothing is
+//! below zero.
 //!
 //! Source: Efron & Stein 1981, Annals of Statistics 9, 586 (jackknife).
 
 use super::learn::Learned;
 use super::robust_median;
-use super::sample::Sample;
+use super::sample::{Sample, levelled, mean};
 use super::{DarkMap, DarkPixel};
 
 /// The map of `all`, its errors from itself and from the `folds` left out in turn.
@@ -38,16 +39,32 @@ pub(crate) fn of(sample: &Sample, folds: &[Learned], all: &Learned) -> DarkMap {
             .map_or(pooled, |own| 0.5 * (own + pooled))
             .max(marginal[p])
     };
+    let value = levelled(&all.dark.value, &sample.group, &all.dark.seen, lowest);
     let pixels = (0..sample.centre.len())
         .filter(|&p| all.dark.seen[p])
         .map(|p| DarkPixel {
             x_px: sample.centre[p][0],
             y_px: sample.centre[p][1],
-            dn: all.dark.value[p] * sample.unit,
+            dn: value[p].max(0.0) * sample.unit,
             sigma_dn: variance(p).sqrt() * sample.unit,
         })
         .collect();
     DarkMap { pixels }
+}
+
+/// Share of the pixels that may lie below the level that counts as dark.
+const LOWEST: f64 = 0.05;
+
+/// The level that counts as dark.
+fn lowest(mut values: Vec<f64>) -> Option<f64> {
+    values.sort_unstable_by(f64::total_cmp);
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a share of a count"
+    )]
+    let index = (LOWEST * values.len() as f64) as usize;
+    values.get(index).copied()
 }
 
 /// Delete-one variance of every pixel that all maps have seen.
@@ -59,20 +76,9 @@ fn jackknife(sample: &Sample, folds: &[Learned]) -> Vec<Option<f64>> {
     let shared: Vec<bool> = (0..pixels)
         .map(|p| folds.iter().all(|l| l.dark.seen[p]))
         .collect();
-    let owner = owners(sample);
     let maps: Vec<Vec<f64>> = folds
         .iter()
-        .map(|learned| {
-            let mut sum = vec![[0.0; 2]; sample.stars];
-            for p in (0..pixels).filter(|&p| shared[p]) {
-                let s = &mut sum[owner[p]];
-                *s = [s[0] + learned.dark.value[p], s[1] + 1.0];
-            }
-            let level = |p: usize| sum[owner[p]][0] / f64::max(sum[owner[p]][1], 1.0);
-            (0..pixels)
-                .map(|p| learned.dark.value[p] - level(p))
-                .collect()
-        })
+        .map(|l| levelled(&l.dark.value, &sample.group, &shared, mean))
         .collect();
     let n = maps.len() as f64;
     (0..pixels)
@@ -82,16 +88,4 @@ fn jackknife(sample: &Sample, folds: &[Learned]) -> Vec<Option<f64>> {
             shared[p].then_some((n - 1.0) / n * square)
         })
         .collect()
-}
-
-/// The first star that covers each pixel.
-pub(crate) fn owners(sample: &Sample) -> Vec<usize> {
-    let mut owner = vec![usize::MAX; sample.centre.len()];
-    for w in 0..sample.windows() {
-        for i in sample.cells_of(w) {
-            let owner = &mut owner[sample.pixel[i]];
-            *owner = (*owner).min(sample.star[w]);
-        }
-    }
-    owner
 }

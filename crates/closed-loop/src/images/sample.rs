@@ -68,6 +68,8 @@ pub(crate) struct Sample {
     pub(crate) pixel: Vec<usize>,
     /// Centre of each detector pixel, px.
     pub(crate) centre: Vec<[f64; 2]>,
+    /// Group of each detector pixel: stars whose windows share pixels share a group.
+    pub(crate) group: Vec<usize>,
     /// Table's unit in a unit of `z`.
     pub(crate) unit: f64,
 }
@@ -102,6 +104,7 @@ impl Sample {
             valid: Vec::new(),
             pixel: Vec::new(),
             centre: Vec::new(),
+            group: Vec::new(),
             unit: 1.0,
         };
         let table = frames
@@ -116,6 +119,7 @@ impl Sample {
             sample.first_window.push(sample.row.len());
         }
         sample.centre = pixels.centre;
+        sample.group = sample.groups();
         let sums: Vec<f64> = (0..sample.windows()).map(|w| sample.sum(w)).collect();
         let (unit, scale) = (
             robust_median(sums.clone())?,
@@ -179,6 +183,30 @@ impl Sample {
             .push(flux.unwrap_or_else(|| self.sum(self.row.len() - 1)));
     }
 
+    /// Groups of pixels, numbered by the first star in them.
+    fn groups(&self) -> Vec<usize> {
+        let mut owner = vec![usize::MAX; self.centre.len()];
+        let mut joined: Vec<usize> = (0..self.stars).collect();
+        let root = |joined: &[usize], mut star: usize| {
+            while joined[star] != star {
+                star = joined[star];
+            }
+            star
+        };
+        for w in 0..self.windows() {
+            let star = self.star[w];
+            for &p in &self.pixel[self.cells_of(w)] {
+                if owner[p] == usize::MAX {
+                    owner[p] = star;
+                } else if owner[p] != star {
+                    let (a, b) = (root(&joined, owner[p]), root(&joined, star));
+                    joined[a.max(b)] = a.min(b);
+                }
+            }
+        }
+        owner.into_iter().map(|star| root(&joined, star)).collect()
+    }
+
     /// Light in window `w` above its background.
     fn sum(&self, w: usize) -> f64 {
         let cells = self.cells_of(w);
@@ -192,10 +220,6 @@ impl Sample {
 
     pub(crate) fn windows(&self) -> usize {
         self.row.len()
-    }
-
-    pub(crate) fn frames(&self) -> usize {
-        self.first_window.len() - 1
     }
 
     /// Indices of the pixels of window `w`.
@@ -268,6 +292,35 @@ impl Pixels {
             self.centre.len() - 1
         })
     }
+}
+
+/// Values by detector pixel, each less `level` of the values of its group that are
+/// `taken`; a group without any keeps its values.
+pub(crate) fn levelled(
+    values: &[f64],
+    group: &[usize],
+    taken: &[bool],
+    level: impl Fn(Vec<f64>) -> Option<f64>,
+) -> Vec<f64> {
+    let groups = group.iter().max().map_or(0, |g| g + 1);
+    let mut members = vec![Vec::new(); groups];
+    for p in (0..values.len()).filter(|&p| taken[p]) {
+        members[group[p]].push(values[p]);
+    }
+    let levels: Vec<f64> = members
+        .into_iter()
+        .map(|m| level(m).unwrap_or(0.0))
+        .collect();
+    values
+        .iter()
+        .zip(group)
+        .map(|(v, &g)| v - levels[g])
+        .collect()
+}
+
+/// The mean, if there is anything to average.
+pub(crate) fn mean(values: Vec<f64>) -> Option<f64> {
+    (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
 }
 
 #[cfg(test)]

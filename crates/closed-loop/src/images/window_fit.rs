@@ -5,11 +5,15 @@
 //! w = 1/var,   var = a + b max(model, 0) + v       v variance of the dark map
 //! ```
 //!
-//! Gauss-Newton; a step of the position is limited, and from the second step on
-//! pixels with `|r| > clip scale sqrt(var)` are left out, decided anew each time:
-//! a particle hit costs its pixel, not the star.
+//! Gauss-Newton with limited steps of the position, in two stages. Far from the
+//! solution every pixel's pull is bounded: `w` times `min(1, c/|chi|)`, with
+//! `chi = r/(scale sqrt(var))`. Near it pixels with `|chi| > clip` are left out, decided
+//! anew each time. A particle hit costs its pixel, not the star; left out from the
+//! start it could take the good pixels with it, as the table's centroid is off by
+//! what the hit did to it.
 //!
-//! Source: Anderson & King 2000, PASP 112, 1360, section 2 (fitting the effective PSF).
+//! Source: Anderson & King 2000, PASP 112, 1360, section 2 (fitting the effective PSF);
+//! Huber 1964, Annals of Mathematical Statistics 35, 73 (bounded pull).
 
 use nalgebra::{Matrix4, Vector4};
 
@@ -23,6 +27,10 @@ const MAX_STEP_PX: f64 = 0.3;
 const SETTLED_PX: f64 = 1e-7;
 /// Multiples of the noise beyond which a pixel is left out.
 const CLIP: f64 = 5.0;
+/// Multiples of the noise beyond which a pixel pulls no harder, far from the solution.
+const BOUND: f64 = 1.5;
+/// A step below this, px, is near the solution.
+const NEAR_PX: f64 = 0.02;
 
 /// Variance of a pixel as a function of what it should read.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -87,13 +95,12 @@ pub(crate) fn fit(
     pixels: &mut Pixels,
 ) -> Option<Fitted> {
     let cells = sample.cells_of(w);
-    pixels.good.clear();
-    pixels.good.extend_from_slice(&sample.valid[cells.clone()]);
+    pixels.good.resize(cells.len(), false);
     pixels.residual.resize(cells.len(), 0.0);
     pixels.model.resize(cells.len(), 0.0);
     let mut now = *start;
     let mut covariance = Matrix4::zeros();
-    let mut settled = false;
+    let (mut near, mut settled) = (false, false);
     for step in 0..=steps {
         pixels.taps.set(known.grid, sample, w, now.at);
         let last = step == steps || settled;
@@ -111,15 +118,19 @@ pub(crate) fn fit(
                 known.noise.variance(model) + known.dark_variance.map_or(0.0, |v| v[dark]);
             pixels.model[k] = model;
             pixels.residual[k] = residual;
-            if step > 0 {
-                let limit = CLIP * known.scale;
-                pixels.good[k] = sample.valid[i] && residual * residual < limit * limit * variance;
-            }
-            if last || !pixels.good[k] {
+            let chi = residual.abs() / (known.scale * variance.sqrt());
+            pixels.good[k] = sample.valid[i] && chi < CLIP;
+            let used = if near {
+                pixels.good[k]
+            } else {
+                sample.valid[i]
+            };
+            if last || !used {
                 continue;
             }
             let column = [psi, 1.0, -now.flux * gx, -now.flux * gy];
-            let weight = 1.0 / variance;
+            let pull = if near { 1.0 } else { (BOUND / chi).min(1.0) };
+            let weight = pull / variance;
             for p in 0..4 {
                 let v = weight * column[p];
                 moment[p] += v * residual;
@@ -146,7 +157,9 @@ pub(crate) fn fit(
         for axis in 0..2 {
             now.at[axis] += d[2 + axis].clamp(-MAX_STEP_PX, MAX_STEP_PX);
         }
-        settled = step > 1 && d[2].abs().max(d[3].abs()) < SETTLED_PX;
+        let moved = d[2].abs().max(d[3].abs());
+        settled = near && moved < SETTLED_PX;
+        near |= moved < NEAR_PX;
     }
     now.background_variance = covariance[(1, 1)];
     now.position_variance = [covariance[(2, 2)], covariance[(3, 3)]];

@@ -1,0 +1,83 @@
+//! The constant level under first moments.
+//!
+//! ```text
+//! e(L) = sum (z - D - L)(p - s) / sum (z - D - L)      over the pixels of a window
+//! L minimises the scatter of e about its mean over the windows of a star
+//! ```
+//!
+//! A level that is left in pulls every first moment towards the middle of its
+//! window, and so does light of the spot beyond the window's edge. Background, dark
+//! level and the spot's own pedestal cannot be told apart; what a first moment needs
+//! is the level at which it follows the star, s the rigid position.
+//!
+//! Source: gain of a truncated first moment, expanded to first order in the level.
+
+use super::sample::Sample;
+
+/// Gauss-Newton steps; the first already lands where the error is linear.
+const STEPS: usize = 5;
+/// Prior standard deviation of the level, in mean signals of a pixel.
+const PRIOR: f64 = 0.2;
+
+/// The level for the star with these windows; windows with particle hits (pixels not
+/// `good`) do not take part.
+pub(crate) fn fit(
+    sample: &Sample,
+    windows: &[usize],
+    at: &[[f64; 2]],
+    good: &[bool],
+    dark: &[f64],
+    start: f64,
+) -> f64 {
+    let n = sample.cells.len() as f64;
+    // light, and moments of light and of a level of one about the star
+    let sums: Vec<[f64; 5]> = windows
+        .iter()
+        .filter(|&&w| good[sample.cells_of(w)].iter().all(|g| *g))
+        .map(|&w| {
+            let mut sum = [0.0; 5];
+            for (i, &[c, r]) in sample.cells_of(w).zip(&sample.cells) {
+                let q = sample.z[i] - dark[sample.pixel[i]];
+                let x = sample.corner[w][0] + c as f64 - at[w][0];
+                let y = sample.corner[w][1] + r as f64 - at[w][1];
+                for (s, t) in sum.iter_mut().zip([q, q * x, q * y, x, y]) {
+                    *s += t;
+                }
+            }
+            sum
+        })
+        .collect();
+    let count = sums.len() as f64;
+    if sums.len() < 3 {
+        return start;
+    }
+    let signal = sums.iter().map(|s| s[0]).sum::<f64>() / (count * n) - start;
+    let mut level = start;
+    for _ in 0..STEPS {
+        let (mut curvature, mut gradient, mut power) = (0.0, 0.0, 0.0);
+        for axis in 0..2 {
+            let point = |s: &[f64; 5]| {
+                let light = s[0] - level * n;
+                let e = (s[1 + axis] - level * s[3 + axis]) / light;
+                [e, (n * e - s[3 + axis]) / light]
+            };
+            let mean = sums
+                .iter()
+                .map(point)
+                .fold([0.0; 2], |m, p| [m[0] + p[0], m[1] + p[1]]);
+            for p in sums.iter().map(point) {
+                let (e, d) = (p[0] - mean[0] / count, p[1] - mean[1] / count);
+                curvature += d * d;
+                gradient += d * e;
+                power += e * e;
+            }
+        }
+        let prior = power / (2.0 * count) / (PRIOR * signal).powi(2);
+        let step = -(gradient + prior * (level - start)) / (curvature + prior);
+        if !step.is_finite() {
+            return start;
+        }
+        level += step.clamp(-PRIOR * signal.abs(), PRIOR * signal.abs());
+    }
+    level
+}
