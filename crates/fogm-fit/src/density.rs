@@ -135,24 +135,38 @@ impl Step {
         self.one_minus_a2 / self.distance2(bin)
     }
 
-    /// The same as seen through a rectangular window of n samples.
-    pub(crate) fn gain_of_window(self, bin: Bin, n: f64) -> f64 {
+    /// What a rectangular window of `n` samples takes from `gain`: `end` is `1 - z^n`, complex.
+    fn leak(self, bin: Bin, n: f64, end: (f64, f64)) -> f64 {
         let d2 = self.distance2(bin);
-        // z (1 - z^n) (1 - z*)^2 / |1 - z|^4, real part
-        let angle = 2.0 * PI * (bin.cycles * n).fract();
+        // Re[z (1 - z^n) (1 - z*)^2] / |1 - z|^4
+        let z = (self.a * bin.cos, self.a * bin.sin);
+        let r = (self.one_minus_a + 2.0 * self.a * bin.sin2_half, z.1);
+        let square = (r.0 * r.0 - r.1 * r.1, 2.0 * r.0 * r.1);
+        let zt = (z.0 * end.0 - z.1 * end.1, z.0 * end.1 + z.1 * end.0);
+        2.0 / n * (zt.0 * square.0 - zt.1 * square.1) / (d2 * d2)
+    }
+
+    /// Expected periodogram of unit variance in units of 2/fs.
+    fn gain_of_window(self, bin: Bin, n: f64) -> f64 {
+        let angle = TAU * (bin.cycles * n).fract();
         let decayed = (-self.x * n).exp();
-        // 1 - z^n: real part by exp_m1 and a half angle
         let half = (0.5 * angle).sin();
-        let top = (
-            -(-self.x * n).exp_m1() + 2.0 * decayed * half * half,
+        let end = (
+            self.end_of(n) + 2.0 * decayed * half * half,
             -decayed * angle.sin(),
         );
-        let z = (self.a * bin.cos, self.a * bin.sin);
-        let r = (self.one_minus_a + 2.0 * self.a * bin.sin2_half, z.1); // 1 - z* = (1 - a cos) + i a sin
-        let square = (r.0 * r.0 - r.1 * r.1, 2.0 * r.0 * r.1);
-        let zt = (z.0 * top.0 - z.1 * top.1, z.0 * top.1 + z.1 * top.0);
-        let leak = (zt.0 * square.0 - zt.1 * square.1) / (d2 * d2);
-        self.one_minus_a2 / d2 - 2.0 / n * leak
+        self.gain(bin) - self.leak(bin, n, end)
+    }
+
+    /// The same at a multiple of fs/n, where `1 - z^n` is `end`.
+    #[cfg(feature = "fit")]
+    pub(crate) fn gain_on_grid(self, bin: Bin, n: f64, end: f64) -> f64 {
+        self.gain(bin) - self.leak(bin, n, (end, 0.0))
+    }
+
+    /// 1 - a^n.
+    pub(crate) fn end_of(self, n: f64) -> f64 {
+        -(-self.x * n).exp_m1()
     }
 }
 

@@ -31,7 +31,7 @@ use crate::{Convention, FogmError};
 use bins::{Bins, Chosen};
 use exact::Exact;
 use likelihood::{Likelihood, Logs, place_of};
-use surface::{Best, DROP, Plane, Region};
+use surface::{Best, Plane, Region};
 use whittle::Whittle;
 
 pub use estimate::{Estimate, Reason};
@@ -185,7 +185,7 @@ pub fn fit_series(y: &[f64], fs_hz: f64, options: &FitOptions) -> Result<Fit, Fo
     let plane = Plane::new(1.0 / fs_hz, y.len() as f64 / fs_hz);
     let second = best_of_spectrum(&whittle, &plane, &log_psd);
     if !options.all_frequencies() {
-        let region = surface::region(&whittle, &plane, second, DROP);
+        let region = surface::region(&whittle, &plane, second);
         return Ok(report(
             &whittle,
             whittle.white(),
@@ -208,7 +208,7 @@ pub fn fit_series(y: &[f64], fs_hz: f64, options: &FitOptions) -> Result<Fit, Fo
         options.mean == Mean::Free,
     );
     let best = surface::climb(&exact, &plane, second.place);
-    let region = surface::region(&exact, &plane, best, DROP);
+    let region = surface::region(&exact, &plane, best);
     Ok(report(
         &exact,
         exact.white(),
@@ -236,7 +236,7 @@ pub fn fit_psd(psd: &Psd, options: &FitOptions) -> Result<Fit, FogmError> {
     let whittle = Whittle::new(&bins, correlation);
     let plane = Plane::new(1.0 / bins.fs_hz, 1.0 / bins.samples[0].frequency_hz);
     let best = best_of_spectrum(&whittle, &plane, &log_psd);
-    let region = surface::region(&whittle, &plane, best, DROP);
+    let region = surface::region(&whittle, &plane, best);
     Ok(report(
         &whittle,
         whittle.white(),
@@ -273,7 +273,7 @@ fn report<L: Likelihood>(
     log_psd: LogPsdFit,
 ) -> Fit {
     let logs = surface::logs_at(region.best, plane);
-    let fogm = surface::fogm_alone(likelihood, plane, region.best.place.x).ln_l;
+    let fogm = surface::fogm_alone(likelihood, plane, None).ln_l;
     // as many independent numbers as the weight says
     let ln_n = (2.0 * likelihood.weight()).ln();
     let choice = choose([white, fogm, region.best.ln_l], ln_n);

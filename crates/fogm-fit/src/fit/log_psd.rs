@@ -25,13 +25,17 @@ use super::bins::Bins;
 use super::estimate::{Estimate, Reason};
 use super::information::inverse;
 use super::likelihood::Logs;
+use crate::density::{Bin, Step, as_printed};
 use crate::process::{Fogm, FogmWhite};
-use crate::{Convention, Density, FitOptions, FogmError};
+use crate::{Convention, FitOptions, FogmError};
 
 /// Correlation times from which the search starts.
 const STARTS: usize = 5;
-/// Steps of one search, at most.
-const STEPS: u64 = 800;
+/// Steps from each of them, and from the best of all, at most.
+const FIRST_STEPS: u64 = 40;
+const STEPS: u64 = 500;
+/// Scatter of the cost over the simplex at which the search ends; 1 is the scatter of the data.
+const TOLERANCE: f64 = 1e-9;
 /// An error of the logarithm above which a parameter counts as not determined.
 const HOPELESS: f64 = 1.0;
 /// Distance from a bound, in logarithm, at which a parameter counts as lying on it.
@@ -84,45 +88,32 @@ pub(crate) fn fit_bins(
     correlation: f64,
 ) -> Result<LogPsdFit, FogmError> {
     let problem = LogCost::new(bins, convention);
-    let (mut best, mut cost) = ([0.0; 3], f64::INFINITY);
-    for start in problem.starts() {
-        let found = Executor::new(problem.clone(), NelderMead::new(problem.simplex(start)))
-            .configure(|state| state.max_iters(STEPS))
-            .run();
-        let Ok(result) = found else { continue };
-        let state = result.state();
-        if let Some(parameters) = state.get_best_param()
-            && state.get_best_cost() < cost
-        {
-            cost = state.get_best_cost();
-            best = problem.inside(parameters);
-        }
-    }
-    if !cost.is_finite() {
-        return Err(FogmError::NotConverged);
-    }
-    Ok(problem.report(best, correlation))
+    let first = problem
+        .starts()
+        .into_iter()
+        .filter_map(|start| problem.search(problem.free(start), FIRST_STEPS))
+        .min_by(|a, b| a.1.total_cmp(&b.1))
+        .ok_or(FogmError::NotConverged)?;
+    let (best, _) = problem
+        .search(first.0, STEPS)
+        .ok_or(FogmError::NotConverged)?;
+    Ok(problem.report(problem.inside(&best), correlation))
 }
 
 /// The cost as argmin sees it.
 #[derive(Clone, Debug)]
 struct LogCost {
     fs_hz: f64,
-    density: Density,
     convention: Convention,
     /// Frequency, unbiased logarithm, weight and variance of each bin.
     bins: Vec<[f64; 4]>,
     bounds: [[f64; 2]; 3],
     window: Option<f64>,
-    places: Vec<crate::density::Bin>,
+    places: Vec<Bin>,
 }
 
 impl LogCost {
     fn new(bins: &Bins, convention: Convention) -> Self {
-        let density = match convention {
-            Convention::AsPrinted => Density::AsPrinted,
-            Convention::Consistent => Density::Sampled,
-        };
         let rows = bins.samples.iter().map(|s| {
             let variance = log_variance(s.dof);
             match convention {
@@ -148,7 +139,6 @@ impl LogCost {
         let span = bins.window.map_or(1.0 / first, |n| n / bins.fs_hz);
         Self {
             fs_hz: bins.fs_hz,
-            density,
             convention,
             bins: rows.collect(),
             bounds: [
@@ -200,8 +190,22 @@ impl LogCost {
             .collect()
     }
 
-    fn simplex(&self, start: Logs) -> Vec<Vec<f64>> {
-        let origin = self.free(start);
+    /// Where Nelder and Mead's method ends, and the cost there; `None` unless finite.
+    fn search(&self, origin: Vec<f64>, steps: u64) -> Option<(Vec<f64>, f64)> {
+        let solver = NelderMead::new(Self::simplex(origin))
+            .with_sd_tolerance(TOLERANCE)
+            .ok()?;
+        let result = Executor::new(self, solver)
+            .configure(|state| state.max_iters(steps))
+            .run()
+            .ok()?;
+        let state = result.state();
+        let cost = state.get_best_cost();
+        let best = state.get_best_param()?.clone();
+        cost.is_finite().then_some((best, cost))
+    }
+
+    fn simplex(origin: Vec<f64>) -> Vec<Vec<f64>> {
         let mut simplex = vec![origin.clone()];
         for i in 0..3 {
             let mut corner = origin.clone();
@@ -211,28 +215,35 @@ impl LogCost {
         simplex
     }
 
-    fn process(logs: Logs) -> Option<FogmWhite> {
-        let fogm = Fogm::new(logs[0].exp(), logs[1].exp()).ok()?;
-        FogmWhite::new(fogm, logs[2].exp()).ok()
-    }
-
-    fn log_density(&self, logs: Logs, k: usize) -> f64 {
-        match self.window {
-            Some(n) => {
-                let step = crate::density::Step::new((-logs[1]).exp() / self.fs_hz);
-                let fogm = (2.0 * logs[0]).exp() * step.gain_of_window(self.places[k], n);
-                (2.0 / self.fs_hz * (fogm + (2.0 * logs[2]).exp())).ln()
+    /// The log of the density at the bins, for these parameters.
+    fn log_density(&self, logs: Logs) -> impl Fn(usize) -> f64 {
+        let [sigma, tau, white] = logs.map(f64::exp);
+        let step = Step::new(1.0 / (tau * self.fs_hz));
+        let scale = 2.0 / self.fs_hz;
+        let window = self.window.map(|n| (n, step.end_of(n)));
+        // Fogm checks its parameters, which bounds have done already here
+        let printed = Fogm::new(sigma, tau).and_then(|fogm| FogmWhite::new(fogm, white));
+        move |k| match (self.convention, window, &printed) {
+            (Convention::AsPrinted, _, Ok(process)) => {
+                as_printed(*process, self.bins[k][0], self.fs_hz).ln()
             }
-            None => Self::process(logs).map_or(f64::NAN, |p| {
-                self.density.at(p, self.bins[k][0], self.fs_hz).ln()
-            }),
+            (Convention::AsPrinted, _, Err(_)) => f64::NAN,
+            (Convention::Consistent, Some((n, end)), _) => {
+                let gain = step.gain_on_grid(self.places[k], n, end);
+                (scale * (sigma * sigma * gain + white * white)).ln()
+            }
+            (Convention::Consistent, None, _) => {
+                let gain = step.gain(self.places[k]);
+                (scale * (sigma * sigma * gain + white * white)).ln()
+            }
         }
     }
 
     fn value(&self, logs: Logs) -> f64 {
+        let model = self.log_density(logs);
         (0..self.bins.len())
             .map(|k| {
-                let e = self.log_density(logs, k) - self.bins[k][1];
+                let e = model(k) - self.bins[k][1];
                 self.bins[k][2] * e * e
             })
             .sum()
@@ -245,16 +256,17 @@ impl LogCost {
             let (mut up, mut down) = (logs, logs);
             up[i] += h;
             down[i] -= h;
-            (self.log_density(up, k) - self.log_density(down, k)) / (2.0 * h)
+            (self.log_density(up)(k) - self.log_density(down)(k)) / (2.0 * h)
         })
     }
 
     fn report(&self, logs: Logs, correlation: f64) -> LogPsdFit {
         let (mut h, mut v) = ([[0.0; 3]; 3], [[0.0; 3]; 3]);
         let mut chi2 = 0.0;
+        let model = self.log_density(logs);
         for (k, [_, y, weight, variance]) in self.bins.iter().enumerate() {
             let g = self.slope(logs, k);
-            let e = self.log_density(logs, k) - y;
+            let e = model(k) - y;
             chi2 += e * e / variance;
             for i in 0..3 {
                 for j in 0..3 {
@@ -306,7 +318,7 @@ impl LogCost {
     }
 }
 
-impl CostFunction for LogCost {
+impl CostFunction for &LogCost {
     type Param = Vec<f64>;
     type Output = f64;
 

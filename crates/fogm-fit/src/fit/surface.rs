@@ -17,8 +17,11 @@ use super::likelihood::{LANES, Likelihood, Logs, Place, logs_of};
 
 /// Half of the 95 % point of chi-square with one degree of freedom.
 pub(crate) const DROP: f64 = 1.920_729_410_347_062;
-/// How far below the column's best its sampling goes.
-const DEPTH: f64 = 3.0;
+/// The same for 99 %: beyond this a region must still be closed for a parameter to count as
+/// estimated.
+pub(crate) const CLOSED: f64 = 3.317_448_300_510_389;
+/// Distance of nodes in natural widths of a column.
+const SPACING: f64 = 0.75;
 /// Columns on either side of the maximum, at most.
 const COLUMNS: usize = 60;
 
@@ -180,91 +183,146 @@ fn downhill(gradient: [f64; 2], [xx, xu, uu]: [f64; 3]) -> [f64; 2] {
 struct Column {
     x: f64,
     best: Best,
-    nodes: Vec<(f64, f64, f64)>,
+    nodes: Vec<Node>,
 }
 
-fn column<L: Likelihood>(likelihood: &L, plane: &Plane, x: f64, guess: f64, width: f64) -> Column {
-    let along = |us: [f64; LANES]| us.map(|u| plane.clip(Place { x, u }));
-    let (mut centre, mut d) = (guess.clamp(plane.u[0], plane.u[1]), width);
-    let mut best: Option<Best> = None;
-    for _ in 0..12 {
-        let places = along(std::array::from_fn(|l| centre + d * (l as f64 - 3.5) * 0.8));
-        let values = likelihood.profile(&places);
-        let here = best_of(&places, &values);
-        if best.is_none_or(|b| here.ln_l > b.ln_l) {
-            best = Some(here);
+/// u, ln L and the log of the best scale.
+type Node = (f64, f64, f64);
+
+/// The cut at `x`, searched from `guess` with nodes `width` apart, down to `floor` or the edges.
+fn column<L: Likelihood>(
+    likelihood: &L,
+    plane: &Plane,
+    x: f64,
+    guess: f64,
+    width: f64,
+    floor: f64,
+) -> Column {
+    let mut nodes = vec![];
+    let mut add = |us: [f64; LANES]| {
+        let places = us.map(|u| plane.clip(Place { x, u }));
+        for (place, (ln_l, ln_v)) in places.iter().zip(likelihood.profile(&places)) {
+            if ln_l.is_finite() {
+                nodes.push((place.u, ln_l, ln_v));
+            }
         }
-        let l = (0..LANES)
-            .max_by(|a, b| values[*a].0.total_cmp(&values[*b].0))
-            .unwrap_or(0);
-        if l == 0 || l == LANES - 1 {
-            let at_edge = here.place.u <= plane.u[0] || here.place.u >= plane.u[1];
-            centre = here.place.u;
-            if at_edge && d > 1.0 {
+        nodes.sort_by(|a: &Node, b: &Node| a.0.total_cmp(&b.0));
+        nodes.dedup_by(|a, b| a.0 - b.0 < 1e-12);
+        nodes.clone()
+    };
+    let around =
+        |centre: f64, d: f64| std::array::from_fn(|l| centre + SPACING * d * (l as f64 - 3.5));
+    let mut d = width;
+    let mut all = add(around(guess.clamp(plane.u[0], plane.u[1]), d));
+    for _ in 0..12 {
+        let Some((u, natural)) = vertex(&all) else {
+            // the best is the last node: go on beyond it, unless the plane ends there
+            let top = highest(&all);
+            let u = all.get(top).map_or(guess, |n| n.0);
+            if u <= plane.u[0] || u >= plane.u[1] {
                 break;
             }
             d *= 2.0;
+            all = add(around(u, d));
             continue;
-        }
-        let (um, u0, up) = (places[l - 1].u, places[l].u, places[l + 1].u);
-        let (fm, f0, fp) = (values[l - 1].0, values[l].0, values[l + 1].0);
-        let (left, right) = (u0 - um, up - u0);
-        if left <= 0.0 || right <= 0.0 {
-            // clipped at the edge of the plane
+        };
+        let top = highest(&all);
+        let apart = all[top + 1].0 - all[top - 1].0;
+        if apart < 2.6 * SPACING * natural {
+            d = natural;
             break;
         }
-        let (sl, sr) = ((f0 - fm) / left, (fp - f0) / right);
-        let curvature = (sl - sr) * 2.0 / (left + right);
-        let slope = (sl * right + sr * left) / (left + right);
-        let natural = 1.0 / curvature.max(1e-2).sqrt();
-        centre = u0 + (slope / curvature.max(1e-2)).clamp(-left, right);
-        let close = d < 1.6 * natural && d > 0.5 * natural;
         d = natural;
-        if close {
-            break;
-        }
+        all = add(around(u, d));
     }
-    let centre_values = likelihood.profile(&along([centre; LANES]));
-    let here = best_of(&along([centre; LANES]), &centre_values);
-    let mut best = best.filter(|b| b.ln_l > here.ln_l).unwrap_or(here);
-    let floor = best.ln_l - DEPTH;
-    let mut nodes: Vec<(f64, f64, f64)> = vec![(best.place.u, best.ln_l, best.ln_v)];
+    // outwards until the column has fallen below the floor
     for side in [-1.0, 1.0] {
-        let edge = if side < 0.0 { plane.u[0] } else { plane.u[1] };
-        let room = (edge - best.place.u).abs();
-        if room <= 0.0 {
-            continue;
-        }
-        // far enough out that the column has fallen below the floor
-        let reach = [0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 1e9].map(|t| (2.6 * d * t).min(room));
-        let probes = along(reach.map(|r| best.place.u + side * r));
-        let values = likelihood.profile(&probes);
-        let far = (0..LANES)
-            .find(|l| values[*l].0 < floor)
-            .unwrap_or(LANES - 1);
-        let far = reach[far];
-        let stretched = far > 8.0 * d;
-        let places = along(std::array::from_fn(|l| {
-            let t = (l + 1) as f64 / LANES as f64;
-            best.place.u + side * far * if stretched { t * t } else { t }
-        }));
-        for (place, value) in places.iter().zip(likelihood.profile(&places)) {
-            nodes.push((place.u, value.0, value.1));
-        }
-    }
-    nodes.retain(|n| n.1.is_finite());
-    nodes.sort_by(|a, b| a.0.total_cmp(&b.0));
-    nodes.dedup_by(|a, b| a.0 - b.0 < 1e-12);
-    for node in &nodes {
-        if node.1 > best.ln_l {
-            best = Best {
-                place: Place { x, u: node.0 },
-                ln_l: node.1,
-                ln_v: node.2,
+        for _ in 0..6 {
+            let end = if side < 0.0 { all.first() } else { all.last() };
+            let Some((u, ln_l, _)) = end.copied() else {
+                break;
             };
+            if ln_l < floor || u <= plane.u[0] || u >= plane.u[1] {
+                break;
+            }
+            all = add(
+                [1.0, 2.0, 3.2, 5.0, 8.0, 13.0, 21.0, 34.0].map(|t| u + side * SPACING * d * t)
+            );
         }
     }
-    Column { x, best, nodes }
+    let mut best = all
+        .get(highest(&all))
+        .copied()
+        .unwrap_or((guess, f64::NEG_INFINITY, 0.0));
+    if let Some((u, _)) = vertex(&all)
+        && let Some(node) = interpolated(&all, u)
+        && node.1 > best.1
+    {
+        best = node;
+    }
+    Column {
+        x,
+        best: Best {
+            place: Place { x, u: best.0 },
+            ln_l: best.1,
+            ln_v: best.2,
+        },
+        nodes: all,
+    }
+}
+
+fn highest(nodes: &[Node]) -> usize {
+    (0..nodes.len())
+        .max_by(|a, b| nodes[*a].1.total_cmp(&nodes[*b].1))
+        .unwrap_or(0)
+}
+
+/// Vertex and natural width of the parabola through the highest node and its neighbours; `None` at
+/// either end.
+fn vertex(nodes: &[Node]) -> Option<(f64, f64)> {
+    let top = highest(nodes);
+    if top == 0 || top + 1 >= nodes.len() {
+        return None;
+    }
+    let (um, u0, up) = (nodes[top - 1].0, nodes[top].0, nodes[top + 1].0);
+    let (left, right) = (u0 - um, up - u0);
+    let (sl, sr) = (
+        (nodes[top].1 - nodes[top - 1].1) / left,
+        (nodes[top + 1].1 - nodes[top].1) / right,
+    );
+    let curvature = ((sl - sr) * 2.0 / (left + right)).max(1e-2);
+    let slope = (sl * right + sr * left) / (left + right);
+    Some((
+        u0 + (slope / curvature).clamp(-left, right),
+        curvature.sqrt().recip(),
+    ))
+}
+
+/// Cubic interpolation between nodes at `u`; `None` outside or for fewer than four.
+fn interpolated(nodes: &[Node], u: f64) -> Option<Node> {
+    let k = nodes.partition_point(|n| n.0 <= u).checked_sub(1)?;
+    if k + 1 >= nodes.len() || nodes.len() < 4 {
+        return None;
+    }
+    let from = k.saturating_sub(1).min(nodes.len() - 4);
+    let four = &nodes[from..from + 4];
+    let (mut f, mut v) = (0.0, 0.0);
+    for (i, node) in four.iter().enumerate() {
+        let mut weight = 1.0;
+        for (j, other) in four.iter().enumerate() {
+            if i != j {
+                weight *= (u - other.0) / (node.0 - other.0);
+            }
+        }
+        f += weight * node.1;
+        v += weight * node.2;
+    }
+    // between nodes far apart a cubic may overshoot
+    let (low, high) = (
+        nodes[k].1.min(nodes[k + 1].1),
+        nodes[k].1.max(nodes[k + 1].1),
+    );
+    Some((u, f.clamp(low - 0.1, high + 0.1), v))
 }
 
 /// What the data say of one parameter, as a logarithm: its interval, open where not bounded.
@@ -300,34 +358,41 @@ pub(crate) struct Region {
     pub(crate) sigma_high_within_span: f64,
 }
 
-/// The region around the maximum `best`, which is replaced should a better one turn up. `drop` is
-/// how far below the maximum it reaches.
-pub(crate) fn region<L: Likelihood>(
-    likelihood: &L,
-    plane: &Plane,
-    best: Best,
-    drop: f64,
-) -> Region {
+/// The region around the maximum `best`, which is replaced should a better one turn up.
+///
+/// A side counts as open when the region of 99 % reaches the edge: a bound that 95 % would just
+/// close, chance closes too often.
+pub(crate) fn region<L: Likelihood>(likelihood: &L, plane: &Plane, best: Best) -> Region {
     let mut best = best;
+    let mut cut = columns(likelihood, plane, best);
     for _ in 0..4 {
-        let columns = columns(likelihood, plane, best, drop);
-        let top = columns
+        let top = cut
             .iter()
             .map(|c| c.best)
             .max_by(|a, b| a.ln_l.total_cmp(&b.ln_l))
             .unwrap_or(best);
-        if top.ln_l > best.ln_l + 1e-3 {
-            best = climb(likelihood, plane, top.place);
-            continue;
+        if top.ln_l <= best.ln_l + 0.01 {
+            break;
         }
-        return summarise(likelihood.weight(), plane, best, &columns, drop);
+        let next = climb(likelihood, plane, top.place);
+        if next.ln_l <= best.ln_l {
+            break;
+        }
+        best = next;
+        cut = columns(likelihood, plane, best);
     }
-    let columns = columns(likelihood, plane, best, drop);
-    summarise(likelihood.weight(), plane, best, &columns, drop)
+    let mut region = summarise(likelihood.weight(), plane, best, &cut, DROP);
+    let wide = summarise(likelihood.weight(), plane, best, &cut, CLOSED);
+    for (range, wide) in region.ranges.iter_mut().zip(wide.ranges) {
+        range.open_low = wide.open_low;
+        range.open_high = wide.open_high;
+    }
+    region
 }
 
-fn columns<L: Likelihood>(likelihood: &L, plane: &Plane, best: Best, drop: f64) -> Vec<Column> {
-    let centre = column(likelihood, plane, best.place.x, best.place.u, 0.3);
+fn columns<L: Likelihood>(likelihood: &L, plane: &Plane, best: Best) -> Vec<Column> {
+    let floor = best.ln_l - CLOSED;
+    let centre = column(likelihood, plane, best.place.x, best.place.u, 0.3, floor);
     let mut all = vec![centre.clone()];
     for side in [-1.0, 1.0] {
         let edge = if side < 0.0 { plane.x[0] } else { plane.x[1] };
@@ -343,18 +408,18 @@ fn columns<L: Likelihood>(likelihood: &L, plane: &Plane, best: Best, drop: f64) 
             // follow the ridge
             let drift = before.map_or(0.0, |(bx, bu)| (last.best.place.u - bu) / (last.x - bx));
             let guess = last.best.place.u + drift.clamp(-3.0, 3.0) * (x - last.x);
-            let next = column(likelihood, plane, x, guess, width_of(&last));
+            let next = column(likelihood, plane, x, guess, width_of(&last), floor);
             let fell = last.best.ln_l - next.best.ln_l;
             before = Some((last.x, last.best.place.u));
-            let out = next.best.ln_l < best.ln_l - drop - 0.3;
+            let out = next.best.ln_l < floor - 0.3;
             all.push(next.clone());
             last = next;
             if out {
                 break;
             }
-            if fell.abs() < 0.12 {
+            if fell.abs() < 0.15 {
                 step *= 1.5;
-            } else if fell > 0.8 {
+            } else if fell > 1.0 {
                 step *= 0.7;
             }
         }
@@ -375,11 +440,7 @@ fn first_step<L: Likelihood>(likelihood: &L, plane: &Plane, centre: &Column, sid
 }
 
 fn width_of(column: &Column) -> f64 {
-    let floor = column.best.ln_l - 0.5;
-    let mut near = column.nodes.iter().filter(|n| n.1 >= floor);
-    let first = near.next().map_or(0.0, |n| n.0);
-    let last = near.next_back().map_or(first, |n| n.0);
-    (0.5 * (last - first)).clamp(1e-3, 2.0)
+    vertex(&column.nodes).map_or(1.0, |(_, natural)| natural.clamp(1e-3, 2.0))
 }
 
 fn summarise(weight: f64, plane: &Plane, best: Best, columns: &[Column], drop: f64) -> Region {
@@ -469,39 +530,17 @@ fn ends(columns: &[Column], floor: f64) -> (Option<f64>, Option<f64>) {
 }
 
 /// Nodes with values in between by cubic interpolation.
-fn refined(nodes: &[(f64, f64, f64)]) -> Vec<(f64, f64, f64)> {
-    const PARTS: usize = 5;
-    if nodes.len() < 4 {
-        return nodes.to_vec();
-    }
+fn refined(nodes: &[Node]) -> Vec<Node> {
+    const PARTS: usize = 6;
     let mut out = Vec::with_capacity(nodes.len() * PARTS);
-    for k in 0..nodes.len() - 1 {
-        out.push(nodes[k]);
-        let from = k.saturating_sub(1).min(nodes.len() - 4);
-        let four = &nodes[from..from + 4];
+    for pair in nodes.windows(2) {
+        out.push(pair[0]);
         for part in 1..PARTS {
-            let u = nodes[k].0 + (nodes[k + 1].0 - nodes[k].0) * part as f64 / PARTS as f64;
-            let (mut f, mut v) = (0.0, 0.0);
-            for (i, node) in four.iter().enumerate() {
-                let mut weight = 1.0;
-                for (j, other) in four.iter().enumerate() {
-                    if i != j {
-                        weight *= (u - other.0) / (node.0 - other.0);
-                    }
-                }
-                f += weight * node.1;
-                v += weight * node.2;
-            }
-            // on a stretched grid a cubic may overshoot: never leave the neighbours' range by much
-            let (low, high) = (
-                nodes[k].1.min(nodes[k + 1].1),
-                nodes[k].1.max(nodes[k + 1].1),
-            );
-            f = f.clamp(low - 0.1, high + 0.1);
-            out.push((u, f, v));
+            let u = pair[0].0 + (pair[1].0 - pair[0].0) * part as f64 / PARTS as f64;
+            out.extend(interpolated(nodes, u));
         }
     }
-    out.push(nodes[nodes.len() - 1]);
+    out.extend(nodes.last());
     out
 }
 
@@ -537,27 +576,28 @@ pub(crate) fn logs_at(best: Best, plane: &Plane) -> Logs {
     logs_of(best.place, best.ln_v, plane.dt_s)
 }
 
-/// The best of FOGM alone: along the edge of the plane where white noise vanishes.
-pub(crate) fn fogm_alone<L: Likelihood>(likelihood: &L, plane: &Plane, from: f64) -> Best {
-    let edge = |xs: [f64; LANES]| xs.map(|x| plane.clip(Place { x, u: plane.u[1] }));
-    let net = |from: f64, to: f64| -> [f64; LANES] {
-        std::array::from_fn(|l| from + (to - from) * l as f64 / (LANES - 1) as f64)
+/// The best of FOGM alone: along the edge of the plane where white noise vanishes, from a net over
+/// all `tau`, or near `from` where that is given.
+pub(crate) fn fogm_alone<L: Likelihood>(likelihood: &L, plane: &Plane, from: Option<f64>) -> Best {
+    let edge = |centre: f64, width: f64| -> [Place; LANES] {
+        std::array::from_fn(|l| {
+            plane.clip(Place {
+                x: centre + width * (l as f64 - 3.5) / 3.5,
+                u: plane.u[1],
+            })
+        })
     };
-    let mut places = edge(net(plane.x[0], plane.x[1]));
+    let half = 0.5 * (plane.x[1] - plane.x[0]);
+    let (centre, mut width) = from.map_or((plane.x[0] + half, half), |x| (x, 0.5));
+    let places = edge(centre, width);
     let mut best = best_of(&places, &likelihood.profile(&places));
-    places = edge([from; LANES]);
-    let other = best_of(&places, &likelihood.profile(&places));
-    if other.ln_l > best.ln_l {
-        best = other;
-    }
-    let mut width = (plane.x[1] - plane.x[0]) / (LANES - 1) as f64;
-    while width > 1e-4 {
-        places = edge(net(best.place.x - width, best.place.x + width));
+    while width > 3e-3 {
+        width /= 2.5;
+        let places = edge(best.place.x, width);
         let next = best_of(&places, &likelihood.profile(&places));
         if next.ln_l > best.ln_l {
             best = next;
         }
-        width /= 2.5;
     }
     best
 }

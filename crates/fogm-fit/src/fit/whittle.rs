@@ -58,9 +58,10 @@ impl Likelihood for Whittle<'_> {
             let unit = Unit::new(place, 1.0 / fs);
             let fogm = unit.fogm();
             let mut value = Value::default();
+            let window = self.bins.window.map(|n| (n, unit.step.end_of(n)));
             for s in &self.bins.samples {
-                let gain = match self.bins.window {
-                    Some(n) => unit.step.gain_of_window(s.bin, n),
+                let gain = match window {
+                    Some((n, end)) => unit.step.gain_on_grid(s.bin, n, end),
                     None => unit.step.gain(s.bin),
                 };
                 let level = fogm * gain + unit.white;
