@@ -27,7 +27,7 @@ use crate::{Psd, SpectraError};
 /// let average = LogAverage::new(&flat, 10.0)?;
 /// let smooth = average.apply(&flat, &[1.0]);
 /// assert!(smooth.len() < 30 && smooth.psd.iter().all(|p| (p - 2.0).abs() < 1e-12));
-/// assert!((smooth.dof.iter().sum::<f64>() - 2000.0).abs() < 1e-9); // none lost, 0 Hz left out
+/// assert!((smooth.dof.iter().sum::<f64>() - 1998.0).abs() < 1e-9); // none lost but 0 and fs/2
 /// # Ok::<(), spectra::SpectraError>(())
 /// ```
 #[derive(Clone, Debug, PartialEq)]
@@ -40,21 +40,23 @@ pub struct LogAverage {
 impl LogAverage {
     /// A plan for the grid of `psd`, with `per_decade` groups to a factor of ten.
     ///
-    /// The bin at 0 Hz belongs to no group.
+    /// The bins at 0 and at fs/2, which are not doubled, belong to no group.
     ///
     /// # Errors
     ///
     /// [`SpectraError::NotPositive`] for `per_decade`, [`SpectraError::NotIncreasing`] frequencies
-    /// (in Hz), [`SpectraError::TooShort`] if no bin lies above 0 Hz.
+    /// (in Hz), [`SpectraError::TooShort`] if no bin lies between 0 and fs/2.
     pub fn new(psd: &Psd, per_decade: f64) -> Result<Self, SpectraError> {
         SpectraError::positive("per_decade", per_decade)?;
         crate::gaps::increasing(&psd.frequency_hz)?;
-        let first = psd.frequency_hz.iter().position(|f| *f > 0.0);
+        let inside = |f: &f64| *f > 0.0 && *f < 0.5 * psd.fs_hz * (1.0 - 1e-12);
+        let first = psd.frequency_hz.iter().position(inside);
         let first = first.ok_or(SpectraError::TooShort { got: 0, need: 1 })?;
         let group_of = |f: f64| (per_decade * (f / psd.frequency_hz[first]).log10() + 1e-9).floor();
         let mut groups: Vec<Range<usize>> = vec![];
         let mut current = f64::NAN;
-        for (k, f) in psd.frequency_hz.iter().enumerate().skip(first) {
+        let bins = psd.frequency_hz.iter().enumerate().skip(first);
+        for (k, f) in bins.take_while(|(_, f)| inside(f)) {
             let group = group_of(*f);
             match groups.last_mut() {
                 Some(last) if group <= current => last.end = k + 1,

@@ -51,6 +51,9 @@ pub fn chi_squared_quantile(probability: f64, dof: f64) -> Result<f64, SpectraEr
     let wilson_hilferty = (1.0 - h + z * h.sqrt()).powi(3) * a;
     // small probabilities: P(a, y) ~ y^a / Gamma(a + 1)
     let power = ((probability.ln() + ln_gamma(a + 1.0)) / a).exp();
+    if power < 1e-14 {
+        return Ok(2.0 * power); // the next term of the series is smaller by y
+    }
     let mut y = if wilson_hilferty > 0.1 * a && wilson_hilferty > 0.02 {
         wilson_hilferty
     } else {

@@ -6,8 +6,8 @@
 //! ln P = min(0, ln m + ln P1),   P1 = (1 + F/(K - 1))^-(K - 1)          union bound over m bins
 //! ```
 //!
-//! its frequency moved to the maximum of `|G(f)|`, `G(f) = sum_n w[n] x[n] exp(-2 pi i f n)` with
-//! `w = sum_k U_k v_k`, the line taken from the series, and the search goes on in what is left. At the end
+//! its frequency moved to the maximum of `|G(f)|`, `G(f) = sum_n w[n] (x[n] - image[n]) exp(-2 pi i f n)`
+//! with `w = sum_k U_k v_k` and the image of the line at `-f`, the line taken from the series, and the search goes on in what is left. At the end
 //! every line is refined once more with all others removed. With the noise `sigma^2 = S fs / 2` around
 //! the line, and `n` counted from the middle,
 //!
@@ -188,38 +188,26 @@ impl Multitaper {
             .max_by(|a, b| a.1.total_cmp(&b.1))
     }
 
-    /// The frequency, near `omega`, where `|G|` is largest, and `C` there, by Newton's method.
+    /// The frequency near `omega` of a line, and its `C`. Each round knows better what leaks from the
+    /// image at `-omega`, by the height of the sidelobes there.
     fn refine(&self, omega: f64, weights: &[f64], series: &[f64]) -> (f64, Complex<f64>) {
-        let start = omega;
-        // within one bin of the series; by a quarter of it at a time
-        let bin = TAU / series.len() as f64;
-        let mut omega = omega;
-        for _ in 0..30 {
-            let [g, g1, g2] = moments(weights, series, omega);
-            let slope = 2.0 * (g.conj() * g1).re;
-            let curvature = 2.0 * (g1.norm_sqr() + (g.conj() * g2).re);
-            let step = if curvature < 0.0 {
-                -slope / curvature
-            } else {
-                0.25 * bin * slope.signum()
-            };
-            let next =
-                (omega + step.clamp(-0.25 * bin, 0.25 * bin)).clamp(start - bin, start + bin);
-            let moved = (next - omega).abs();
-            omega = next;
-            if moved <= 1e-9 * bin {
+        let mut line = climb(omega, NO_LINE, weights, series);
+        for _ in 0..4 {
+            let before = line;
+            line = climb(line.0, (-line.0, line.1.conj()), weights, series);
+            if (line.1 - before.1).norm() <= 1e-13 * line.1.norm() {
                 break;
             }
         }
-        let gain: f64 = weights.iter().sum();
-        (omega, moments(weights, series, omega)[0] / gain)
+        line
     }
 
     fn describe(&self, line: &Found, weights: &[f64], remainder: &[f64]) -> Line {
         let settings = self.settings();
         let n = settings.samples as f64;
         let middle = 0.5 * (n - 1.0);
-        let of_taper = |k: usize| moments(self.tapers().taper(k), remainder, line.omega)[0];
+        let of_taper =
+            |k: usize| moments(self.tapers().taper(k), remainder, line.omega, NO_LINE)[0];
         let coefficients: Vec<Complex<f64>> = (0..self.sums.len()).map(of_taper).collect();
         // phases from the middle: the tapers' sums stay real
         let noise = LineFit::new(&self.sums, coefficients.into_iter()).residual;
@@ -255,14 +243,57 @@ impl MultitaperScratch {
     }
 }
 
-/// `sum w x e`, and its first and second derivative by omega, `e = exp(-i omega n)` with `n` from the middle.
-fn moments(weights: &[f64], series: &[f64], omega: f64) -> [Complex<f64>; 3] {
+/// No line to take away: any frequency, no amplitude.
+const NO_LINE: (f64, Complex<f64>) = (0.0, Complex::ZERO);
+
+/// The frequency, near `omega`, where `|G|` is largest, and `C` there, by Newton's method; `image` is taken from
+/// the series.
+fn climb(
+    omega: f64,
+    image: (f64, Complex<f64>),
+    weights: &[f64],
+    series: &[f64],
+) -> (f64, Complex<f64>) {
+    let start = omega;
+    // within one bin of the series, by a quarter of it at a time
+    let bin = TAU / series.len() as f64;
+    let mut omega = omega;
+    for _ in 0..30 {
+        let [g, g1, g2] = moments(weights, series, omega, image);
+        let slope = 2.0 * (g.conj() * g1).re;
+        let curvature = 2.0 * (g1.norm_sqr() + (g.conj() * g2).re);
+        let step = if curvature < 0.0 {
+            -slope / curvature
+        } else {
+            0.25 * bin * slope.signum()
+        };
+        let next = (omega + step.clamp(-0.25 * bin, 0.25 * bin)).clamp(start - bin, start + bin);
+        let moved = (next - omega).abs();
+        omega = next;
+        if moved <= 1e-9 * bin {
+            break;
+        }
+    }
+    let gain: f64 = weights.iter().sum();
+    (omega, moments(weights, series, omega, image)[0] / gain)
+}
+
+/// `sum w (x - image) e`, and its first and second derivative by omega, `e = exp(-i omega n)` with `n` from the
+/// middle; `image` is a frequency, rad a sample, and a complex amplitude.
+fn moments(
+    weights: &[f64],
+    series: &[f64],
+    omega: f64,
+    image: (f64, Complex<f64>),
+) -> [Complex<f64>; 3] {
     let middle = 0.5 * (series.len() as f64 - 1.0);
     let mut sums = [Complex::ZERO; 3];
     for (i, (w, x)) in weights.iter().zip(series).enumerate() {
         let n = i as f64 - middle;
         let (sin, cos) = (omega * n).sin_cos();
-        let term = Complex::new(cos, -sin) * (w * x);
+        let (image_sin, image_cos) = (image.0 * n).sin_cos();
+        let rest = *x - image.1 * Complex::new(image_cos, image_sin);
+        let term = Complex::new(cos, -sin) * rest * *w;
         sums[0] += term;
         sums[1] += term * n;
         sums[2] += term * (n * n);

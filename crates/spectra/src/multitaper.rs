@@ -21,7 +21,7 @@ use realfft::num_complex::Complex;
 use realfft::{RealFftPlanner, RealToComplex};
 
 use crate::welch::{frequencies, trimmed};
-use crate::{Detrend, Psd, Slepian, SpectraError};
+use crate::{Psd, Slepian, SpectraError};
 
 mod settings;
 

@@ -5,7 +5,8 @@
 //! ```
 //!
 //! The bins at 0 and at fs/2 have no partner at negative frequencies: they are not doubled, and hold
-//! half the degrees of freedom.
+//! half the degrees of freedom. Where the spectrum is flat they stand at half the height of their
+//! neighbours: leave both out of averages and fits ([`LogAverage`](crate::LogAverage) does).
 //!
 //! Source: Percival & Walden, Spectral Analysis for Physical Applications (1993), Sections 4.1, 6.2; erratum E7.
 

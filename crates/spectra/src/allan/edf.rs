@@ -11,8 +11,8 @@
 //!
 //! with `M` differences `S` samples apart. White angle noise is new at every sample, flicker of the angle
 //! is averaged over the sampling interval; the other three are continuous in time, and the angle is read
-//! at instants. The source averages these too; that differs at `m` of a few only. The sum ends where the
-//! covariance has died out, after three averaging times (flicker: falls as `t^-2` or faster).
+//! at instants. The source averages these too; that differs at `m` of a few only. The covariance
+//! ends within three averaging times; that of flicker falls off as `t^-2` and is followed for ten.
 //!
 //! Source: Greenhall & Riley, Proc. 35th PTTI Meeting (2003) 267, Eqs. 8-12; NIST SP 1065 Section 5.4.1.
 
@@ -94,11 +94,14 @@ pub fn allan_edf(noise: PowerLaw, kind: AllanKind, factor: usize, angles: usize)
     };
     let m = factor as f64;
     let differences = (angles - 2 * factor).div_ceil(stride);
-    let reach = differences.min(3 * factor / stride);
+    let times = match noise {
+        PowerLaw::FlickerAngle | PowerLaw::FlickerRate => 10,
+        _ => 3,
+    };
+    let reach = (times * factor / stride).min(differences - 1);
     let count = differences as f64;
     let variance = noise.difference(0.0, m);
-    // lag `reach` too, where the covariance of white noise has a last term
-    let sum: f64 = (1..=reach.min(differences - 1))
+    let sum: f64 = (1..=reach)
         .map(|j| {
             let rho = noise.difference((j * stride) as f64, m) / variance;
             (1.0 - j as f64 / count) * rho * rho
