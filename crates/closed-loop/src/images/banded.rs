@@ -21,7 +21,7 @@ pub(crate) struct Banded {
 #[derive(Clone, Debug)]
 pub(crate) struct Factor {
     width: usize,
-    /// Row i holds D_i, then L_ji of the rows j = i+1..=i+width.
+    /// Row i holds `D_i`, then `L_ji` of the rows j = i+1..=i+width.
     entries: Vec<f64>,
 }
 

@@ -17,7 +17,7 @@
 use super::sample::Sample;
 use super::spline::{Grid, ORDER};
 
-/// Sums of one star; rows c_p hold their non-zero entries only.
+/// Sums of one star; rows `c_p` hold their non-zero entries only.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Coupling {
     /// Detector pixels that count, ascending.
@@ -117,7 +117,7 @@ impl Coupling {
         }
     }
 
-    /// Adds `d_p - c_p g` and N_p to what all stars say of each pixel.
+    /// Adds `d_p - c_p g` and `N_p` to what all stars say of each pixel.
     pub(crate) fn tell_pixels(&self, psi: &[f64], moment: &mut [f64], weight: &mut [f64]) {
         for (k, &p) in self.pixel.iter().enumerate() {
             let (index, value) = self.row(k);

@@ -18,12 +18,12 @@
 //! M_i = Q_i - sum_p v(p) c_ip c_ip^T,       c_ip = sum over the windows of star i on p of  w F taps
 //! ```
 //!
-//! with Q_i the spot's own precision and means over the pixels that star i covers: a
+//! with `Q_i` the spot's own precision and means over the pixels that star i covers: a
 //! uniform level there is a pedestal of the spot or a background as well, and has no
 //! size of its own. Units: those of the scaled windows.
 //!
-//! Source: linear least squares with blocks eliminated (Schur complement); MacKay
-//! 1992 for tau.
+//! Source: linear least squares with blocks eliminated (Schur complement); Dempster,
+//! Laird & Rubin 1977 (expectation-maximisation) for tau.
 
 use super::banded::Banded;
 use super::coupling::Coupling;
@@ -126,4 +126,80 @@ pub(crate) fn variance_from_spot(
             (p, factor.quadratic(&mut u))
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::DMatrix;
+
+    use super::super::coupling;
+    use super::super::sample::Sample;
+    use super::super::spline::Grid;
+    use super::super::spot;
+    use super::super::synthetic::few_windows;
+    use super::*;
+
+    /// The inverse of all normal equations of spot and pixels together, contrasts
+    /// taken: condition about 10^9 by the ridge, hence 10^-6.
+    #[test]
+    fn variance_is_that_of_the_whole_system() {
+        let sample: Sample = few_windows(30);
+        let grid = Grid::new(sample.reach_px() + 0.5, 1.1);
+        let windows: Vec<usize> = (0..sample.windows()).collect();
+        let weight: Vec<f64> = (0..sample.z.len())
+            .map(|i| if i % 11 == 3 { 0.0 } else { 0.01 + (i % 7) as f64 * 0.003 })
+            .collect();
+        let level = |_: usize| 20.0;
+        let (flux, at, rho) = (&sample.flux, &sample.start, 1e-3);
+        let normal = spot::normal(&grid, &sample, &windows, flux, at, &weight, level);
+        let ordered = coupling::by_pixel(&sample, &windows);
+        let shared = Coupling::new(&grid, &sample, &ordered, flux, at, &weight, level);
+        let (order, prior) = (grid.len(), 1.0 / 400.0);
+        let pixels = shared.pixel.len();
+        let mut whole = DMatrix::zeros(order + pixels, order + pixels);
+        let mut precision = normal.penalised(&grid, rho);
+        for i in 0..order {
+            for k in 0..=precision.width.min(order - 1 - i) {
+                whole[(i, i + k)] = *precision.at(i, k);
+                whole[(i + k, i)] = *precision.at(i, k);
+            }
+        }
+        let mut variance = vec![0.0; sample.centre.len()];
+        for k in 0..pixels {
+            whole[(order + k, order + k)] = shared.weight[k] + prior;
+            variance[shared.pixel[k]] = 1.0 / (shared.weight[k] + prior);
+            let (index, value) = shared.row(k);
+            for (&j, &v) in index.iter().zip(value) {
+                whole[(j, order + k)] = v;
+                whole[(order + k, j)] = v;
+            }
+        }
+        let covariance = whole.cholesky().unwrap().inverse();
+        let covariance = covariance.view((order, order), (pixels, pixels)).into_owned();
+        let all = pixels as f64;
+        for (k, (p, added)) in
+            variance_from_spot(&shared, precision, &variance).into_iter().enumerate()
+        {
+            assert_eq!(p, shared.pixel[k]);
+            let contrast = covariance[(k, k)] - 2.0 * covariance.column(k).sum() / all
+                + covariance.sum() / (all * all);
+            // v of a pixel against the mean of the others, which the module leaves out
+            let own = variance[p] * (1.0 - 2.0 / all)
+                + shared.pixel.iter().map(|&q| variance[q]).sum::<f64>() / (all * all);
+            let expected = contrast - own;
+            assert!((added - expected).abs() < 1e-6 * contrast, "{added} {expected}");
+        }
+    }
+
+    /// One pixel seen with weight 4 and excess 3, another with none: shrunk, level
+    /// taken off, the unseen one at the level.
+    #[test]
+    fn unseen_pixels_get_the_level_and_the_spread() {
+        let mut dark = Dark::none(3);
+        let change = dark.update(&[12.0, 4.0, 0.0], &[4.0, 4.0, 0.0], &[0, 0, 0]);
+        assert!((dark.value[0] - 1.0).abs() < 1e-15 && (dark.value[1] + 1.0).abs() < 1e-15);
+        assert!(dark.value[2].abs() < 1e-15 && !dark.seen[2]);
+        assert!((dark.spread - 1.25).abs() < 1e-15 && (dark.variance[2] - 1.25).abs() < 1e-15);
+        assert!((change - 2.0).abs() < 1e-15);
+    }
 }

@@ -13,7 +13,7 @@
 //! marginal likelihood.
 //!
 //! Source: Anderson & King 2000, PASP 112, 1360 (effective PSF); Eilers & Marx 1996
-//! (penalised splines); MacKay 1992 for rho.
+//! (penalised splines); Dempster, Laird & Rubin 1977 (expectation-maximisation) for rho.
 
 use super::banded::{Banded, Factor};
 use super::sample::Sample;

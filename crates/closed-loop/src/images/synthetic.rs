@@ -12,6 +12,7 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use telemetry::WindowTable;
 
+use super::sample::{Entry, Sample};
 use crate::star_data::{Inputs, StarData};
 
 /// What to make.
@@ -158,6 +159,44 @@ impl Scenario<'_> {
             truth,
         }
     }
+}
+
+/// Windows of one star, 4 by 4 pixels, without noise, for tests of single steps.
+pub(crate) fn few_windows(count: usize) -> Sample {
+    let mut values = Vec::new();
+    let mut place = Vec::new();
+    for k in 0..count {
+        let [dx, dy] = dither(17 * k).map(|v| 0.5 * v);
+        let at = Pixel { x: 40.0 + dx, y: -25.0 + dy };
+        let corner = [(at.x - 1.5).round(), (at.y - 1.5).round()];
+        let mut window = vec![0.0; 16];
+        let first = Pixel { x: corner[0], y: corner[1] };
+        centroid::pixel_gaussian_into(first, 4, at, 0.9, FLUX, &mut window).unwrap();
+        for v in &mut window {
+            *v += BACKGROUND;
+        }
+        values.push(window);
+        place.push((at, corner));
+    }
+    let frames: Vec<Vec<Entry<'_>>> = place
+        .iter()
+        .zip(&values)
+        .enumerate()
+        .map(|(row, (&(at, corner), values))| {
+            vec![Entry {
+                row,
+                star: 0,
+                start: [at.x, at.y],
+                flux: Some(FLUX),
+                base: [at.x, at.y],
+                jacobian: [[0.0, 4e4, 25.0], [-4e4, 0.0, 40.0]],
+                corner,
+                background: BACKGROUND,
+                values,
+            }]
+        })
+        .collect();
+    Sample::collect(1, [4, 4], &[], &frames).unwrap()
 }
 
 /// Root mean square over both axes of `at - truth` for the rows `taken`, each

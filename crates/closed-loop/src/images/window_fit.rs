@@ -166,3 +166,62 @@ pub(crate) fn fit(
     let sound = now.flux > 0.0 && now.flux.is_finite() && now.background.is_finite();
     (sound && sample.near(w, now.at)).then_some(now)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::spot;
+    use super::super::synthetic::few_windows;
+    use super::*;
+
+    /// Without noise the fit returns the position that the spot was learned at, from
+    /// any start within a pixel, and with a hit anywhere in the window. The spline
+    /// does not follow the spot exactly: its own fit to the window is the reference.
+    #[test]
+    fn starts_and_hits_do_not_matter() {
+        let mut sample = few_windows(300);
+        let grid = Grid::new(sample.reach_px() + 0.5, 0.4);
+        let windows: Vec<usize> = (0..sample.windows()).collect();
+        let weight = vec![0.05; sample.z.len()];
+        let level = sample.background[0];
+        let (flux, at) = (sample.flux.clone(), sample.start.clone());
+        let normal = spot::normal(&grid, &sample, &windows, &flux, &at, &weight, |_| level);
+        let mut psi = normal.moment.clone();
+        normal.factor(&grid, 1e-2).unwrap().solve(&mut psi);
+        let dark = vec![0.0; sample.centre.len()];
+        let mut pixels = Pixels::default();
+        for w in [3, 40, 111] {
+            let truth = at[w];
+            let fit_from = |sample: &Sample, start: [f64; 2], pixels: &mut Pixels| {
+                let known = Known {
+                    grid: &grid,
+                    psi: &psi,
+                    noise: PixelNoise { a: 4.0, b: 0.2 },
+                    scale: 1.0,
+                    background: level,
+                    background_variance: 9.0,
+                    dark: &dark,
+                    dark_variance: None,
+                };
+                let start = Fitted { at: start, flux: 8e3, background: level, ..Fitted::default() };
+                fit(&known, sample, w, &start, 30, pixels).unwrap()
+            };
+            let best = fit_from(&sample, truth, &mut pixels);
+            assert!((best.at[0] - truth[0]).hypot(best.at[1] - truth[1]) < 2e-3);
+            assert!(pixels.good.iter().all(|g| *g));
+            let moved = fit_from(&sample, [truth[0] + 0.6, truth[1] - 0.5], &mut pixels);
+            assert!((moved.at[0] - best.at[0]).hypot(moved.at[1] - best.at[1]) < 1e-6);
+            for cell in 0..16 {
+                let i = sample.cells_of(w).start + cell;
+                let kept = sample.z[i];
+                sample.z[i] += 3000.0;
+                let struck = fit_from(&sample, [truth[0] + 0.3, truth[1] + 0.2], &mut pixels);
+                sample.z[i] = kept;
+                let good = pixels.good.iter().filter(|g| **g).count();
+                assert_eq!((good, pixels.good[cell]), (15, false), "window {w}, pixel {cell}");
+                let off = (struck.at[0] - truth[0]).hypot(struck.at[1] - truth[1]);
+                // the spline's own misfit without that pixel
+                assert!(off < 0.01, "window {w}, pixel {cell}: {off}");
+            }
+        }
+    }
+}
