@@ -122,12 +122,12 @@ impl Welch {
     /// Spectra of two series and their cross-spectrum, from their common `runs`.
     ///
     /// ```
-    /// use spectra::{Welch, WelchSettings, coherence_significance};
+    /// use spectra::{Welch, WelchSettings, coherence_significance, whole};
     ///
     /// let x: Vec<f64> = (0..600_i64).map(|n| (n * n * n % 101) as f64).collect();
     /// let y: Vec<f64> = x.iter().map(|v| -3.0 * v).collect();
     /// let welch = Welch::new(WelchSettings::half_overlap(60, 1.0))?;
-    /// let cross = welch.process_cross(&x, &y, &[0..600])?;
+    /// let cross = welch.process_cross(&x, &y, &whole(&x))?;
     /// assert!(cross.coherence()[5] > 1.0 - 1e-12);
     /// assert!(coherence_significance(0.01, cross.dof[5])? < 0.3);
     /// # Ok::<(), spectra::SpectraError>(())

@@ -12,6 +12,16 @@ use std::ops::Range;
 
 use crate::SpectraError;
 
+/// The one run of a series without gaps.
+///
+/// ```
+/// assert_eq!(spectra::whole(&[1.0, 2.0]), std::array::from_fn(|_| 0..2));
+/// ```
+#[must_use]
+pub fn whole(x: &[f64]) -> [Range<usize>; 1] {
+    std::array::from_fn(|_| 0..x.len())
+}
+
 /// Runs of finite values in a regularly sampled series whose gaps are marked by NaN.
 ///
 /// ```

@@ -56,7 +56,7 @@ pub use confidence::{Band, chi_squared_quantile, confidence_factors};
 pub use cross::{CrossMut, CrossSpectrum, coherence_significance};
 pub use detrend::Detrend;
 pub use error::SpectraError;
-pub use gaps::{continuous_runs, finite_runs};
+pub use gaps::{continuous_runs, finite_runs, whole};
 pub use lines::{Line, f_test_ln_p};
 pub use log_chi::{log_bias, log_variance};
 pub use lomb_scargle::{LombScargle, LombScargleScratch, LombScargleSettings, mean_rate_hz};

@@ -18,7 +18,7 @@ use std::sync::Arc;
 use realfft::num_complex::Complex;
 use realfft::{RealFftPlanner, RealToComplex};
 
-use crate::{Detrend, Psd, SpectraError, Window};
+use crate::{Detrend, Psd, SpectraError, Window, gaps};
 
 mod settings;
 
@@ -27,7 +27,7 @@ pub use settings::{Coverage, WelchSettings};
 /// A plan for Welch's estimate: window, transform and normalisation.
 ///
 /// ```
-/// use spectra::{Welch, WelchSettings};
+/// use spectra::{Welch, WelchSettings, whole};
 ///
 /// let x: Vec<f64> = (0..1000).map(|n| f64::from(n * n % 17)).collect();
 /// let welch = Welch::new(WelchSettings::half_overlap(200, 10.0))?;
@@ -37,7 +37,7 @@ pub use settings::{Coverage, WelchSettings};
 ///
 /// // the same without allocating
 /// let (mut scratch, mut psd) = (welch.make_scratch(), vec![0.0; welch.bins()]);
-/// let used = welch.process_into(&x, &[0..1000], &mut scratch, &mut psd)?;
+/// let used = welch.process_into(&x, &whole(&x), &mut scratch, &mut psd)?;
 /// assert_eq!((psd, used.segments), (spectrum.psd, 9));
 /// # Ok::<(), spectra::SpectraError>(())
 /// ```
@@ -183,7 +183,7 @@ impl Welch {
     ///
     /// As [`process_into`](Self::process_into).
     pub fn process(&self, x: &[f64]) -> Result<Psd, SpectraError> {
-        self.process_runs(x, std::slice::from_ref(&(0..x.len())))
+        self.process_runs(x, &gaps::whole(x))
     }
 
     /// Density of a series with gaps, from its `runs` ([`finite_runs`](crate::finite_runs),

@@ -2,7 +2,7 @@
 use spectra::{
     Allan, AllanData, AllanKind, Detrend, LombScargle, LombScargleSettings, Multitaper,
     MultitaperSettings, PowerLaw, Psd, SpectraError, Welch, WelchSettings, Window, continuous_runs,
-    mean_rate_hz, periodogram,
+    mean_rate_hz, periodogram, whole,
 };
 
 #[test]
@@ -80,7 +80,7 @@ fn series_that_cannot_be_used() {
             samples: 20
         }
     );
-    let unequal = welch.process_cross(&[0.0; 20], &[0.0; 21], &[0..20]);
+    let unequal = welch.process_cross(&[0.0; 20], &[0.0; 21], &whole(&[0.0; 20]));
     assert_eq!(
         unequal.unwrap_err(),
         SpectraError::Unequal {
@@ -154,7 +154,9 @@ fn zeros_are_a_series() -> Result<(), SpectraError> {
             .is_empty()
     );
     let welch = Welch::new(WelchSettings::half_overlap(16, 1.0))?;
-    let coherence = welch.process_cross(&zeros, &zeros, &[0..64])?.coherence();
+    let coherence = welch
+        .process_cross(&zeros, &zeros, &whole(&zeros))?
+        .coherence();
     assert!(coherence.iter().all(|c| c.abs() < 1e-300));
     assert!(Psd::default().step_hz().is_none());
     Ok(())

@@ -49,13 +49,13 @@ fn lines_are_refined_far_below_a_bin() -> Result<(), SpectraError> {
     let (samples, fs_hz) = (1000_u32, 5.0);
     let plan = Multitaper::new(MultitaperSettings::for_lines(1000, 4.0, fs_hz))?;
     let mut scratch = plan.make_scratch();
-    let mut squares = [vec![], vec![], vec![]];
+    let (mut squares, mut others) = ([vec![], vec![], vec![]], 0);
     let bound = (6.0 * fs_hz * fs_hz / (PI * PI * f64::from(samples).powi(3))).sqrt();
     for seed in 0..200_u32 {
         let share = f64::from(seed) / 200.0;
         let truth = [
-            (0.6 + 0.005 * share, 1.0, 0.3 + share),
-            (1.7 + 0.005 * (1.0 - share), 0.5, -2.0),
+            (0.6 + 0.005 * share, 1.5, 0.3 + share),
+            (1.7 + 0.005 * (1.0 - share), 1.0, -2.0),
         ];
         let mut x = white(1000, 7000 + u64::from(seed));
         for (n, v) in (0..samples).zip(&mut x) {
@@ -64,20 +64,22 @@ fn lines_are_refined_far_below_a_bin() -> Result<(), SpectraError> {
                 *v += a * (TAU * f * t_s + p).cos();
             }
         }
-        let lines = plan.find_lines(&x, 1e-3, 4, &mut scratch)?;
-        assert_eq!(lines.len(), 2, "{seed}: {lines:?}");
-        for (line, (f, a, p)) in lines.iter().zip(truth) {
+        let lines = plan.find_lines(&x, 0.05, 4, &mut scratch)?;
+        others += lines.len() - 2;
+        for (f, a, p) in truth {
+            let near = |l: &&spectra::Line| (l.frequency_hz - f).abs() < 2e-3;
+            let line = lines.iter().find(near).unwrap();
             squares[0].push(((line.frequency_hz - f) / line.sigma_frequency_hz).powi(2));
             squares[1].push(((line.amplitude - a) / line.sigma_amplitude).powi(2));
-            assert!(line.ln_p < -6.9 && line.f > 10.0);
-            let ratio = line.sigma_frequency_hz * a / bound;
-            assert!(ratio > 0.5 && ratio < 2.6, "{ratio} times the bound");
-            squares[2].push(ratio);
+            squares[2].push(line.sigma_frequency_hz * a / bound);
+            assert!(line.ln_p < 0.05_f64.ln() && line.f > 10.0);
             // the phase at the first sample errs with the frequency half a series long
             let sigma = line.sigma_frequency_hz * TAU * 100.0 + line.sigma_amplitude / a;
             assert!((line.phase_rad - p).abs() < 6.0 * sigma, "{line:?} {p}");
         }
     }
+    // one more in 5 % of the series or fewer: 10 +- 3
+    assert!(others <= 25, "{others} lines of noise");
     // the noise comes from 2K - 2 = 12 values: z^2 follows F(1, 12), mean 12/10
     for values in &squares[..2] {
         let [mean, error] = mean_and_error(values);
@@ -91,7 +93,7 @@ fn lines_are_refined_far_below_a_bin() -> Result<(), SpectraError> {
     Ok(())
 }
 
-/// Without noise the frequency comes back to rounding, and nothing is left.
+/// Without noise the line comes back to rounding, and nothing is left.
 #[test]
 fn pure_line_is_taken_out() -> Result<(), SpectraError> {
     let x: Vec<f64> = (0..800)
@@ -103,9 +105,10 @@ fn pure_line_is_taken_out() -> Result<(), SpectraError> {
     })?;
     let mut scratch = plan.make_scratch();
     let lines = plan.find_lines(&x, 0.01, 1, &mut scratch)?;
-    // its image at the negative frequency leaks through the sidelobes of the tapers: 1e-8
-    assert!((lines[0].frequency_hz - 0.9).abs() < 1e-9, "{lines:?}");
-    assert!((lines[0].phase_rad + 1.0).abs() < 1e-6 && (lines[0].amplitude - 2.0).abs() < 1e-6);
-    assert!(scratch.remainder().iter().all(|r| r.abs() < 1e-6));
+    // rounds against the image, whose sidelobes are below 1e-3, leave rounding
+    assert!((lines[0].frequency_hz - 0.9).abs() < 1e-12, "{lines:?}");
+    assert!((lines[0].phase_rad + 1.0).abs() < 1e-10, "{lines:?}");
+    assert!((lines[0].amplitude - 2.0).abs() < 1e-11, "{lines:?}");
+    assert!(scratch.remainder().iter().all(|r| r.abs() < 1e-10));
     Ok(())
 }

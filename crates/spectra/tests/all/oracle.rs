@@ -7,7 +7,7 @@ use std::error::Error;
 use spectra::{
     Allan, AllanData, AllanKind, Detrend, LombScargle, LombScargleSettings, Multitaper,
     MultitaperSettings, PowerLaw, Slepian, TaperWeights, Welch, WelchSettings, Window,
-    chi_squared_quantile, log_bias, log_variance, mean_rate_hz, periodogram,
+    chi_squared_quantile, log_bias, log_variance, mean_rate_hz, periodogram, whole,
 };
 
 use crate::cases::{Row, Table, close};
@@ -56,7 +56,7 @@ fn welch_csd_and_coherence_of_scipy() -> Outcome {
             fs_hz: FS_HZ,
         })?;
         let k = row.count("bin")?;
-        let cross = welch.process_cross(&x, &y, std::slice::from_ref(&(0..x.len())))?;
+        let cross = welch.process_cross(&x, &y, &whole(&x))?;
         let alone = welch.process(&x)?;
         let scale = largest(&cross.xx);
         close(
