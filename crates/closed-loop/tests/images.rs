@@ -1,0 +1,697 @@
+//! Raw windows with a known truth: what the detector adds, and what it does not.
+//!
+//! Gaussian spots on integrating pixels, photon and read noise, pixels with a level
+//! of their own; the table's centroids are plain first moments, and neither the
+//! stars' directions nor the attitude are given.
+//!
+//! Source: integration of a Gaussian over square pixels (`centroid::pixel_gaussian_into`).
+#![expect(clippy::unwrap_used, reason = "helpers of tests")]
+
+use std::collections::BTreeMap;
+
+use closed_loop::{Closed, Rival, close};
+use focal_plane::{Camera, Pixel, StarFrames};
+use nalgebra::{UnitQuaternion, Vector3};
+use rand_core::SeedableRng;
+use rand_distr::{Distribution, Exp1, StandardNormal, StandardUniform};
+use rand_xoshiro::Xoshiro256PlusPlus;
+use telemetry::{Bundle, Model, WindowTable};
+
+/// Warm pixels by column and row of the detector, counted from the boresight.
+type Warm = BTreeMap<[i64; 2], f64>;
+/// Where each star is while the tracker does not move, px.
+type Field = [[f64; 2]; 5];
+
+/// Focal length of a long camera: 5 arcsec a pixel.
+const FOCAL_PX: f64 = 41_252.96;
+const BACKGROUND: f64 = 20.0;
+/// Variance of a pixel that holds `s` units: `READ^2 + s/GAIN`.
+const READ: f64 = 4.0;
+const GAIN: f64 = 5.0;
+const WIDE: Field = [
+    [97.6, 50.3],
+    [114.4, 52.9],
+    [-210.2, 205.7],
+    [-160.9, -190.4],
+    [233.3, -120.8],
+];
+
+/// What to make.
+struct Scene {
+    frames: usize,
+    stars: Field,
+    /// Stars used, from the first.
+    count: usize,
+    size: [usize; 2],
+    unread: Vec<[usize; 2]>,
+    sigma_px: f64,
+    flux: f64,
+    pixel_centre: f64,
+    /// Shift along x and y, px, and roll, px at 1000 px, of frame `k` of `n`.
+    motion: fn(usize, usize) -> [f64; 3],
+    warm: Warm,
+    /// Share of the pixels with a particle hit, hundreds of units each.
+    hits: f64,
+    seed: u64,
+}
+
+/// Twenty pixels from end to end along x, to and fro along y.
+fn drift(k: usize, n: usize) -> [f64; 3] {
+    let s = k as f64 / (n - 1) as f64;
+    let t = k as f64;
+    [
+        -9.0 + 18.0 * s + 0.4 * (0.37 * t).sin(),
+        6.0 * (0.031 * t).sin() + 0.5 * (0.53 * t).cos(),
+        0.0,
+    ]
+}
+
+/// Twenty pixels to and fro, every place many times.
+fn dither(k: usize, _: usize) -> [f64; 3] {
+    let t = k as f64;
+    [
+        10.0 * (0.0297 * t).sin(),
+        10.0 * (0.0419 * t).sin(),
+        3.0 * (0.013 * t).sin(),
+    ]
+}
+
+impl Default for Scene {
+    fn default() -> Self {
+        Self {
+            frames: 600,
+            stars: WIDE,
+            count: 5,
+            size: [6, 6],
+            unread: Vec::new(),
+            sigma_px: 0.75,
+            flux: 6000.0,
+            pixel_centre: 0.5,
+            motion: dither,
+            warm: Warm::new(),
+            hits: 0.0,
+            seed: 1,
+        }
+    }
+}
+
+impl Scene {
+    fn make(&self) -> Bundle {
+        let camera = Camera::from_focal_length_px([1024, 1024], FOCAL_PX)
+            .and_then(|c| c.with_pixel_centre(self.pixel_centre))
+            .unwrap();
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(self.seed);
+        // of its own, so that the noise is the same with and without hits
+        let mut particles = Xoshiro256PlusPlus::seed_from_u64(!self.seed);
+        let [columns, rows] = self.size;
+        let mut images = WindowTable {
+            size: self.size,
+            unread: vec![false; columns * rows],
+            ..WindowTable::default()
+        };
+        for &[row, column] in &self.unread {
+            images.unread[row * columns + column] = true;
+        }
+        let mut stars = StarFrames::new();
+        let mut spot = vec![0.0; columns * rows];
+        for k in 0..self.frames {
+            let [x, y, roll] = (self.motion)(k, self.frames);
+            // small rotation: dx = f theta_y, dy = -f theta_x
+            let theta = Vector3::new(-y / FOCAL_PX, x / FOCAL_PX, roll / 1000.0);
+            let q = UnitQuaternion::from_scaled_axis(theta);
+            let t_s = 2.0 * k as f64;
+            stars.begin(t_s);
+            for (i, star) in self.stars.iter().take(self.count).enumerate() {
+                let at = camera
+                    .project(
+                        &(q * camera.direction(Pixel {
+                            x: star[0],
+                            y: star[1],
+                        })),
+                    )
+                    .unwrap();
+                let corner = self.corner(at);
+                let flux = self.flux * (1.0 - 0.12 * i as f64);
+                let first = Pixel {
+                    x: corner[0] as f64 + self.pixel_centre,
+                    y: corner[1] as f64 + self.pixel_centre,
+                };
+                centroid::pixel_gaussian_into(first, columns, at, self.sigma_px, flux, &mut spot)
+                    .unwrap();
+                let mut sum = [0.0; 3];
+                for (p, light) in spot.iter().enumerate() {
+                    let (c, r) = (p % columns, p / columns);
+                    let key = [
+                        corner[0] + i64::try_from(c).unwrap(),
+                        corner[1] + i64::try_from(r).unwrap(),
+                    ];
+                    let signal = light + BACKGROUND + self.warm.get(&key).unwrap_or(&0.0);
+                    let e: f64 = StandardNormal.sample(&mut rng);
+                    let mut value = signal + (READ * READ + signal / GAIN).sqrt() * e;
+                    let u: f64 = StandardUniform.sample(&mut particles);
+                    if u < self.hits {
+                        let e: f64 = Exp1.sample(&mut particles);
+                        value += 300.0 * (1.0 + e);
+                    }
+                    if images.unread[p] {
+                        value = 0.0;
+                    } else {
+                        let q = value - BACKGROUND;
+                        sum = [sum[0] + q, sum[1] + q * c as f64, sum[2] + q * r as f64];
+                    }
+                    images.pixels.push(value);
+                }
+                let slot = i32::try_from(i).unwrap();
+                let place = [first.x + sum[1] / sum[0], first.y + sum[2] / sum[0]];
+                stars.push(slot, 1000 + i64::from(slot), place[0], place[1]);
+                images.t_s.push(t_s);
+                images.slot.push(slot);
+                images.x0_px.push(first.x);
+                images.y0_px.push(first.y);
+                images.background.push(BACKGROUND);
+            }
+        }
+        Bundle {
+            camera: Some(camera),
+            stars: Some(stars),
+            images: Some(images),
+            ..Bundle::default()
+        }
+    }
+
+    /// Column and row of the first pixel of the window around a star.
+    #[expect(clippy::cast_possible_truncation, reason = "a thousand pixels")]
+    fn corner(&self, at: Pixel) -> [i64; 2] {
+        let first =
+            |v: f64, n: usize| (v - self.pixel_centre - 0.5 * (n as f64 - 1.0)).round() as i64;
+        [first(at.x, self.size[0]), first(at.y, self.size[1])]
+    }
+}
+
+fn run(bundle: &Bundle) -> Closed {
+    close(&Model::default(), bundle, &|_| ()).unwrap()
+}
+
+/// A share of all pixels around the stars, exponential with this mean.
+fn population(share: f64, mean: f64, stars: &Field, seed: u64) -> Warm {
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+    let mut warm = Warm::new();
+    for star in stars {
+        #[expect(clippy::cast_possible_truncation, reason = "a thousand pixels")]
+        let centre = [star[0] as i64, star[1] as i64];
+        for x in -16..=16 {
+            for y in -16..=16 {
+                let (u, e): (f64, f64) = (StandardUniform.sample(&mut rng), Exp1.sample(&mut rng));
+                if u < share {
+                    warm.entry([centre[0] + x, centre[1] + y])
+                        .or_insert(mean * e);
+                }
+            }
+        }
+    }
+    warm
+}
+
+fn rms(closed: &Closed) -> [[f64; 2]; 2] {
+    [&closed.report.before, &closed.report.after].map(|e| e.star_rms_arcsec.unwrap())
+}
+
+fn ids(closed: &Closed) -> Vec<&str> {
+    closed
+        .report
+        .effects
+        .iter()
+        .map(|e| e.id.as_str())
+        .collect()
+}
+
+/// The bundle without the rows of both tables that `keep` refuses, by time and slot.
+fn keep_rows(
+    bundle: &Bundle,
+    stars: impl Fn(f64, i32) -> bool,
+    windows: impl Fn(f64, i32) -> bool,
+) -> Bundle {
+    let all = bundle.stars.as_ref().unwrap();
+    let mut frames = StarFrames::new();
+    for k in 0..all.frames() {
+        frames.begin(all.t_s[k]);
+        for row in all
+            .rows_of(k)
+            .filter(|&row| stars(all.t_s[k], all.slot[row]))
+        {
+            frames.push(
+                all.slot[row],
+                all.star_id[row],
+                all.x_px[row],
+                all.y_px[row],
+            );
+        }
+    }
+    let all = bundle.images.as_ref().unwrap();
+    let mut images = WindowTable {
+        size: all.size,
+        unread: all.unread.clone(),
+        ..WindowTable::default()
+    };
+    for i in (0..all.len()).filter(|&i| windows(all.t_s[i], all.slot[i])) {
+        images.t_s.push(all.t_s[i]);
+        images.slot.push(all.slot[i]);
+        images.x0_px.push(all.x0_px[i]);
+        images.y0_px.push(all.y0_px[i]);
+        images.background.push(all.background[i]);
+        images.pixels.extend_from_slice(all.window(i));
+    }
+    Bundle {
+        stars: Some(frames),
+        images: Some(images),
+        ..bundle.clone()
+    }
+}
+
+/// Out-of-fold rms over both axes, before and after, of a slot's rows at these times.
+fn rms_of(closed: &Closed, slot: i32, at: &[f64]) -> [f64; 2] {
+    let stars = closed.stars.as_ref().unwrap();
+    let rows: Vec<usize> = (0..stars.t_s.len())
+        .filter(|&r| stars.slot[r] == slot && at.contains(&stars.t_s[r]) && !stars.outlier[r])
+        .collect();
+    [&stars.before_arcsec, &stars.after_arcsec].map(|[x, y]| {
+        let square: f64 = rows.iter().map(|&r| x[r] * x[r] + y[r] * y[r]).sum();
+        (square / rows.len() as f64).sqrt()
+    })
+}
+
+/// Folds that these times fall into.
+fn folds_of(closed: &Closed, at: &[f64]) -> Vec<u32> {
+    let stars = closed.stars.as_ref().unwrap();
+    let mut folds: Vec<u32> = (0..stars.t_s.len())
+        .filter(|&r| at.contains(&stars.t_s[r]))
+        .map(|r| stars.fold[r])
+        .collect();
+    folds.sort_unstable();
+    folds.dedup();
+    folds
+}
+
+fn rival<'a>(closed: &'a Closed, what: &str) -> &'a Rival {
+    closed.rivals.iter().find(|r| r.what == what).unwrap()
+}
+
+/// Column and row of pixel `i` of the map.
+#[expect(clippy::cast_possible_truncation, reason = "a thousand pixels")]
+fn cell(closed: &Closed, i: usize) -> [i64; 2] {
+    let map = closed.dark_map.as_ref().unwrap();
+    [map.x_px[i].floor() as i64, map.y_px[i].floor() as i64]
+}
+
+/// `(dn - truth)/sigma` of every pixel of the map, less the median: a level that is
+/// common to all cannot be told from a background.
+fn pulls(closed: &Closed, warm: &Warm) -> Vec<f64> {
+    let map = closed.dark_map.as_ref().expect("a map is adopted");
+    let excess: Vec<f64> = (0..map.dn.len())
+        .map(|i| map.dn[i] - warm.get(&cell(closed, i)).unwrap_or(&0.0))
+        .collect();
+    let mut sorted = excess.clone();
+    sorted.sort_by(f64::total_cmp);
+    let level = sorted[sorted.len() / 2];
+    excess
+        .iter()
+        .zip(&map.sigma_dn)
+        .map(|(e, s)| (e - level) / s)
+        .collect()
+}
+
+fn root_mean_square(values: &[f64]) -> f64 {
+    (values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64).sqrt()
+}
+
+/// The pixel that two stars cross, and its level.
+const SHARED: [i64; 2] = [106, 51];
+const SHARED_DN: f64 = 60.0;
+/// Columns of the patch of warm pixels around it.
+const PATCH: std::ops::RangeInclusive<i64> = 104..=108;
+
+/// The tracker drifts: star 0 reaches the patch in the last folds only, star 1 leaves
+/// it in the first ones.
+fn crossing(seed: u64) -> Scene {
+    let mut warm = population(0.03, 40.0, &WIDE, 5 + seed);
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(100 + seed);
+    for x in PATCH {
+        for y in 40..=62 {
+            let (u, e): (f64, f64) = (StandardUniform.sample(&mut rng), Exp1.sample(&mut rng));
+            warm.insert([x, y], if u < 0.5 { 20.0 * (1.0 + e) } else { 0.0 });
+        }
+    }
+    warm.insert(SHARED, SHARED_DN);
+    Scene {
+        motion: drift,
+        warm,
+        seed,
+        ..Scene::default()
+    }
+}
+
+/// Times at which the window of a slot covers the column of the shared pixel.
+fn times_on_patch(bundle: &Bundle, slot: i32) -> Vec<f64> {
+    let images = bundle.images.as_ref().unwrap();
+    let first = *PATCH.start() as f64;
+    let last = *PATCH.end() as f64 + 1.0;
+    (0..images.len())
+        .filter(|&i| {
+            let x0 = images.x0_px[i];
+            images.slot[i] == slot && x0 < last && x0 + images.size[0] as f64 > first
+        })
+        .map(|i| images.t_s[i])
+        .collect()
+}
+
+/// The map belongs to the detector. Two stars cross the same warm pixels at different
+/// times; each fold is predicted with what the other star saw. In the second bundle
+/// everything is the same but for star 0, whose rows are said to lie 40 pixels away: it
+/// has the same windows and no pixel in common with star 1 any more.
+///
+/// Six seeds: the map's gain falls by 1060 to 4900 nats, star 1's error on the patch
+/// grows by 2 to 33 %, in this one by 22 %.
+#[test]
+fn two_stars_that_cross_one_warm_pixel_see_the_same_value() {
+    let scene = crossing(1);
+    let together = scene.make();
+    let mut apart = together.clone();
+    let stars = apart.stars.as_mut().unwrap();
+    for row in (0..stars.rows())
+        .filter(|&r| stars.slot[r] == 0)
+        .collect::<Vec<_>>()
+    {
+        stars.y_px[row] += 40.0;
+    }
+    let images = apart.images.as_mut().unwrap();
+    for i in (0..images.len())
+        .filter(|&i| images.slot[i] == 0)
+        .collect::<Vec<_>>()
+    {
+        images.y0_px[i] += 40.0;
+    }
+    let times = [times_on_patch(&together, 0), times_on_patch(&together, 1)];
+    let [together, apart] = [run(&together), run(&apart)];
+
+    let folds = times.each_ref().map(|t| folds_of(&together, t));
+    assert!(!folds[0].iter().any(|f| folds[1].contains(f)), "{folds:?}");
+    assert!(ids(&together).contains(&"dark_map"), "{:?}", ids(&together));
+    for (slot, at) in [0, 1].into_iter().zip(&times) {
+        let [before, after] = rms_of(&together, slot, at);
+        assert!(after < 0.3 * before, "star {slot}: {before} {after}");
+        let [_, alone] = rms_of(&apart, slot, at);
+        assert!(
+            after < 0.97 * alone,
+            "star {slot}: {after} together, {alone} alone"
+        );
+    }
+    let gain = [&together, &apart].map(|c| rival(c, "dark_map").delta_loglik);
+    assert!(gain[0] > gain[1] + 500.0, "{gain:?}");
+
+    let found: Vec<usize> = (0..together.dark_map.as_ref().unwrap().dn.len())
+        .filter(|&i| cell(&together, i) == SHARED)
+        .collect();
+    assert_eq!(found.len(), 1, "the pixel is in the map once");
+    let pulls = pulls(&together, &scene.warm);
+    assert!(pulls[found[0]].abs() < 5.0, "{}", pulls[found[0]]);
+    let sigma = together.dark_map.as_ref().unwrap().sigma_dn[found[0]];
+    assert!((0.2..2.0).contains(&sigma), "{sigma}");
+}
+
+/// Pixels without a level of their own: whatever else is found, no map is claimed.
+#[test]
+fn without_warm_pixels_no_map_is_claimed() {
+    for size in [[8, 8], [6, 6]] {
+        let closed = run(&Scene {
+            size,
+            ..Scene::default()
+        }
+        .make());
+        assert!(
+            !ids(&closed).contains(&"dark_map"),
+            "{size:?} {:?}",
+            closed.report.effects
+        );
+        assert!(closed.dark_map.is_none());
+        let [before, after] = rms(&closed);
+        for axis in 0..2 {
+            assert!(
+                after[axis] < 1.01 * before[axis],
+                "{size:?} {before:?} {after:?}"
+            );
+        }
+    }
+}
+
+/// A hit in one pixel of a thousand changes a window in 28 and no pixel of the map by
+/// more than its error. The errors themselves hold against the truth: 3000 pulls, of
+/// which neighbours share spots; a factor 1.3 is far outside their scatter.
+#[test]
+fn particle_hits_leave_map_and_residual_alone() {
+    let warm = population(0.03, 40.0, &WIDE, 5);
+    let [clean, hit] = [0.0, 1e-3].map(|hits| {
+        run(&Scene {
+            hits,
+            warm: warm.clone(),
+            ..Scene::default()
+        }
+        .make())
+    });
+    for closed in [&clean, &hit] {
+        assert!(ids(closed).contains(&"dark_map"), "{:?}", ids(closed));
+        assert!(
+            !ids(closed).contains(&"pixel_phase_harmonics"),
+            "{:?}",
+            ids(closed)
+        );
+        let pulls = root_mean_square(&pulls(closed, &warm));
+        assert!((1.0 / 1.3..1.3).contains(&pulls), "pulls {pulls}");
+    }
+    let ([_, clean_after], [before, after]) = (rms(&clean), rms(&hit));
+    for axis in 0..2 {
+        assert!(
+            before[axis] > 1.1 * rms(&clean)[0][axis],
+            "the hits are felt before"
+        );
+        assert!(
+            (after[axis] / clean_after[axis] - 1.0).abs() < 0.1,
+            "{after:?} {clean_after:?}"
+        );
+    }
+    let (a, b) = (
+        clean.dark_map.as_ref().unwrap(),
+        hit.dark_map.as_ref().unwrap(),
+    );
+    assert_eq!((&a.x_px, &a.y_px), (&b.x_px, &b.y_px));
+    let change: Vec<f64> = (0..a.dn.len())
+        .map(|i| (a.dn[i] - b.dn[i]) / a.sigma_dn[i].hypot(b.sigma_dn[i]))
+        .collect();
+    assert!(
+        root_mean_square(&change) < 0.5,
+        "{}",
+        root_mean_square(&change)
+    );
+    assert!(change.iter().all(|c| c.abs() < 5.0));
+}
+
+/// Spots much sharper than a pixel: the first moment errs with the pixel phase, and no
+/// pixel adds anything. The map is not the explanation.
+#[test]
+#[ignore = "the step to the map is credited with the level that its first moments also follow"]
+fn pixel_phase_is_not_mistaken_for_warm_pixels() {
+    for size in [[4, 4], [3, 3]] {
+        let closed = run(&Scene {
+            size,
+            sigma_px: 0.35,
+            ..Scene::default()
+        }
+        .make());
+        assert!(
+            !ids(&closed).contains(&"dark_map"),
+            "{size:?} {:?}",
+            closed.report.effects
+        );
+        let [before, after] = rms(&closed);
+        let best = rival(&closed, "declared model + pixel_phase_harmonics");
+        for axis in 0..2 {
+            assert!(
+                after[axis] < 0.5 * before[axis],
+                "{size:?} {before:?} {after:?}"
+            );
+            assert!(
+                after[axis] < 1.1 * best.rms_arcsec[axis],
+                "{size:?} {after:?} {best:?}"
+            );
+        }
+    }
+}
+
+/// Whatever the pixels are explained by, the rival by pixel phase stands beside it on
+/// the data of sharp spots with the truth: it takes off most of the error.
+#[test]
+fn rivals_show_what_pixel_phase_explains() {
+    let closed = run(&Scene {
+        size: [4, 4],
+        sigma_px: 0.35,
+        ..Scene::default()
+    }
+    .make());
+    let [declared, phase] = ["declared model", "declared model + pixel_phase_harmonics"]
+        .map(|what| rival(&closed, what));
+    assert!(phase.delta_loglik > 1000.0, "{phase:?}");
+    assert!(phase.delta_loglik > rival(&closed, "dark_map").delta_loglik + 1000.0);
+    for axis in 0..2 {
+        assert!(
+            phase.rms_arcsec[axis] < 0.4 * declared.rms_arcsec[axis],
+            "{phase:?} {declared:?}"
+        );
+    }
+}
+
+/// A short, sparse scene for what only has to work.
+fn short() -> Scene {
+    Scene {
+        frames: 120,
+        motion: small,
+        warm: population(0.05, 40.0, &WIDE, 5),
+        ..Scene::default()
+    }
+}
+
+/// A few pixels to and fro: a short stretch sees every pixel many times.
+fn small(k: usize, _: usize) -> [f64; 3] {
+    let t = k as f64;
+    [
+        2.0 * (0.33 * t).sin(),
+        2.0 * (0.47 * t).cos(),
+        0.5 * (0.2 * t).sin(),
+    ]
+}
+
+/// Every row is there, every number finite, and the error no larger than before.
+fn sound(name: &str, bundle: &Bundle) -> Closed {
+    let closed = run(bundle);
+    let rows = bundle.stars.as_ref().unwrap().rows();
+    let stars = closed.stars.as_ref().unwrap();
+    assert_eq!(
+        stars.t_s.len() + closed.report.rows.outside_reference,
+        rows,
+        "{name}"
+    );
+    for values in stars.before_arcsec.iter().chain(&stars.after_arcsec) {
+        assert!(values.iter().all(|v| v.is_finite()), "{name}");
+    }
+    let [before, after] = rms(&closed);
+    for axis in 0..2 {
+        assert!(
+            after[axis] < 1.1 * before[axis],
+            "{name}: {before:?} {after:?}"
+        );
+    }
+    closed
+}
+
+#[test]
+fn windows_of_any_size_and_pixel_centre() {
+    for (size, pixel_centre) in [([4, 4], 0.5), ([7, 7], 0.5), ([8, 8], 0.0), ([5, 7], 0.0)] {
+        let scene = Scene {
+            size,
+            pixel_centre,
+            ..short()
+        };
+        let closed = sound(&format!("{size:?}"), &scene.make());
+        if let Some(map) = &closed.dark_map {
+            let fraction = |v: &f64| (v - pixel_centre - (v - pixel_centre).round()).abs();
+            assert!(
+                map.x_px.iter().chain(&map.y_px).all(|v| fraction(v) < 1e-9),
+                "{size:?}"
+            );
+        }
+    }
+    let corners = vec![[0, 0], [0, 5], [5, 0], [5, 5]];
+    let closed = sound(
+        "corners",
+        &Scene {
+            unread: corners,
+            ..short()
+        }
+        .make(),
+    );
+    let [before, after] = rms(&closed);
+    assert!(
+        after[0] < 0.7 * before[0] && after[1] < 0.7 * before[1],
+        "{before:?} {after:?}"
+    );
+}
+
+#[test]
+fn tables_that_cover_each_other_in_part() {
+    let whole = short().make();
+    let gaps = |t_s: f64, slot: i32| slot != 2 && !(slot == 1 && (t_s / 2.0) % 3.0 < 0.5);
+    sound(
+        "stars without windows",
+        &keep_rows(&whole, |_, _| true, gaps),
+    );
+    sound(
+        "windows without stars",
+        &keep_rows(&whole, gaps, |_, _| true),
+    );
+    sound(
+        "no window at all",
+        &keep_rows(&whole, |_, _| true, |_, _| false),
+    );
+    let mut holes = whole.clone();
+    for (i, value) in holes.images.as_mut().unwrap().pixels.iter_mut().enumerate() {
+        if i % 997 == 0 {
+            *value = f64::NAN;
+        }
+    }
+    sound("pixels without a value", &holes);
+}
+
+/// A star is who it is, whatever slot follows it.
+#[test]
+fn slots_may_change_their_stars() {
+    let whole = short().make();
+    let mut changed = whole.clone();
+    let other = |t_s: f64, slot: i32| {
+        if t_s > 120.0 && slot < 2 {
+            1 - slot
+        } else {
+            slot
+        }
+    };
+    let stars = changed.stars.as_mut().unwrap();
+    for (row, t_s) in stars.t_of_rows_s().into_iter().enumerate() {
+        stars.slot[row] = other(t_s, stars.slot[row]);
+    }
+    let images = changed.images.as_mut().unwrap();
+    for i in 0..images.len() {
+        images.slot[i] = other(images.t_s[i], images.slot[i]);
+    }
+    let [a, b] = [sound("as they are", &whole), sound("changed", &changed)];
+    let ([_, a], [_, b]) = (rms(&a), rms(&b));
+    for axis in 0..2 {
+        assert!((a[axis] / b[axis] - 1.0).abs() < 1e-6, "{a:?} {b:?}");
+    }
+}
+
+#[test]
+fn little_data_is_taken_in_stride() {
+    for (frames, count) in [(40, 2), (31, 5), (12, 3), (5, 4)] {
+        let mut stars = WIDE;
+        // two stars side by side know nothing of the roll
+        stars.rotate_left(2);
+        let scene = Scene {
+            frames,
+            count,
+            stars,
+            ..short()
+        };
+        let closed = sound(&format!("{frames} frames, {count} stars"), &scene.make());
+        assert_eq!(
+            closed.report.rows.used + closed.report.rows.outliers,
+            frames * count
+        );
+    }
+}
