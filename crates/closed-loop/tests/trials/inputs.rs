@@ -1,0 +1,198 @@
+//! Bundles with little or odd data in them: a clear error or a sensible result, never a panic.
+
+use closed_loop::{CloseError, Closed};
+use focal_plane::StarFrames;
+use telemetry::{Bundle, Model};
+
+use crate::kit::{Case, Path, closed};
+
+fn short() -> Case {
+    let mut case = Case::new(Path::Slews, 5);
+    case.duration_s = 60.0;
+    case
+}
+
+/// The rows of `stars` that `keep(frame, row of the frame)` accepts; frames stay, empty or not.
+fn kept(stars: &StarFrames, keep: impl Fn(usize, usize) -> bool) -> StarFrames {
+    let mut out = StarFrames::new();
+    for k in 0..stars.frames() {
+        out.begin(stars.t_s[k]);
+        for (i, row) in stars.rows_of(k).enumerate() {
+            if keep(k, i) {
+                out.push(
+                    stars.slot[row],
+                    stars.star_id[row],
+                    stars.x_px[row],
+                    stars.y_px[row],
+                );
+            }
+        }
+    }
+    out
+}
+
+/// The loop on a bundle that `change` has been at.
+fn after(case: &Case, change: impl Fn(&mut Bundle)) -> Result<Closed, CloseError> {
+    let (model, mut bundle) = case.make();
+    change(&mut bundle);
+    closed(&model, &bundle)
+}
+
+fn is_finite(closed: &Closed) -> bool {
+    let rms = [
+        closed.report.before.star_rms_arcsec,
+        closed.report.after.star_rms_arcsec,
+    ];
+    rms.iter()
+        .all(|r| r.is_some_and(|r| r.iter().all(|v| v.is_finite())))
+}
+
+fn only_first(count: usize) -> impl Fn(&mut Bundle) {
+    move |bundle| {
+        let stars = bundle.stars.as_ref().map(|s| kept(s, |_, i| i < count));
+        bundle.stars = stars;
+    }
+}
+
+#[test]
+fn one_or_two_stars_against_a_reference() {
+    for count in [1, 2] {
+        let closed = after(&short(), only_first(count)).unwrap();
+        assert!(is_finite(&closed), "{count} stars");
+        assert!(
+            closed.report.effects.is_empty(),
+            "{count} stars: {:?}",
+            closed.report.effects
+        );
+    }
+}
+
+/// A star alone gives no attitude.
+#[test]
+fn one_star_without_a_reference_is_an_error() {
+    let alone = after(&short().reference("none"), only_first(1));
+    assert!(
+        matches!(alone, Err(CloseError::TooFewFrames { frames: 0, .. })),
+        "{:?}",
+        alone.err()
+    );
+}
+
+#[test]
+fn stars_alone() {
+    assert!(is_finite(
+        &after(&short().reference("none"), |_| {}).unwrap()
+    ));
+    let blind = after(&short().reference("none"), |b| b.catalog = None).unwrap();
+    assert!(is_finite(&blind));
+    let blind = after(&short(), |b| b.catalog = None).unwrap();
+    assert!(is_finite(&blind));
+}
+
+#[test]
+fn frames_without_stars_and_stars_that_leave() {
+    let closed = after(&short(), |b| {
+        let stars = b
+            .stars
+            .as_ref()
+            .map(|s| kept(s, |k, i| k % 17 != 3 && (k < 60 || i > 4)));
+        b.stars = stars;
+    })
+    .unwrap();
+    assert!(is_finite(&closed));
+    let rows: usize = closed.stars.map_or(0, |s| s.t_s.len());
+    assert_eq!(rows, closed.report.rows.used + closed.report.rows.outliers);
+}
+
+/// Frames inside a hole of the reference are counted, never interpolated across.
+#[test]
+fn a_gap_in_the_reference() {
+    let (model, mut bundle) = short().make();
+    let whole: usize = bundle.stars.as_ref().map_or(0, StarFrames::rows);
+    let table = bundle.reference.as_mut().unwrap();
+    let keep: Vec<bool> = table
+        .t_s
+        .iter()
+        .map(|t| !(20.0..30.0).contains(t))
+        .collect();
+    let mut at = keep.iter();
+    table.t_s.retain(|_| *at.next().unwrap());
+    let mut at = keep.iter();
+    table.q.retain(|_| *at.next().unwrap());
+    if let Some(rates) = &mut table.rates_rad_s {
+        let mut at = keep.iter();
+        rates.retain(|_| *at.next().unwrap());
+    }
+    let closed = closed(&model, &bundle).unwrap();
+    let rows = closed.report.rows;
+    assert!(rows.outside_reference >= 15 * 12, "{rows:?}");
+    assert_eq!(rows.used + rows.outliers + rows.outside_reference, whole);
+    assert!(is_finite(&closed));
+}
+
+#[test]
+fn nothing_within_the_reference_is_an_error() {
+    let late = after(&short(), |b| {
+        if let Some(table) = &mut b.reference {
+            for t in &mut table.t_s {
+                *t += 1e4;
+            }
+        }
+    });
+    assert!(
+        matches!(late, Err(CloseError::TooFewFrames { frames: 0, .. })),
+        "{:?}",
+        late.err()
+    );
+}
+
+/// Fewer than ten frames: one is left out at a time.
+#[test]
+fn nine_frames_and_three() {
+    let mut case = short();
+    case.duration_s = 4.5;
+    let nine = case.close();
+    assert_eq!(nine.report.folds, 9);
+    assert!(
+        is_finite(&nine) && nine.report.effects.is_empty(),
+        "{:?}",
+        nine.report.effects
+    );
+    case.duration_s = 1.5;
+    let (model, bundle) = case.make();
+    let three = closed(&model, &bundle);
+    assert!(
+        matches!(three, Err(CloseError::TooFewFrames { frames: 3, .. })),
+        "{:?}",
+        three.err()
+    );
+}
+
+#[test]
+fn unknown_magnitudes_and_colours() {
+    let closed = after(&short(), |b| {
+        if let Some(stars) = &mut b.stars {
+            stars.mag = Some(vec![f64::NAN; stars.rows()]);
+        }
+        b.housekeeping = None;
+    })
+    .unwrap();
+    assert!(is_finite(&closed));
+}
+
+#[test]
+fn neither_stars_nor_reference_is_an_error() {
+    let bare = after(&short().reference("none"), |b| b.stars = None);
+    assert!(
+        matches!(bare, Err(CloseError::NothingToCompare(_))),
+        "{:?}",
+        bare.err()
+    );
+    let nothing = closed(
+        &Model::parse(MODEL, "m.toml", &[]).unwrap(),
+        &Bundle::default(),
+    );
+    assert!(nothing.is_err());
+}
+
+const MODEL: &str = "format = \"boresight-model/1\"\nkind = \"pbm\"\n[tracker]\npixels = [1024, 1024]\nfov_deg = [20.0, 20.0]\n";

@@ -1,0 +1,190 @@
+//! Bundles to try the loop on: the tracker of [M23] Table 1, a motion, and what acts in it.
+//!
+//! Not physics: scenario files, made from parts.
+
+use closed_loop::{CloseError, Closed, close};
+use scenarios::{Scenario, simulate};
+use telemetry::{Bundle, Model};
+
+/// How the tracker moves.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Path {
+    /// A slow drift, tens of pixels within the run.
+    Drift,
+    /// Slews to and fro about three axes, up to 5 px/s.
+    Slews,
+    /// To and fro every 8 s: the image reverses again and again.
+    Turns,
+}
+
+impl Path {
+    fn toml(self, seed: u64) -> String {
+        // pointings of different star density, at any roll
+        let s = seed as f64;
+        let start = format!(
+            "start = {{ ra_deg = {:.3}, dec_deg = {:.3}, roll_deg = {:.3} }}",
+            (75.0 + 137.508 * s) % 360.0,
+            55.0 * (0.7 * s).sin(),
+            (20.0 + 77.7 * s) % 360.0
+        );
+        let slew = |axis: &str, angle: f64, duration: f64, hold: f64| {
+            format!(
+                "[[motion.slew]]\naxis = {axis}\nangle_deg = {angle:?}\nduration_s = {duration:?}\nhold_s = {hold:?}\n"
+            )
+        };
+        match self {
+            Self::Drift => {
+                format!("[motion]\nkind = \"hold\"\n{start}\ndrift_arcsec_s = [6.0, -9.0, 1.0]\n")
+            }
+            Self::Slews => {
+                let mut text = format!(
+                    "[motion]\nkind = \"slews\"\n{start}\ndrift_arcsec_s = [1.5, -2.5, 0.5]\nwait_s = 20.0\nrepeat = 4\n"
+                );
+                for (axis, angle) in [
+                    ("[1.0, 0.0, 0.0]", 1.3),
+                    ("[0.0, 1.0, 0.0]", 1.3),
+                    ("[0.0, 0.0, 1.0]", 7.0),
+                ] {
+                    text += &slew(axis, angle, 30.0, 10.0);
+                    text += &slew(axis, -angle, 30.0, 10.0);
+                }
+                text
+            }
+            Self::Turns => format!(
+                "[motion]\nkind = \"hold\"\n{start}\ndrift_arcsec_s = [1.5, -2.5, 0.5]\n\
+                 [[motion.sinusoid]]\naxis = [1.0, 0.4, 0.0]\namplitude_arcsec = 400.0\nfrequency_hz = 0.11\n\
+                 [[motion.sinusoid]]\naxis = [0.0, 0.6, 1.0]\namplitude_arcsec = 600.0\nfrequency_hz = 0.083\n"
+            ),
+        }
+    }
+}
+
+/// One bundle to be made.
+#[derive(Clone, Debug)]
+pub(crate) struct Case {
+    pub(crate) path: Path,
+    pub(crate) seed: u64,
+    pub(crate) stars: usize,
+    pub(crate) duration_s: f64,
+    /// `[[effect]]` entries: what acts.
+    pub(crate) effects: String,
+    /// `[reference]`, or nothing.
+    pub(crate) reference: String,
+    /// More `[[housekeeping.channel]]` entries.
+    pub(crate) channels: String,
+    /// True temporal noise over the declared.
+    pub(crate) noise: f64,
+}
+
+impl Case {
+    /// Nothing acts; a perfect reference; two channels that do nothing.
+    pub(crate) fn new(path: Path, seed: u64) -> Self {
+        Self {
+            path,
+            seed,
+            stars: 12,
+            duration_s: 420.0,
+            effects: String::new(),
+            reference: "[reference]\n".to_owned(),
+            channels: String::new(),
+            noise: 1.0,
+        }
+    }
+
+    /// The same with an effect: its `id` and the lines of its parameters.
+    pub(crate) fn with(mut self, id: &str, parameters: &str) -> Self {
+        self.effects += &format!("[[effect]]\nid = \"{id}\"\n{parameters}\n");
+        self
+    }
+
+    pub(crate) fn reference(mut self, lines: &str) -> Self {
+        self.reference = if lines == "none" {
+            String::new()
+        } else {
+            format!("[reference]\n{lines}\n")
+        };
+        self
+    }
+
+    pub(crate) fn scenario(&self) -> Scenario {
+        let noise = |sigma: f64| {
+            format!(
+                "[noise]\ntemporal_arcsec = {sigma:?}\ncentroid_arcsec = 5.06\n\
+                 distortion_arcsec = 3.1667\ndistortion_order = 7\n"
+            )
+        };
+        let text = format!(
+            "format = \"boresight-model/1\"\nkind = \"pbm\"\n\
+             [tracker]\npixels = [1024, 1024]\nfov_deg = [20.0, 20.0]\nmax_stars = {}\nexposure_s = 0.1\n\
+             {}{}{}\
+             [sky]\nkind = \"hipparcos\"\nstars = {}\n\
+             [run]\nduration_s = {:?}\nrate_hz = 2.0\nseed = {}\n{}\
+             [housekeeping]\nrate_hz = 0.2\n{HEATER}{OPTICS}{}",
+            self.stars,
+            noise(7.43 * self.noise),
+            self.effects,
+            self.path.toml(self.seed),
+            self.stars,
+            self.duration_s,
+            self.seed,
+            self.reference,
+            self.channels,
+        );
+        Scenario::parse(&text, "trial.toml").expect("the trial's scenario is one")
+    }
+
+    /// The model of somebody who does not know what acts, and the bundle.
+    pub(crate) fn make(&self) -> (Model, Bundle) {
+        let scenario = self.scenario();
+        let bundle = simulate(&scenario).expect("the trial's bundle can be made");
+        let mut model = scenario.model_without_effects();
+        model.noise.temporal_arcsec = Some(7.43);
+        (model, bundle)
+    }
+
+    pub(crate) fn close(&self) -> Closed {
+        let (model, bundle) = self.make();
+        closed(&model, &bundle).expect("the loop closes")
+    }
+}
+
+/// A bracket under a thermostat, and its heater.
+const HEATER: &str = r#"[[housekeeping.channel]]
+kind = "thermostat"
+name = "bracket_c"
+low = 19.4
+high = 20.6
+settles_on = 24.0
+settles_off = 17.0
+tau_s = 200.0
+noise = 0.02
+switch = "heater_on"
+"#;
+
+/// Optics whose temperature goes up and down within the run.
+const OPTICS: &str = r#"[[housekeeping.channel]]
+kind = "sinusoid"
+name = "optics_c"
+mean = 12.0
+amplitude = 0.8
+period_s = 300.0
+phase_deg = 40.0
+noise = 0.02
+"#;
+
+/// Velocity of the Earth, inertial.
+pub(crate) const VELOCITY: &str = r#"[[housekeeping.channel]]
+kind = "orbit_velocity"
+radius_km = 149597870.7
+period_s = 31558149.5
+inclination_deg = 23.44
+"#;
+
+pub(crate) fn closed(model: &Model, bundle: &Bundle) -> Result<Closed, CloseError> {
+    close(model, bundle, &|_| {})
+}
+
+/// Sum of the mean squares over both axes, arcsec^2.
+pub(crate) fn power(rms: Option<[f64; 2]>) -> f64 {
+    rms.map_or(f64::NAN, |[x, y]| x * x + y * y)
+}

@@ -1,0 +1,6 @@
+//! The loop on bundles of known truth.
+
+mod inputs;
+mod invariances;
+mod kit;
+mod power;
