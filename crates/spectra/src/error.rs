@@ -1,6 +1,6 @@
 //! What can be wrong with a series or with what is asked of it.
 //!
-//! Source: this crate.
+//! Not physics: names of what was refused.
 
 /// Why no spectrum came out.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

@@ -135,6 +135,19 @@ fn averaged_bins() -> Result<(), SpectraError> {
         Ok(LogAverage::new(&spectrum, 8.0)?.apply(&spectrum, &correlation))
     };
     check(averaged, 1024, &[6, 9, 12], 0.01, "averaged Welch")?;
+    // boxcar segments are joined across bins by their overlap alone
+    let welch = Welch::new(WelchSettings {
+        window: Window::Boxcar,
+        overlap: 128,
+        ..welch.settings().clone()
+    })?;
+    let correlation = welch.bin_correlation(7);
+    assert!(correlation.len() > 2 && correlation[1] > 0.05);
+    let averaged = |x: &[f64]| {
+        let spectrum = welch.process(x)?;
+        Ok(LogAverage::new(&spectrum, 8.0)?.apply(&spectrum, &correlation))
+    };
+    check(averaged, 1024, &[6, 9, 12], 0.01, "averaged boxcars")?;
     let multitaper = Multitaper::new(MultitaperSettings {
         weights: TaperWeights::Uniform,
         detrend: Detrend::None,

@@ -59,3 +59,27 @@ fn white_noise_has_its_level() -> Result<(), SpectraError> {
     assert!((mean - 1.6).abs() < 5.0 * error, "{mean} +- {error}");
     Ok(())
 }
+
+/// Phases are turned from bin to bin: after 4000 bins still those of a plan that starts at the last one. Each
+/// turn rounds by `eps` and turns are computed anew every 128 bins: `128 eps` of the amplitude.
+#[test]
+fn many_bins_do_not_drift() -> Result<(), SpectraError> {
+    let x = white(100, 9);
+    let t_s: Vec<f64> = (0..100)
+        .map(|n| f64::from(n) + 0.01 * f64::from(n * n % 23))
+        .collect();
+    let plan = |first_hz, bins| {
+        let settings = LombScargleSettings {
+            first_hz,
+            step_hz: 1e-4,
+            bins,
+            floating_mean: true,
+            fs_hz: 1.0,
+        };
+        LombScargle::new(&t_s, settings)?.process(&x)
+    };
+    let many = plan(1e-4, 4095)?;
+    let last = plan(0.4095, 1)?;
+    close(many.psd[4094], last.psd[0], 10.0, 3e-14, "last bin");
+    Ok(())
+}
