@@ -147,7 +147,13 @@ mod tests {
         let grid = Grid::new(sample.reach_px() + 0.5, 1.1);
         let windows: Vec<usize> = (0..sample.windows()).collect();
         let weight: Vec<f64> = (0..sample.z.len())
-            .map(|i| if i % 11 == 3 { 0.0 } else { 0.01 + (i % 7) as f64 * 0.003 })
+            .map(|i| {
+                if i % 11 == 3 {
+                    0.0
+                } else {
+                    0.01 + (i % 7) as f64 * 0.003
+                }
+            })
             .collect();
         let level = |_: usize| 20.0;
         let (flux, at, rho) = (&sample.flux, &sample.start, 1e-3);
@@ -175,10 +181,13 @@ mod tests {
             }
         }
         let covariance = whole.cholesky().unwrap().inverse();
-        let covariance = covariance.view((order, order), (pixels, pixels)).into_owned();
+        let covariance = covariance
+            .view((order, order), (pixels, pixels))
+            .into_owned();
         let all = pixels as f64;
-        for (k, (p, added)) in
-            variance_from_spot(&shared, precision, &variance).into_iter().enumerate()
+        for (k, (p, added)) in variance_from_spot(&shared, precision, &variance)
+            .into_iter()
+            .enumerate()
         {
             assert_eq!(p, shared.pixel[k]);
             let contrast = covariance[(k, k)] - 2.0 * covariance.column(k).sum() / all
@@ -187,7 +196,10 @@ mod tests {
             let own = variance[p] * (1.0 - 2.0 / all)
                 + shared.pixel.iter().map(|&q| variance[q]).sum::<f64>() / (all * all);
             let expected = contrast - own;
-            assert!((added - expected).abs() < 1e-6 * contrast, "{added} {expected}");
+            assert!(
+                (added - expected).abs() < 1e-6 * contrast,
+                "{added} {expected}"
+            );
         }
     }
 

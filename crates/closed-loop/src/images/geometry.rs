@@ -222,7 +222,13 @@ mod tests {
     /// a single star: nothing is left of these, and nothing breaks.
     #[test]
     fn distortion_and_attitude_are_told_apart() {
-        let stars = [[-300.0, 210.0], [350.0, 280.0], [60.0, -390.0], [-120.0, -60.0], [220.0, -80.0]];
+        let stars = [
+            [-300.0, 210.0],
+            [350.0, 280.0],
+            [60.0, -390.0],
+            [-120.0, -60.0],
+            [220.0, -80.0],
+        ];
         let (length, focal) = (500.0, 40_000.0);
         let truth = [0.4, -0.7, 1.5];
         let values = [1.0, 2.0, 3.0, 2.0];
@@ -231,7 +237,11 @@ mod tests {
         for k in 0..200 {
             let t = f64::from(k);
             let shift = [30.0 * (0.05 * t).sin(), 25.0 * (0.031 * t).cos()];
-            let rotation = [1e-5 * (0.7 * t).sin(), 1e-5 * (0.3 * t).cos(), 1e-4 * (0.2 * t).sin()];
+            let rotation = [
+                1e-5 * (0.7 * t).sin(),
+                1e-5 * (0.3 * t).cos(),
+                1e-4 * (0.2 * t).sin(),
+            ];
             let mut frame = Vec::new();
             for (star, place) in stars.iter().enumerate() {
                 if star == 4 && k % 2 == 0 || star > 0 && k % 50 == 7 {
@@ -267,7 +277,11 @@ mod tests {
         };
         let weight = [1.0, 2.0, 1.0, 3.0, 1.0];
         let geometry = Geometry::fit(&sample, &taken, &at, &weight, length);
-        assert!((geometry.distortion - Vector3::from(truth)).norm() < 0.05, "{}", geometry.distortion);
+        assert!(
+            (geometry.distortion - Vector3::from(truth)).norm() < 0.05,
+            "{}",
+            geometry.distortion
+        );
         let left = rms(&geometry.residual(&sample, &others, &at));
         let plain = Geometry::fit(&sample, &taken, &at, &weight, f64::INFINITY);
         let without = rms(&plain.residual(&sample, &others, &at));

@@ -26,14 +26,17 @@ use super::spot::{self, Normal};
 use super::window_fit::{self, Fitted, Known, PixelNoise, Pixels};
 use super::{MAD_SCALE, robust_median};
 
-/// Rounds of everything.
-const OUTER: usize = 5;
+/// Rounds of everything: with half as many the table's centroids, moved by the very
+/// pixels that are sought, still show in the map at twice its error.
+const OUTER: usize = 12;
 /// Most rounds of spots and map at fixed positions, and the change of the map in
 /// its own sigmas that ends them.
 const INNER: usize = 60;
 const STANDS_STILL: f64 = 0.01;
-/// Gauss-Newton steps of a window while learning, and when all else is frozen.
-const LEARNING_STEPS: usize = 4;
+/// Gauss-Newton steps of a window in the first round, in those that start where the
+/// last one ended, and when all else is frozen.
+const FIRST_STEPS: usize = 4;
+const LEARNING_STEPS: usize = 2;
 const FINAL_STEPS: usize = 16;
 /// Starting values in the scaled unit, each far on the side of knowing nothing:
 /// variance of backgrounds, and variance of the second differences of a spot.
@@ -135,7 +138,12 @@ pub(crate) fn learn(
         if with_variance && outer == OUTER - 1 {
             learned.dark_variance = learned.marginal_variance(&sums);
         }
-        let weights = learned.fit_windows(sample, &windows, &mut state);
+        let steps = if outer == 0 {
+            FIRST_STEPS
+        } else {
+            LEARNING_STEPS
+        };
+        let weights = learned.fit_windows(sample, &windows, &mut state, steps);
         learned.learn_noise(sample, &windows, &state);
         star_weight = weights;
     }
@@ -285,6 +293,7 @@ impl Learned {
         sample: &Sample,
         windows: &[Vec<usize>],
         state: &mut State,
+        steps: usize,
     ) -> Vec<f64> {
         let results: Vec<Vec<(Fitted, Pixels)>> = windows
             .par_iter()
@@ -295,8 +304,7 @@ impl Learned {
                     .map(|&w| {
                         let mut pixels = Pixels::default();
                         let start = state.fitted[w];
-                        let fitted =
-                            window_fit::fit(&known, sample, w, &start, LEARNING_STEPS, &mut pixels);
+                        let fitted = window_fit::fit(&known, sample, w, &start, steps, &mut pixels);
                         if fitted.is_none() {
                             // nothing in it is believed
                             pixels.good.fill(false);

@@ -101,7 +101,10 @@ mod tests {
                 let mut sum = [0.0; 2];
                 for (i, &[c, _]) in sample.cells_of(w).zip(&sample.cells) {
                     let q = sample.z[i] - level;
-                    sum = [sum[0] + q, sum[1] + q * (sample.corner[w][0] + c as f64 - sample.start[w][0])];
+                    sum = [
+                        sum[0] + q,
+                        sum[1] + q * (sample.corner[w][0] + c as f64 - sample.start[w][0]),
+                    ];
                 }
                 sum[1] / sum[0]
             };
@@ -114,7 +117,12 @@ mod tests {
         let again = fit(&sample, &windows, &sample.start, &good, &dark, known + 30.0);
         assert!(level > known, "light beyond the edge needs a higher level");
         assert!(scatter(known) > 0.02, "{}", scatter(known));
-        assert!(scatter(level) < 0.25 * scatter(known), "{} {}", scatter(level), scatter(known));
+        assert!(
+            scatter(level) < 0.25 * scatter(known),
+            "{} {}",
+            scatter(level),
+            scatter(known)
+        );
         assert!((again - level).abs() < 2.0, "{again} {level}");
         for step in [-3.0, 3.0] {
             assert!(scatter(level + step) > 0.99 * scatter(level));

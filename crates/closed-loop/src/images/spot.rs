@@ -115,7 +115,7 @@ impl Normal {
             *band.at(row, 0) += ridge;
         }
         for_roughness(grid, |row, offset, value| {
-            *band.at(row, offset) += value / rho
+            *band.at(row, offset) += value / rho;
         });
         band
     }

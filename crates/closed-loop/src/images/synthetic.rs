@@ -167,10 +167,16 @@ pub(crate) fn few_windows(count: usize) -> Sample {
     let mut place = Vec::new();
     for k in 0..count {
         let [dx, dy] = dither(17 * k).map(|v| 0.5 * v);
-        let at = Pixel { x: 40.0 + dx, y: -25.0 + dy };
+        let at = Pixel {
+            x: 40.0 + dx,
+            y: -25.0 + dy,
+        };
         let corner = [(at.x - 1.5).round(), (at.y - 1.5).round()];
         let mut window = vec![0.0; 16];
-        let first = Pixel { x: corner[0], y: corner[1] };
+        let first = Pixel {
+            x: corner[0],
+            y: corner[1],
+        };
         centroid::pixel_gaussian_into(first, 4, at, 0.9, FLUX, &mut window).unwrap();
         for v in &mut window {
             *v += BACKGROUND;

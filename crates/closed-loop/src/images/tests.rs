@@ -51,8 +51,7 @@ fn out_of_fold(made: &Made, variants: &[[Vec<f64>; 2]]) -> [Vec<f64>; 2] {
 
 /// A value for every pixel, exponential with mean 25, the same on every call.
 fn warm(centre: [f64; 2]) -> f64 {
-    let n = ((centre[0] + 700.0) * 2.0) as u64 * 4099 + ((centre[1] + 700.0) * 2.0) as u64;
-    let mut z = n.wrapping_mul(0x9E37_79B9_7F4A_7C15);
+    let mut z = centre[0].to_bits().wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ centre[1].to_bits();
     z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
     z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
     let uniform = ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64;
@@ -96,9 +95,10 @@ fn every(_: usize) -> bool {
     true
 }
 
-/// Deviations in units of sigma have rms 1 if the errors are honest. They hang
-/// together over a star's patch (a few tens of independent ones in all), hence the
-/// wide gate; the variance with the spots known alone gives 4 and more.
+/// Deviations in units of sigma have rms 1 if the errors are honest. Over 12 maps
+/// drawn anew it was 0.98 to 1.15 with a scatter of 0.05; the gate is 5 of these
+/// about the middle. With half the rounds of learning it is 1.1 to 2.8, with the
+/// spots taken as known 2 and more.
 #[test]
 fn errors_of_the_map_are_honest() {
     let made = Scenario {
@@ -109,12 +109,13 @@ fn errors_of_the_map_are_honest() {
     .make();
     let formed = formed(&made);
     let rms = rms_of(&pulls(&made, &formed.map, &warm));
-    assert!((0.6..1.6).contains(&rms), "deviations of {rms} sigma");
+    assert!((0.8..1.32).contains(&rms), "deviations of {rms} sigma");
     assert_eq!(formed.fallback_rows, 0);
 }
 
-/// First moments with the map off come within 15 % of what they are on a clean
-/// detector; fitted positions are better than these.
+/// First moments with the map off are better than plain ones on a clean detector,
+/// by 0.75 to 0.9 over 40 maps, as their level follows the star; fitted positions
+/// are better still, 0.69 to 0.75. Before they are 4 times worse.
 #[test]
 fn warm_pixels_stop_moving_the_stars() {
     let made = Scenario {
@@ -134,12 +135,13 @@ fn warm_pixels_stop_moving_the_stars() {
     let fitted = rms(&made, &out_of_fold(&made, &formed.fitted), &every);
     let before = rms(&made, &table(&made), &every);
     assert!(before > 3.0 * floor, "{before} {floor}");
-    assert!(moments < 1.15 * floor, "moments {moments}, clean {floor}");
+    assert!(moments < floor, "moments {moments}, clean {floor}");
     assert!(fitted < 0.8 * floor, "fitted {fitted}, clean {floor}");
 }
 
 /// Without warm pixels the map stays within its errors, and the centroids as good
-/// as they were: first moments lose less than 2 %, positions gain.
+/// as they were: over 40 seeds first moments gain 1 to 3 %, positions 20 %; the map has
+/// an rms of 0.02 to 0.04.
 #[test]
 fn a_clean_detector_gets_no_map() {
     for pixel_centre in [0.0, 0.5] {
@@ -151,13 +153,13 @@ fn a_clean_detector_gets_no_map() {
         .make();
         let formed = formed(&made);
         let deviation = rms_of(&pulls(&made, &formed.map, &nothing));
-        assert!(deviation < 1.6, "{deviation}");
-        assert!(formed.map.rms_dn() < 0.5, "{}", formed.map.rms_dn());
+        assert!(deviation < 1.0, "{deviation}");
+        assert!(formed.map.rms_dn() < 0.1, "{}", formed.map.rms_dn());
         let before = rms(&made, &table(&made), &every);
         let moments = rms(&made, &out_of_fold(&made, &formed.moments), &every);
         let fitted = rms(&made, &out_of_fold(&made, &formed.fitted), &every);
-        assert!(moments < 1.02 * before, "{moments} {before}");
-        assert!(fitted < before, "{fitted} {before}");
+        assert!(moments < 1.01 * before, "{moments} {before}");
+        assert!(fitted < 0.9 * before, "{fitted} {before}");
         // sqrt(sigma^2 + 1/12) 2.3548, to the area's cells of 0.05 px
         let expected = 2.3548 * (SIGMA_PX * SIGMA_PX + 1.0 / 12.0).sqrt();
         for width in &formed.fwhm_px {
@@ -167,7 +169,8 @@ fn a_clean_detector_gets_no_map() {
 }
 
 /// A hit of 3000 in one pixel moves the first moment by up to half a pixel and the
-/// fitted position by what the loss of one of 36 pixels costs, at the core a third.
+/// fitted position by what the loss of one of 36 pixels costs: 0.8 to 1.2 times the
+/// scatter of the others over 40 seeds.
 #[test]
 fn a_particle_hit_costs_its_pixel_only() {
     let hit = |row: usize| row % 23 == 4;
@@ -181,7 +184,7 @@ fn a_particle_hit_costs_its_pixel_only() {
     let (struck, others) = (rms(&made, &fitted, &hit), rms(&made, &fitted, &|r| !hit(r)));
     let before = rms(&made, &table(&made), &hit);
     assert!(before > 0.2, "{before}");
-    assert!(struck < 1.5 * others, "{struck} {others}");
+    assert!(struck < 1.4 * others, "{struck} {others}");
 }
 
 /// Two stars pass the same warm pixel, at different times and in different slots.
@@ -226,6 +229,12 @@ fn a_map_belongs_to_the_detector() {
     };
     let both = make(&dark, usize::MAX);
     let whole = formed(&both).map;
+    let there = whole
+        .pixels
+        .iter()
+        .filter(|p| dark([p.x_px, p.y_px]) > 0.0)
+        .count();
+    assert_eq!(there, 1, "one pixel, whichever star looks at it");
     let others = whole.pixels.iter().filter(|p| **p != pixel(&whole));
     let largest = others.map(|p| p.dn).fold(0.0, f64::max);
     assert!(
@@ -400,10 +409,6 @@ mod measured {
     use crate::robust;
     use crate::star_data::Inputs;
 
-    #[expect(
-        clippy::print_stderr,
-        reason = "a test that checks nothing must say so"
-    )]
     fn chandra() -> Option<(StarData, WindowTable)> {
         let root = std::env::var_os("BORESIGHT_DATA").map_or_else(
             || PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data")),
@@ -510,10 +515,6 @@ mod measured {
             of(&formed.fitted, f64::INFINITY),
         );
         let bent = of(&formed.fitted, 512.0);
-        println!(
-            "before {start:.4?} moments {moments:.4?} fitted {fitted:.4?} bent {bent:.4?} moments bent {:.4?}",
-            of(&formed.moments, 512.0)
-        );
         assert!(start.iter().all(|v| (0.25..0.30).contains(v)), "{start:?}");
         assert!(moments.iter().all(|v| *v <= 0.065), "{moments:?}");
         assert!(fitted.iter().all(|v| *v <= 0.04), "{fitted:?}");

@@ -42,7 +42,7 @@ pub(crate) struct PixelNoise {
 }
 
 impl PixelNoise {
-    pub(crate) fn variance(&self, model: f64) -> f64 {
+    pub(crate) fn variance(self, model: f64) -> f64 {
         self.a + self.b * model.max(0.0)
     }
 }
@@ -202,7 +202,12 @@ mod tests {
                     dark: &dark,
                     dark_variance: None,
                 };
-                let start = Fitted { at: start, flux: 8e3, background: level, ..Fitted::default() };
+                let start = Fitted {
+                    at: start,
+                    flux: 8e3,
+                    background: level,
+                    ..Fitted::default()
+                };
                 fit(&known, sample, w, &start, 30, pixels).unwrap()
             };
             let best = fit_from(&sample, truth, &mut pixels);
@@ -217,7 +222,11 @@ mod tests {
                 let struck = fit_from(&sample, [truth[0] + 0.3, truth[1] + 0.2], &mut pixels);
                 sample.z[i] = kept;
                 let good = pixels.good.iter().filter(|g| **g).count();
-                assert_eq!((good, pixels.good[cell]), (15, false), "window {w}, pixel {cell}");
+                assert_eq!(
+                    (good, pixels.good[cell]),
+                    (15, false),
+                    "window {w}, pixel {cell}"
+                );
                 let off = (struck.at[0] - truth[0]).hypot(struck.at[1] - truth[1]);
                 // the spline's own misfit without that pixel
                 assert!(off < 0.01, "window {w}, pixel {cell}: {off}");
