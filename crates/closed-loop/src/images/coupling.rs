@@ -127,3 +127,61 @@ impl Coupling {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::spot::WindowTaps;
+    use super::super::synthetic::few_windows;
+    use super::*;
+
+    /// Both directions against sums over the pixels one by one: rounding only.
+    #[test]
+    fn sums_are_those_over_the_pixels() {
+        let sample = few_windows(25);
+        let grid = Grid::new(sample.reach_px() + 0.5, 0.7);
+        let windows: Vec<usize> = (0..sample.windows()).filter(|w| w % 5 != 2).collect();
+        let weight: Vec<f64> = (0..sample.z.len()).map(|i| (i % 4) as f64 * 0.1).collect();
+        let (flux, at) = (&sample.flux, &sample.start);
+        let level = |w: usize| w as f64;
+        let coupling = Coupling::new(
+            &grid,
+            &sample,
+            &by_pixel(&sample, &windows),
+            flux,
+            at,
+            &weight,
+            level,
+        );
+        let dark: Vec<f64> = (0..sample.centre.len())
+            .map(|p| (p as f64 * 0.7).sin())
+            .collect();
+        let psi: Vec<f64> = (0..grid.len()).map(|j| (j as f64 * 0.3).cos()).collect();
+        let pixels = sample.centre.len();
+        let (mut off, mut told, mut total) =
+            (vec![0.0; grid.len()], vec![0.0; pixels], vec![0.0; pixels]);
+        coupling.take_off_dark(&dark, &mut off);
+        coupling.tell_pixels(&psi, &mut told, &mut total);
+        let (mut both, mut excess, mut weights) = (0.0, vec![0.0; pixels], vec![0.0; pixels]);
+        let mut taps = WindowTaps::default();
+        for &w in &windows {
+            taps.set(&grid, &sample, w, at[w]);
+            for (i, &[c, r]) in sample.cells_of(w).zip(&sample.cells) {
+                let light = flux[w] * grid.value(&psi, &taps.x[c], &taps.y[r]);
+                let p = sample.pixel[i];
+                both -= weight[i] * light * dark[p];
+                excess[p] += weight[i] * (sample.z[i] - level(w) - light);
+                weights[p] += weight[i];
+            }
+        }
+        // psi^T sum c D, one number for all entries of the first
+        let got: f64 = off.iter().zip(&psi).map(|(o, g)| o * g).sum();
+        assert!((got / both - 1.0).abs() < 1e-9, "{got} {both}");
+        for p in 0..pixels {
+            assert!((told[p] - excess[p]).abs() < 1e-8 * FLUX_SCALE, "pixel {p}");
+            assert!((total[p] - weights[p]).abs() < 1e-12);
+        }
+    }
+
+    /// Rounding is relative to the light in a window.
+    const FLUX_SCALE: f64 = 1e4;
+}

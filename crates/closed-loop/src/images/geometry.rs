@@ -216,6 +216,21 @@ mod tests {
     use super::super::sample::Entry;
     use super::*;
 
+    /// By hand on the axes and the diagonal, as rows (dx, dy) for p1, p2, k1.
+    #[test]
+    fn decentring_and_radial_terms_by_hand() {
+        for (at, expected) in [
+            ([2.0, 0.0], [[0.0, 3.0, 1.0], [1.0, 0.0, 0.0]]),
+            ([0.0, -2.0], [[0.0, 1.0, 0.0], [3.0, 0.0, -1.0]]),
+            ([2.0, 2.0], [[2.0, 4.0, 2.0], [4.0, 2.0, 2.0]]),
+        ] {
+            let got = brown(at, 2.0);
+            for (g, e) in got.as_flattened().iter().zip(expected.as_flattened()) {
+                assert!((g - e).abs() < 1e-15, "{got:?}");
+            }
+        }
+    }
+
     /// Five stars that move by 30 px behind a lens with decentring and radial
     /// distortion of some px at 500 px: found to the second order of what the
     /// attitude absorbs. One star sits in every other frame only, some frames hold

@@ -233,4 +233,52 @@ mod tests {
         let width = fwhm_px(&grid, &psi);
         assert!((width - 2.3548 * sigma).abs() < 0.02 * width, "{width}");
     }
+
+    /// psi^T R psi + tr(Q^-1 R) with dense matrices; R built from its definition.
+    #[test]
+    fn roughness_step_against_dense_algebra() {
+        let sample = super::super::synthetic::few_windows(40);
+        let grid = Grid::new(sample.reach_px() + 0.5, 1.3);
+        let (n, order) = (grid.side, grid.len());
+        let windows: Vec<usize> = (0..sample.windows()).collect();
+        let weight = vec![1e-9; sample.z.len()];
+        let sums = normal(
+            &grid,
+            &sample,
+            &windows,
+            &sample.flux,
+            &sample.start,
+            &weight,
+            |_| 0.0,
+        );
+        let mut q = sums.penalised(&grid, 0.4);
+        let mut dense = nalgebra::DMatrix::zeros(order, order);
+        for i in 0..order {
+            for k in 0..=q.width.min(order - 1 - i) {
+                dense[(i, i + k)] = *q.at(i, k);
+                dense[(i + k, i)] = *q.at(i, k);
+            }
+        }
+        let mut rough = nalgebra::DMatrix::zeros(order, order);
+        for line in 0..n {
+            for s in 0..n - 2 {
+                for (stride, start) in [(n, s * n + line), (1, line * n + s)] {
+                    for (a, u) in [1.0, -2.0, 1.0].into_iter().enumerate() {
+                        for (b, v) in [1.0, -2.0, 1.0].into_iter().enumerate() {
+                            rough[(start + a * stride, start + b * stride)] += u * v;
+                        }
+                    }
+                }
+            }
+        }
+        let psi: Vec<f64> = (0..order).map(|i| (i as f64).sin()).collect();
+        let x = nalgebra::DVector::from_vec(psi.clone());
+        let trace = (dense.try_inverse().unwrap() * &rough).trace();
+        let expected = (x.dot(&(&rough * &x)) + trace) / (order as f64 - 4.0);
+        let factor = sums.factor(&grid, 0.4).unwrap();
+        let got = next_rho(&grid, &factor, &psi);
+        assert!((got / expected - 1.0).abs() < 1e-9, "{got} {expected}");
+        // both parts count
+        assert!(trace > 0.1 * expected * order as f64);
+    }
 }

@@ -315,6 +315,38 @@ fn the_number_of_threads_does_not_matter() {
     assert!(run(1) == run(3));
 }
 
+/// Two windows of a fold change places: no number that all data share moves by it,
+/// and what is learned outside that fold stays the same to the last bit.
+#[test]
+fn a_fold_takes_no_part_in_what_it_is_judged_by() {
+    let mut made = Scenario {
+        dark: &warm,
+        frames: 100,
+        ..scenario()
+    }
+    .make();
+    let before = formed(&made);
+    let n = made.windows.pixels_per_window();
+    let (a, b) = (
+        made.windows.window(8).to_vec(),
+        made.windows.window(48).to_vec(),
+    );
+    made.windows.pixels[8 * n..9 * n].copy_from_slice(&b);
+    made.windows.pixels[48 * n..49 * n].copy_from_slice(&a);
+    let after = formed(&made);
+    let differing = |variant: usize| {
+        (0..made.truth[0].len())
+            .filter(|r| ![8, 48].contains(r))
+            .filter(|&r| {
+                let bits = |f: &Formed| [&f.fitted, &f.moments].map(|v| v[variant][0][r].to_bits());
+                bits(&before) != bits(&after)
+            })
+            .count()
+    };
+    assert_eq!(differing(0), 0);
+    assert!(differing(1) > 300 && differing(5) > 300);
+}
+
 #[test]
 fn little_or_foreign_data_is_no_failure() {
     let still = |k: usize| [0.01 * k as f64, 0.0];
