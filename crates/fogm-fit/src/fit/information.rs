@@ -115,3 +115,58 @@ pub(crate) fn inverse(m: &Matrix) -> Option<Matrix> {
     });
     Some(out)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// First and second derivatives against differences of the density: second differences with a
+    /// step of 1e-3 are good to 1e-6 and lose 1e-10 to rounding.
+    #[test]
+    fn derivatives_are_those_of_differences() {
+        let at = |logs: Logs, cycles: f64| {
+            derivatives(
+                (2.0 * logs[0]).exp(),
+                (-logs[1]).exp(),
+                (2.0 * logs[2]).exp(),
+                cycles,
+            )
+        };
+        let h = 1e-3;
+        for (logs, cycles) in [
+            ([0.3, 3.0, -0.2], 0.004),
+            ([1.0, -0.5, 0.5], 0.3),
+            ([0.0, 6.0, -3.0], 0.0002),
+        ] {
+            let here = at(logs, cycles);
+            for i in 0..3 {
+                let (mut up, mut down) = (logs, logs);
+                up[i] += h;
+                down[i] -= h;
+                let (up, down) = (at(up, cycles), at(down, cycles));
+                let slope = (up.f - down.f) / (2.0 * h);
+                assert!((slope - here.first[i]).abs() < 1e-5 * here.f, "first {i}");
+                for j in 0..3 {
+                    let second = (up.first[j] - down.first[j]) / (2.0 * h);
+                    let error = (second - here.second[i][j]).abs();
+                    assert!(error < 1e-5 * here.f, "second {i} {j}: {error}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn inverse_is_one() {
+        let m = [[4.0, 1.0, 0.05], [1.0, 3e6, 2.0], [0.05, 2.0, 1e-2]];
+        let inverse = inverse(&m).unwrap();
+        for i in 0..3 {
+            for j in 0..3 {
+                let product: f64 = (0..3).map(|k| m[i][k] * inverse[k][j]).sum();
+                let want = f64::from(u8::from(i == j));
+                // columns differ in scale by 1e9
+                assert!((product - want).abs() < 1e-5, "{i} {j}: {product}");
+            }
+        }
+        assert!(super::inverse(&[[1.0; 3]; 3]).is_none());
+    }
+}

@@ -20,6 +20,8 @@ pub(crate) const DROP: f64 = 1.920_729_410_347_062;
 /// The same for 99 %: beyond this a region must still be closed for a parameter to count as
 /// estimated.
 pub(crate) const CLOSED: f64 = 3.317_448_300_510_389;
+/// By how much a column at a tip of the region may miss its floor.
+const TIP: f64 = 0.02;
 /// Distance of nodes in natural widths of a column.
 const SPACING: f64 = 0.75;
 /// Columns on either side of the maximum, at most.
@@ -381,13 +383,42 @@ pub(crate) fn region<L: Likelihood>(likelihood: &L, plane: &Plane, best: Best) -
         best = next;
         cut = columns(likelihood, plane, best);
     }
-    let mut region = summarise(likelihood.weight(), plane, best, &cut, DROP);
     let wide = summarise(likelihood.weight(), plane, best, &cut, CLOSED);
+    sharpen(likelihood, plane, best, &mut cut);
+    let mut region = summarise(likelihood.weight(), plane, best, &cut, DROP);
     for (range, wide) in region.ranges.iter_mut().zip(wide.ranges) {
         range.open_low = wide.open_low;
         range.open_high = wide.open_high;
     }
     region
+}
+
+/// Columns where the region of 95 % ends, and half-way there: on a narrow oblique ridge the extremes
+/// of sigma lie at its very tips.
+fn sharpen<L: Likelihood>(likelihood: &L, plane: &Plane, best: Best, cut: &mut Vec<Column>) {
+    let floor = best.ln_l - DROP;
+    let (low, high) = ends(cut, floor);
+    for (end, first) in [(low, true), (high, false)] {
+        let Some(end) = end else { continue };
+        let inside = |c: &&Column| c.best.ln_l >= floor;
+        let near = if first {
+            cut.iter().find(inside)
+        } else {
+            cut.iter().rfind(inside)
+        };
+        let Some(near) = near.cloned() else { continue };
+        for x in [0.5 * (near.x + end), end] {
+            let guess = cut
+                .windows(2)
+                .find(|pair| pair[0].x <= x && x <= pair[1].x)
+                .map_or(near.best.place.u, |pair| {
+                    let (a, b) = (pair[0].best.place, pair[1].best.place);
+                    a.u + (b.u - a.u) * (x - a.x) / (b.x - a.x)
+                });
+            cut.push(column(likelihood, plane, x, guess, width_of(&near), floor));
+            cut.sort_by(|a, b| a.x.total_cmp(&b.x));
+        }
+    }
 }
 
 fn columns<L: Likelihood>(likelihood: &L, plane: &Plane, best: Best) -> Vec<Column> {
@@ -452,9 +483,13 @@ fn summarise(weight: f64, plane: &Plane, best: Best, columns: &[Column], drop: f
         range.add(value, value);
     }
     for column in columns {
-        if column.best.ln_l < floor {
+        if column.best.ln_l < floor - TIP {
             continue;
         }
+        // a column at the tip of the region holds one point of it
+        let tip = logs_of(column.best.place, column.best.ln_v, plane.dt_s);
+        ranges[0].add(tip[0], tip[0]);
+        ranges[2].add(tip[2], tip[2]);
         for node in refined(&column.nodes) {
             let (u, excess) = (node.0, node.1 - floor);
             if excess < 0.0 {
