@@ -273,7 +273,7 @@ fn report<L: Likelihood>(
     log_psd: LogPsdFit,
 ) -> Fit {
     let logs = surface::logs_at(region.best, plane);
-    let fogm = surface::fogm_alone(likelihood, plane, None).ln_l;
+    let fogm = surface::fogm_alone(likelihood, plane).ln_l;
     // as many independent numbers as the weight says
     let ln_n = (2.0 * likelihood.weight()).ln();
     let choice = choose([white, fogm, region.best.ln_l], ln_n);

@@ -41,7 +41,7 @@ pub(crate) struct Unit {
     pub(crate) step: Step,
     /// q.
     pub(crate) drive: f64,
-    /// sigma_TN^2.
+    /// White variance.
     pub(crate) white: f64,
 }
 
@@ -55,13 +55,13 @@ impl Unit {
         }
     }
 
-    /// sigma_HSF^2.
+    /// Variance of the FOGM.
     pub(crate) fn fogm(&self) -> f64 {
         self.drive / self.step.one_minus_a2
     }
 }
 
-/// True parameters as logarithms: sigma_HSF, tau (s), sigma_TN.
+/// True parameters as logarithms: `sigma_HSF`, `tau` in s, `sigma_TN`.
 pub(crate) type Logs = [f64; 3];
 
 /// The place and the log of v of given parameters.
