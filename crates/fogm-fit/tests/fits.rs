@@ -50,7 +50,7 @@ fn spectrum(
 }
 
 /// E9: fitted to a raw periodogram, the printed cost returns every sigma 0.749 times too small, and
-/// sigma_HSF sqrt(2) too large on top (E6). 20 spectra of 4000 bins; the mean's standard error is the
+/// `sigma_HSF` sqrt(2) too large on top (E6). 20 spectra of 4000 bins; the mean's standard error is the
 /// claimed one over sqrt(20). tau is far above the step, so that E8 stays below the FOGM's corner.
 #[test]
 fn printed_fit_of_a_raw_periodogram_is_low_by_a_quarter() -> Result<(), Failure> {
