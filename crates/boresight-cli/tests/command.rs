@@ -1,0 +1,167 @@
+//! The command as a user meets it: exit codes, streams, files.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use assert_cmd::Command;
+
+type Done = Result<(), Box<dyn std::error::Error>>;
+
+fn boresight() -> Command {
+    Command::new(env!("CARGO_BIN_EXE_boresight"))
+}
+
+fn fixtures() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fixtures")
+}
+
+/// A copy of the example's bundle that a test may break.
+fn example_bundle(to: &Path) -> std::io::Result<PathBuf> {
+    let bundle = to.join("bundle");
+    fs::create_dir(&bundle)?;
+    for entry in fs::read_dir(fixtures().join("example/bundle"))? {
+        let entry = entry?;
+        fs::copy(entry.path(), bundle.join(entry.file_name()))?;
+    }
+    Ok(bundle)
+}
+
+/// The example carries a rolling shutter of 30 us a line, five sigma of its own
+/// estimate on either side; the model file does not declare it.
+#[test]
+fn without_arguments_the_example_is_explained() -> Done {
+    let out = boresight().args(["close", "--json"]).output()?;
+    assert!(out.status.success());
+    let report: serde_json::Value = serde_json::from_slice(&out.stdout)?;
+    assert_eq!(report["format"], "boresight-report/1");
+    assert_eq!(report["verdict"], "explained");
+    let effects = report["effects"].as_array().ok_or("effects")?;
+    assert_eq!(effects.len(), 1);
+    assert_eq!(effects[0]["id"], "rolling_shutter");
+    let line_time = &effects[0]["parameters"]["line_time_s"];
+    let (value, sigma) = (line_time["value"].as_f64().ok_or("value")?, line_time["sigma"].as_f64().ok_or("sigma")?);
+    assert!((value - 30e-6).abs() < 5.0 * sigma, "{value} +- {sigma}");
+    for axis in 0..2 {
+        let rms = |when: &str| report[when]["star_rms_arcsec"][axis].as_f64();
+        assert!(rms("after") < rms("before"));
+    }
+    Ok(())
+}
+
+#[test]
+fn results_are_whole_and_the_model_can_be_used_again() -> Done {
+    let dir = tempfile::tempdir()?;
+    let out = dir.path().join("results");
+    let done = boresight().arg("close").arg("--out").arg(&out).output()?;
+    assert!(done.status.success());
+    let text = String::from_utf8(done.stdout)?;
+    assert!(text.contains("before") && text.contains("rolling_shutter"));
+    assert!(done.stderr.is_empty(), "no progress where stderr is no terminal");
+    for file in
+        ["report.json", "summary.txt", "model.toml", "residuals_stars.parquet", "residuals_attitude.parquet"]
+    {
+        assert!(fs::metadata(out.join(file))?.len() > 0, "{file}");
+    }
+    assert_eq!(fs::read_dir(dir.path())?.count(), 1, "nothing beside the results");
+    // with what was found declared, nothing is left to find
+    let bundle = example_bundle(dir.path())?;
+    let again = boresight().args(["close", "--json"]).arg(out.join("model.toml")).arg(&bundle).output()?;
+    let report: serde_json::Value = serde_json::from_slice(&again.stdout)?;
+    assert_eq!(report["verdict"], "consistent");
+    Ok(())
+}
+
+/// Exit 2, one message that names the place, and nothing left behind.
+fn refuses(bundle: &Path, words: &[&str]) -> Done {
+    let dir = tempfile::tempdir()?;
+    let out = dir.path().join("results");
+    let done = boresight()
+        .arg("close")
+        .arg(fixtures().join("example/model.toml"))
+        .arg(bundle)
+        .arg("--out")
+        .arg(&out)
+        .output()?;
+    let message = String::from_utf8(done.stderr)?;
+    assert_eq!(done.status.code(), Some(2), "{message}");
+    assert!(done.stdout.is_empty());
+    for word in words {
+        assert!(message.contains(word), "no {word:?} in: {message}");
+    }
+    assert!(!out.exists() && fs::read_dir(dir.path())?.count() == 0, "output left behind");
+    Ok(())
+}
+
+#[test]
+fn a_word_in_a_number_is_named_by_file_line_and_column() -> Done {
+    let dir = tempfile::tempdir()?;
+    let bundle = example_bundle(dir.path())?;
+    fs::remove_file(bundle.join("housekeeping.csv.gz"))?;
+    fs::write(bundle.join("rates.csv"), "t_s,wx_rad_s,wy_rad_s,wz_rad_s\n0.0,0,0,0\n0.5,0,fast,0\n")?;
+    refuses(&bundle, &["rates.csv", "3", "wy_rad_s", "fast"])
+}
+
+#[test]
+fn a_missing_column_is_named() -> Done {
+    let dir = tempfile::tempdir()?;
+    let bundle = example_bundle(dir.path())?;
+    fs::remove_file(bundle.join("reference.csv.gz"))?;
+    fs::write(bundle.join("reference.csv"), "t_s,qx,qy,qz\n0.0,0,0,0\n")?;
+    refuses(&bundle, &["reference.csv", "qw"])
+}
+
+#[test]
+fn a_key_that_does_not_exist_names_the_nearest() -> Done {
+    let dir = tempfile::tempdir()?;
+    let bundle = example_bundle(dir.path())?;
+    let toml = fs::read_to_string(bundle.join("bundle.toml"))?;
+    fs::write(bundle.join("bundle.toml"), toml.replace("sample_rate_hz", "sample_rate_herz"))?;
+    refuses(&bundle, &["bundle.toml", "sample_rate_herz", "sample_rate_hz"])
+}
+
+#[test]
+fn an_empty_folder_is_no_bundle() -> Done {
+    let dir = tempfile::tempdir()?;
+    let bundle = dir.path().join("bundle");
+    fs::create_dir(&bundle)?;
+    refuses(&bundle, &["bundle.toml"])
+}
+
+#[test]
+fn usage_errors_exit_with_two() -> Done {
+    for arguments in [&["clos"][..], &["close", "model.toml"], &["close", "--threads", "0"]] {
+        let done = boresight().args(arguments).output()?;
+        assert_eq!(done.status.code(), Some(2), "{arguments:?}");
+        assert!(done.stdout.is_empty());
+    }
+    Ok(())
+}
+
+#[test]
+fn the_numbers_do_not_depend_on_the_threads() -> Done {
+    let run = |threads: &str| boresight().args(["close", "--json", "--threads", threads]).output();
+    assert_eq!(run("1")?.stdout, run("3")?.stdout);
+    Ok(())
+}
+
+#[test]
+fn a_simulated_bundle_closes() -> Done {
+    let dir = tempfile::tempdir()?;
+    let bundle = dir.path().join("bundle");
+    let done = boresight()
+        .args(["simulate", "--quiet", "--tables", "parquet"])
+        .arg(fixtures().join("scenarios/example.toml"))
+        .arg("--out")
+        .arg(&bundle)
+        .output()?;
+    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+    assert!(done.stdout.is_empty());
+    let done = boresight()
+        .args(["close", "--json"])
+        .arg(fixtures().join("example/model.toml"))
+        .arg(&bundle)
+        .output()?;
+    let report: serde_json::Value = serde_json::from_slice(&done.stdout)?;
+    assert_eq!(report["effects"][0]["id"], "rolling_shutter");
+    Ok(())
+}
