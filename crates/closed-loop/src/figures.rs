@@ -90,8 +90,9 @@ fn amplitudes_of(
     let p = found.candidates[g].coefficients().len();
     let at: Vec<Option<usize>> = (0..p).map(|j| set.iter().position(|&c| c == first + j)).collect();
     let values = at.iter().map(|a| a.map_or(0.0, |i| estimate.value[i])).collect();
+    let spread = estimate.cautious_covariance();
     let covariance = DMatrix::from_fn(p, p, |i, j| match (at[i], at[j]) {
-        (Some(i), Some(j)) => estimate.covariance[(i, j)],
+        (Some(i), Some(j)) => spread[(i, j)],
         _ => 0.0,
     });
     (values, covariance)

@@ -15,14 +15,20 @@
 //! on times shorter than a block and whatever the true noise level is:
 //!
 //! ```text
-//! V = S^-1 (sum_b s_b s_b^T) S^-1,   s_b = the score of block b at beta
+//! V = S^-1 (sum_b s_b s_b^T + v (S - sum_b S_b)) S^-1,   s_b = the score of block b at beta
 //! F = (B - p) / (p (B - 1)) beta^T V^-1 beta ~ F(p, B - p)    (Hotelling)
 //! ```
+//!
+//! S - sum_b S_b is what the prior of the nuisance adds: a drawn distortion is
+//! one draw for all blocks, and its share of the score shows in none of them.
+//! Few blocks, or a column that lives in few of them, make V too small by chance:
+//! neither the standard error nor the p-value is let below that of white noise,
+//! v S^-1 and chi-squared.
 //!
 //! Source: Liang & Zeger 1986 (cluster-robust variance); Hotelling 1931.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
-use statrs::distribution::{ContinuousCDF, FisherSnedecor};
+use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
 
 use crate::folds::Folds;
 use crate::gram::BlockGrams;
@@ -153,8 +159,10 @@ impl OutOfFold {
 pub(crate) struct Estimate {
     /// One amplitude a column of the set.
     pub(crate) value: DVector<f64>,
-    /// Its covariance.
+    /// Its cluster-robust covariance.
     pub(crate) covariance: DMatrix<f64>,
+    /// Its covariance if the noise were white.
+    pub(crate) white: DMatrix<f64>,
     /// Blocks behind the covariance.
     pub(crate) blocks: usize,
 }
@@ -167,18 +175,34 @@ impl Estimate {
         if which.is_empty() || b <= p {
             return 1.0;
         }
+        let (Some(robust), Some(white)) =
+            (self.distance(&self.covariance, which), self.distance(&self.white, which))
+        else {
+            return 1.0;
+        };
+        let f = (b - p) / (p * (b - 1.0)) * robust;
+        let hotelling = FisherSnedecor::new(p, b - p).map_or(1.0, |law| law.sf(f));
+        hotelling.max(ChiSquared::new(p).map_or(1.0, |law| law.sf(white)))
+    }
+
+    /// Squared distance of amplitudes `which` from zero in the metric of `covariance`.
+    fn distance(&self, covariance: &DMatrix<f64>, which: &[usize]) -> Option<f64> {
         let value = DVector::from_fn(which.len(), |i, _| self.value[which[i]]);
-        let covariance =
-            DMatrix::from_fn(which.len(), which.len(), |i, j| self.covariance[(which[i], which[j])]);
-        let Some(factor) = Cholesky::new(covariance) else { return 1.0 };
-        let t2 = value.dot(&factor.solve(&value));
-        let f = (b - p) / (p * (b - 1.0)) * t2;
-        FisherSnedecor::new(p, b - p).map_or(1.0, |law| law.sf(f))
+        let part = DMatrix::from_fn(which.len(), which.len(), |i, j| covariance[(which[i], which[j])]);
+        Some(value.dot(&Cholesky::new(part)?.solve(&value)))
+    }
+
+    /// The cluster-robust covariance with no variance below that of white noise.
+    pub(crate) fn cautious_covariance(&self) -> DMatrix<f64> {
+        let stretch = |k: usize| self.sigma(k) / self.covariance[(k, k)].sqrt().max(f64::MIN_POSITIVE);
+        DMatrix::from_fn(self.value.len(), self.value.len(), |i, j| {
+            stretch(i) * self.covariance[(i, j)] * stretch(j)
+        })
     }
 
     /// Standard error of amplitude `k`.
     pub(crate) fn sigma(&self, k: usize) -> f64 {
-        self.covariance[(k, k)].max(0.0).sqrt()
+        self.covariance[(k, k)].max(self.white[(k, k)]).max(0.0).sqrt()
     }
 }
 
@@ -259,9 +283,16 @@ impl Fits {
         let b = self.blocks as f64;
         // Small-sample factor of the cluster-robust variance.
         spread *= b / (b - 1.0).max(1.0);
+        let variance = self.variance(set)?;
+        for i in 0..p {
+            for j in 0..p {
+                let own: f64 = self.all.blocks.iter().map(|(gram, _)| gram[(set[i], set[j])]).sum();
+                spread[(i, j)] += variance * (self.all.train[(set[i], set[j])] - own);
+            }
+        }
         let inverse = factor.inverse();
         let covariance = &inverse * spread * &inverse;
-        Some(Estimate { value, covariance, blocks: self.blocks })
+        Some(Estimate { value, covariance, white: inverse * variance, blocks: self.blocks })
     }
 
     /// Correlation between two columns once the nuisance is out: how alike two
