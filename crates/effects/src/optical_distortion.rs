@@ -56,7 +56,14 @@ impl EffectKind for Kind {
     ) -> Result<Box<dyn Effect>, EffectError> {
         let known = ["k1", "k2", "p1", "p2", "cx_px", "cy_px"];
         let reader = Reader::new(ID, parameters, &known)?;
-        let values = reader.axes(TERMS)?; // terms not given are zero
+        // Terms not given are not there, and are not reported as zeros.
+        let terms: Vec<usize> = (0..TERMS.len())
+            .filter(|&k| reader.has(TERMS[k]))
+            .collect();
+        let values = terms
+            .iter()
+            .map(|&k| reader.required(TERMS[k]))
+            .collect::<Result<Vec<f64>, _>>()?;
         let centre = Pixel {
             x: reader.number_or("cx_px", 0.0)?,
             y: reader.number_or("cy_px", 0.0)?,
@@ -64,9 +71,9 @@ impl EffectKind for Kind {
         let brown = Brown {
             camera: surroundings.camera.clone(),
             centre,
-            terms: &[0, 1, 2, 3],
+            terms,
         };
-        Ok(Box::new(Shifted::new(brown, values.to_vec())))
+        Ok(Box::new(Shifted::new(brown, values)))
     }
     fn candidates(&self, scene: &Scene<'_>) -> Vec<Box<dyn Candidate>> {
         if !scene.has_stars {
@@ -77,7 +84,7 @@ impl EffectKind for Kind {
                 ShiftCandidate::boxed(Brown {
                     camera: scene.surroundings.camera.clone(),
                     centre: Pixel::default(),
-                    terms,
+                    terms: terms.to_vec(),
                 })
             })
             .collect()
@@ -89,7 +96,7 @@ struct Brown {
     camera: Camera,
     centre: Pixel,
     /// Which of [`TERMS`] it has.
-    terms: &'static [usize],
+    terms: Vec<usize>,
 }
 
 impl Shift for Brown {
@@ -125,7 +132,7 @@ impl Shift for Brown {
             [fx * 2.0 * x * y, fy * (r2 + 2.0 * y * y)],
             [fx * (r2 + 2.0 * x * x), fy * 2.0 * x * y],
         ];
-        for (out, &k) in out.iter_mut().zip(self.terms) {
+        for (out, &k) in out.iter_mut().zip(&self.terms) {
             *out = all[k];
         }
     }
