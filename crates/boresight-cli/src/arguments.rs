@@ -7,7 +7,9 @@ use clap::{Args, Parser, Subcommand};
 /// Star tracker error models that close the loop with measured data.
 #[derive(Debug, Parser)]
 #[command(name = "boresight", version, about, propagate_version = true)]
-#[command(after_help = "Example:\n  boresight close                 the whole loop on the example inside the binary")]
+#[command(
+    after_help = "Example:\n  boresight close                 the whole loop on the example inside the binary"
+)]
 pub(crate) struct Arguments {
     #[command(subcommand)]
     pub(crate) command: Command,
@@ -25,10 +27,14 @@ pub(crate) struct Arguments {
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
     /// Find what the model misses, add it, and report the error before and after
-    #[command(after_help = "Examples:\n  boresight close\n  boresight close fixtures/models/aa-str.toml telemetry/ --out results/")]
+    #[command(
+        after_help = "Examples:\n  boresight close\n  boresight close fixtures/models/aa-str.toml telemetry/ --out results/"
+    )]
     Close(Close),
     /// Make the bundle that a tracker would have sent
-    #[command(after_help = "Example:\n  boresight simulate fixtures/scenarios/example.toml --out bundle/")]
+    #[command(
+        after_help = "Example:\n  boresight simulate fixtures/scenarios/example.toml --out bundle/"
+    )]
     Simulate(Simulate),
 }
 

@@ -15,7 +15,11 @@ pub(crate) struct Console {
 impl Console {
     pub(crate) fn new(quiet: bool, json: bool) -> Self {
         // Draws on stderr, and not at all when that is no terminal.
-        let bar = if quiet { ProgressBar::hidden() } else { ProgressBar::new_spinner() };
+        let bar = if quiet {
+            ProgressBar::hidden()
+        } else {
+            ProgressBar::new_spinner()
+        };
         if let Ok(style) = ProgressStyle::with_template("{spinner} {elapsed} {msg}") {
             bar.set_style(style);
         }

@@ -25,7 +25,9 @@ fn main() -> ExitCode {
     let console = Console::new(arguments.quiet, arguments.json);
     if let Some(threads) = arguments.threads {
         // Fails only when a pool is there already, which nothing before this made.
-        let _ = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
+        let _ = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build_global();
     }
     let done = match &arguments.command {
         Command::Close(options) => commands::close::run(options, &console),

@@ -39,7 +39,10 @@ fn without_arguments_the_example_is_explained() -> Done {
     assert_eq!(effects.len(), 1);
     assert_eq!(effects[0]["id"], "rolling_shutter");
     let line_time = &effects[0]["parameters"]["line_time_s"];
-    let (value, sigma) = (line_time["value"].as_f64().ok_or("value")?, line_time["sigma"].as_f64().ok_or("sigma")?);
+    let (value, sigma) = (
+        line_time["value"].as_f64().ok_or("value")?,
+        line_time["sigma"].as_f64().ok_or("sigma")?,
+    );
     assert!((value - 30e-6).abs() < 5.0 * sigma, "{value} +- {sigma}");
     for axis in 0..2 {
         let rms = |when: &str| report[when]["star_rms_arcsec"][axis].as_f64();
@@ -56,16 +59,31 @@ fn results_are_whole_and_the_model_can_be_used_again() -> Done {
     assert!(done.status.success());
     let text = String::from_utf8(done.stdout)?;
     assert!(text.contains("before") && text.contains("rolling_shutter"));
-    assert!(done.stderr.is_empty(), "no progress where stderr is no terminal");
-    for file in
-        ["report.json", "summary.txt", "model.toml", "residuals_stars.parquet", "residuals_attitude.parquet"]
-    {
+    assert!(
+        done.stderr.is_empty(),
+        "no progress where stderr is no terminal"
+    );
+    for file in [
+        "report.json",
+        "summary.txt",
+        "model.toml",
+        "residuals_stars.parquet",
+        "residuals_attitude.parquet",
+    ] {
         assert!(fs::metadata(out.join(file))?.len() > 0, "{file}");
     }
-    assert_eq!(fs::read_dir(dir.path())?.count(), 1, "nothing beside the results");
+    assert_eq!(
+        fs::read_dir(dir.path())?.count(),
+        1,
+        "nothing beside the results"
+    );
     // with what was found declared, nothing is left to find
     let bundle = example_bundle(dir.path())?;
-    let again = boresight().args(["close", "--json"]).arg(out.join("model.toml")).arg(&bundle).output()?;
+    let again = boresight()
+        .args(["close", "--json"])
+        .arg(out.join("model.toml"))
+        .arg(&bundle)
+        .output()?;
     let report: serde_json::Value = serde_json::from_slice(&again.stdout)?;
     assert_eq!(report["verdict"], "consistent");
     Ok(())
@@ -88,7 +106,10 @@ fn refuses(bundle: &Path, words: &[&str]) -> Done {
     for word in words {
         assert!(message.contains(word), "no {word:?} in: {message}");
     }
-    assert!(!out.exists() && fs::read_dir(dir.path())?.count() == 0, "output left behind");
+    assert!(
+        !out.exists() && fs::read_dir(dir.path())?.count() == 0,
+        "output left behind"
+    );
     Ok(())
 }
 
@@ -97,7 +118,10 @@ fn a_word_in_a_number_is_named_by_file_line_and_column() -> Done {
     let dir = tempfile::tempdir()?;
     let bundle = example_bundle(dir.path())?;
     fs::remove_file(bundle.join("housekeeping.csv.gz"))?;
-    fs::write(bundle.join("rates.csv"), "t_s,wx_rad_s,wy_rad_s,wz_rad_s\n0.0,0,0,0\n0.5,0,fast,0\n")?;
+    fs::write(
+        bundle.join("rates.csv"),
+        "t_s,wx_rad_s,wy_rad_s,wz_rad_s\n0.0,0,0,0\n0.5,0,fast,0\n",
+    )?;
     refuses(&bundle, &["rates.csv", "3", "wy_rad_s", "fast"])
 }
 
@@ -115,8 +139,14 @@ fn a_key_that_does_not_exist_names_the_nearest() -> Done {
     let dir = tempfile::tempdir()?;
     let bundle = example_bundle(dir.path())?;
     let toml = fs::read_to_string(bundle.join("bundle.toml"))?;
-    fs::write(bundle.join("bundle.toml"), toml.replace("sample_rate_hz", "sample_rate_herz"))?;
-    refuses(&bundle, &["bundle.toml", "sample_rate_herz", "sample_rate_hz"])
+    fs::write(
+        bundle.join("bundle.toml"),
+        toml.replace("sample_rate_hz", "sample_rate_herz"),
+    )?;
+    refuses(
+        &bundle,
+        &["bundle.toml", "sample_rate_herz", "sample_rate_hz"],
+    )
 }
 
 #[test]
@@ -129,7 +159,11 @@ fn an_empty_folder_is_no_bundle() -> Done {
 
 #[test]
 fn usage_errors_exit_with_two() -> Done {
-    for arguments in [&["clos"][..], &["close", "model.toml"], &["close", "--threads", "0"]] {
+    for arguments in [
+        &["clos"][..],
+        &["close", "model.toml"],
+        &["close", "--threads", "0"],
+    ] {
         let done = boresight().args(arguments).output()?;
         assert_eq!(done.status.code(), Some(2), "{arguments:?}");
         assert!(done.stdout.is_empty());
@@ -139,7 +173,11 @@ fn usage_errors_exit_with_two() -> Done {
 
 #[test]
 fn the_numbers_do_not_depend_on_the_threads() -> Done {
-    let run = |threads: &str| boresight().args(["close", "--json", "--threads", threads]).output();
+    let run = |threads: &str| {
+        boresight()
+            .args(["close", "--json", "--threads", threads])
+            .output()
+    };
     assert_eq!(run("1")?.stdout, run("3")?.stdout);
     Ok(())
 }
@@ -154,7 +192,11 @@ fn a_simulated_bundle_closes() -> Done {
         .arg("--out")
         .arg(&bundle)
         .output()?;
-    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+    assert!(
+        done.status.success(),
+        "{}",
+        String::from_utf8_lossy(&done.stderr)
+    );
     assert!(done.stdout.is_empty());
     let done = boresight()
         .args(["close", "--json"])

@@ -42,7 +42,11 @@ pub(crate) struct AttitudeData {
 
 impl AttitudeData {
     /// Differences `q` (at `t_s`) against the reference.
-    pub(crate) fn against(t_s: &[f64], q: &[UnitQuaternion<f64>], reference: &AttitudeSeries) -> Self {
+    pub(crate) fn against(
+        t_s: &[f64],
+        q: &[UnitQuaternion<f64>],
+        reference: &AttitudeSeries,
+    ) -> Self {
         let mut data = Self {
             t_s: Vec::new(),
             theta: Default::default(),
@@ -86,23 +90,40 @@ impl AttitudeData {
     pub(crate) fn rebin(&mut self, folds: &Folds) {
         self.bins = Bins::cut(&self.t_s, folds);
         self.count = std::array::from_fn(|axis| {
-            let kept = |rows: &Range<usize>| rows.clone().filter(|&k| !self.outlier[axis][k]).count();
-            self.bins.rows.iter().map(|rows| kept(rows) as f64).collect()
+            let kept =
+                |rows: &Range<usize>| rows.clone().filter(|&k| !self.outlier[axis][k]).count();
+            self.bins
+                .rows
+                .iter()
+                .map(|rows| kept(rows) as f64)
+                .collect()
         });
     }
 
     /// Means over the bins of one axis of a series of rows; 0 where nothing counts.
     pub(crate) fn binned(&self, axis: usize, values: &[f64]) -> Vec<f64> {
         let mean = |rows: &Range<usize>, count: f64| {
-            let sum: f64 =
-                rows.clone().filter(|&k| !self.outlier[axis][k]).map(|k| values[k]).sum();
+            let sum: f64 = rows
+                .clone()
+                .filter(|&k| !self.outlier[axis][k])
+                .map(|k| values[k])
+                .sum();
             if count > 0.0 { sum / count } else { 0.0 }
         };
-        self.bins.rows.iter().zip(&self.count[axis]).map(|(rows, &count)| mean(rows, count)).collect()
+        self.bins
+            .rows
+            .iter()
+            .zip(&self.count[axis])
+            .map(|(rows, &count)| mean(rows, count))
+            .collect()
     }
 
     /// Rows as effects see them.
-    pub(crate) fn rows<'a>(&'a self, rows: Range<usize>, attitude: Option<&'a dyn AttitudeSource>) -> AttitudeRows<'a> {
+    pub(crate) fn rows<'a>(
+        &'a self,
+        rows: Range<usize>,
+        attitude: Option<&'a dyn AttitudeSource>,
+    ) -> AttitudeRows<'a> {
         AttitudeRows {
             t_s: &self.t_s[rows.clone()],
             wx_rad_s: &self.rate[0][rows.clone()],
@@ -152,7 +173,10 @@ impl AttitudeEvidence<'_> {
     /// Constants and candidates of `rows`, arcsec, x then y then z of every row.
     fn raw(&self, rows: Range<usize>, candidates: &[&dyn Candidate]) -> DMatrix<f64> {
         let n = rows.len();
-        let width = 3 + candidates.iter().map(|c| c.coefficients().len()).sum::<usize>();
+        let width = 3 + candidates
+            .iter()
+            .map(|c| c.coefficients().len())
+            .sum::<usize>();
         let mut out = DMatrix::zeros(3 * n, width);
         let seen = self.data.rows(rows, self.motion);
         let mut columns: [Vec<f64>; 3] = Default::default();
@@ -189,7 +213,9 @@ impl AttitudeEvidence<'_> {
         let mut columns = binned.clone().insert_column(width, 0.0);
         for axis in 0..3 {
             let theta = self.data.binned(axis, &self.data.theta[axis]);
-            columns.view_mut((axis * m, width), (m, 1)).copy_from_slice(&theta);
+            columns
+                .view_mut((axis * m, width), (m, 1))
+                .copy_from_slice(&theta);
             let mut slices: Vec<&mut [f64]> = columns
                 .as_mut_slice()
                 .chunks_exact_mut(3 * m)
@@ -197,7 +223,10 @@ impl AttitudeEvidence<'_> {
                 .collect();
             self.noise[axis].whiten(&self.data.bins.t_s, &self.data.count[axis], &mut slices);
         }
-        Box::new(WhitenedDesign { data: self.data, columns })
+        Box::new(WhitenedDesign {
+            data: self.data,
+            columns,
+        })
     }
 
     /// Constants and candidates averaged over the bins: x, y, z of every bin by
@@ -233,8 +262,12 @@ impl Design for WhitenedDesign<'_> {
         *out = DMatrix::zeros(3 * n, self.width());
         let mut scalars = 0;
         for axis in 0..3 {
-            out.rows_mut(axis * n, n).copy_from(&self.columns.rows(axis * all + rows.start, n));
-            scalars += rows.clone().filter(|&k| self.data.count[axis][k] > 0.0).count();
+            out.rows_mut(axis * n, n)
+                .copy_from(&self.columns.rows(axis * all + rows.start, n));
+            scalars += rows
+                .clone()
+                .filter(|&k| self.data.count[axis][k] > 0.0)
+                .count();
         }
         scalars
     }
@@ -242,7 +275,10 @@ impl Design for WhitenedDesign<'_> {
 
 impl Evidence for AttitudeEvidence<'_> {
     fn precision(&self) -> Vec<f64> {
-        self.constant_sigma.iter().map(|s| if s.is_finite() { 1.0 / (s * s) } else { 0.0 }).collect()
+        self.constant_sigma
+            .iter()
+            .map(|s| if s.is_finite() { 1.0 / (s * s) } else { 0.0 })
+            .collect()
     }
 
     fn residual_columns(&self) -> usize {
@@ -259,11 +295,19 @@ impl Evidence for AttitudeEvidence<'_> {
 
     /// The constants of the figures are plain means over the other folds: those
     /// of a generalised fit would carry the slow noise of a distant fold along.
-    fn residuals(&self, folds: &Folds, candidates: &[&dyn Candidate], amplitudes: &Amplitudes) -> Residuals {
+    fn residuals(
+        &self,
+        folds: &Folds,
+        candidates: &[&dyn Candidate],
+        amplitudes: &Amplitudes,
+    ) -> Residuals {
         let n = self.data.t_s.len();
         let raw = self.raw(0..n, candidates);
         let fold = folds.fold_of_frame();
-        let mut out = Residuals { axes: vec![vec![0.0; n]; 3], modelled: vec![vec![0.0; n]; 3] };
+        let mut out = Residuals {
+            axes: vec![vec![0.0; n]; 3],
+            modelled: vec![vec![0.0; n]; 3],
+        };
         for f in 0..folds.count {
             let shift = raw.columns_range(3..) * &amplitudes.candidates[f];
             for axis in 0..3 {
@@ -278,7 +322,11 @@ impl Evidence for AttitudeEvidence<'_> {
                 let noise = self.noise[axis];
                 let variance = (noise.white.powi(2) + noise.slow.powi(2)) / count;
                 let prior = self.constant_sigma[axis].powi(2);
-                let constant = if prior.is_finite() { free * prior / (prior + variance) } else { free };
+                let constant = if prior.is_finite() {
+                    free * prior / (prior + variance)
+                } else {
+                    free
+                };
                 for k in (0..n).filter(|&k| fold[k] == f) {
                     out.axes[axis][k] = left(k) - constant;
                     out.modelled[axis][k] = shift[axis * n + k] + constant;

@@ -4,11 +4,11 @@
 
 use effects::{Candidate, Scene};
 
-use crate::attitude_search;
 use crate::attitude_data::{AttitudeData, AttitudeEvidence};
+use crate::attitude_search;
 use crate::close::{Closed, Rival, catalogue_candidates};
-use crate::declared;
 use crate::coloured::Coloured;
+use crate::declared;
 use crate::empirical::{Empirical, Variable};
 use crate::error::CloseError;
 use crate::evidence::{Evidence, Residuals};
@@ -20,8 +20,8 @@ use crate::search::{Found, amplitudes, borrowed, fit};
 use crate::situation::Situation;
 use crate::star_data::median_step;
 use focal_plane::{AttitudeSource, Series};
-use telemetry::AttitudeResiduals;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
+use telemetry::AttitudeResiduals;
 use telemetry::report::{Dependence, Errors, Report, Rows, Unattributed};
 
 /// A correlated part below this share of the variance, or that the likelihood
@@ -31,11 +31,21 @@ const SLOW_GAIN: f64 = 20.0;
 /// Fewest frames from which an effect and its noise can both be had.
 const MIN_FRAMES: usize = 20;
 
-pub(crate) fn run(situation: &Situation<'_>, progress: &dyn Fn(&str)) -> Result<Closed, CloseError> {
-    let table = situation.bundle.attitude.as_ref().ok_or(CloseError::NothingToCompare("no attitude"))?;
-    let reference = situation.reference.as_ref().ok_or(CloseError::NothingToCompare(
-        "the bundle has an attitude but no reference to hold it against",
-    ))?;
+pub(crate) fn run(
+    situation: &Situation<'_>,
+    progress: &dyn Fn(&str),
+) -> Result<Closed, CloseError> {
+    let table = situation
+        .bundle
+        .attitude
+        .as_ref()
+        .ok_or(CloseError::NothingToCompare("no attitude"))?;
+    let reference = situation
+        .reference
+        .as_ref()
+        .ok_or(CloseError::NothingToCompare(
+            "the bundle has an attitude but no reference to hold it against",
+        ))?;
     let mut data = AttitudeData::against(&table.t_s, &table.q, reference);
     if data.t_s.len() < MIN_FRAMES {
         return Err(CloseError::TooFewFrames {
@@ -76,14 +86,20 @@ pub(crate) fn run(situation: &Situation<'_>, progress: &dyn Fn(&str)) -> Result<
         });
     }
     progress("figures");
-    finish(situation, &data, &folds, noise, motion, &found, before, after, rivals)
+    finish(
+        situation, &data, &folds, noise, motion, &found, before, after, rivals,
+    )
 }
 
 /// What a set of candidates is called.
 fn names(found: &Found, set: &[usize]) -> String {
     let name = |&g: &usize| {
         let candidate = &found.candidates[g];
-        candidate.selectors().get("variable").cloned().unwrap_or_else(|| candidate.id().to_owned())
+        candidate
+            .selectors()
+            .get("variable")
+            .cloned()
+            .unwrap_or_else(|| candidate.id().to_owned())
     };
     if set.is_empty() {
         return "declared model".to_owned();
@@ -95,7 +111,11 @@ fn names(found: &Found, set: &[usize]) -> String {
 pub(crate) fn resolved_motion<'a>(situation: &'a Situation<'_>) -> Option<&'a dyn AttitudeSource> {
     let reference = situation.reference.as_ref()?;
     // Rates that were measured do not come from differences.
-    let known = situation.bundle.reference.as_ref().is_some_and(|r| r.rates_rad_s.is_some());
+    let known = situation
+        .bundle
+        .reference
+        .as_ref()
+        .is_some_and(|r| r.rates_rad_s.is_some());
     (known || motion::resolved(reference.quaternions())).then_some(reference as &dyn AttitudeSource)
 }
 
@@ -115,7 +135,9 @@ fn settle(
         let before = evidence.residuals(folds, &[], &amplitudes);
         let group = vec![0; data.t_s.len()];
         let added: usize = (0..3)
-            .map(|axis| robust::mark_outliers(&before.axes[axis], &group, 1, &mut data.outlier[axis]))
+            .map(|axis| {
+                robust::mark_outliers(&before.axes[axis], &group, 1, &mut data.outlier[axis])
+            })
             .sum();
         if added == 0 {
             return Ok(before);
@@ -135,7 +157,9 @@ fn evidence<'a>(
             .model
             .noise
             .bias_arcsec
-            .map_or([f64::INFINITY; 3], |b| b.map(|s| if s > 0.0 { s } else { f64::INFINITY })),
+            .map_or([f64::INFINITY; 3], |b| {
+                b.map(|s| if s > 0.0 { s } else { f64::INFINITY })
+            }),
         noise,
         motion,
     }
@@ -152,8 +176,10 @@ fn fit_noise(data: &AttitudeData, residual: &Residuals) -> [Coloured; 3] {
 fn loglik_per_frame(data: &AttitudeData, residual: &Residuals) -> f64 {
     let total: f64 = (0..3)
         .map(|axis| {
-            let count: Vec<f64> =
-                data.outlier[axis].iter().map(|out| f64::from(u8::from(!out))).collect();
+            let count: Vec<f64> = data.outlier[axis]
+                .iter()
+                .map(|out| f64::from(u8::from(!out)))
+                .collect();
             let series = &residual.axes[axis];
             Coloured::fit(&data.t_s, series, &count).log_likelihood(&data.t_s, series, &count)
         })
@@ -167,7 +193,11 @@ fn residuals(
     found: &Found,
     chosen: &[usize],
 ) -> Result<Residuals, CloseError> {
-    let columns = found.candidates.iter().map(|c| c.coefficients().len()).sum();
+    let columns = found
+        .candidates
+        .iter()
+        .map(|c| c.coefficients().len())
+        .sum();
     let amplitudes =
         amplitudes(&found.fitted, folds, chosen, columns).ok_or(CloseError::Singular)?;
     Ok(evidence.residuals(folds, &borrowed(&found.candidates), &amplitudes))
@@ -191,9 +221,11 @@ fn scene<'a>(situation: &'a Situation<'_>, data: &AttitudeData) -> Scene<'a> {
 /// aberration alone.
 fn leftover_terms(situation: &Situation<'_>, data: &AttitudeData) -> Vec<Box<dyn Candidate>> {
     let range = |values: &mut dyn Iterator<Item = f64>| {
-        values.filter(|v| v.is_finite()).fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| {
-            [low.min(v), high.max(v)]
-        })
+        values
+            .filter(|v| v.is_finite())
+            .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| {
+                [low.min(v), high.max(v)]
+            })
     };
     let mut terms: Vec<Box<dyn Candidate>> = Vec::new();
     let mut add = |variable: Variable, range: [f64; 2]| {
@@ -203,7 +235,10 @@ fn leftover_terms(situation: &Situation<'_>, data: &AttitudeData) -> Vec<Box<dyn
     };
     add(Variable::Time, range(&mut data.t_s.iter().copied()));
     for (name, series) in channels_of_interest(&situation.channels) {
-        add(Variable::Housekeeping(name, series.clone()), range(&mut series.value().iter().copied()));
+        add(
+            Variable::Housekeeping(name, series.clone()),
+            range(&mut series.value().iter().copied()),
+        );
     }
     terms
 }
@@ -230,7 +265,11 @@ fn slow_leftover(
     for axis in 0..3 {
         let means = data.binned(axis, &after.axes[axis]);
         let noise = Coloured::fit(&data.bins.t_s, &means, &data.count[axis]);
-        let white = Coloured { slow: 0.0, white: noise.white.hypot(noise.slow), ..noise };
+        let white = Coloured {
+            slow: 0.0,
+            white: noise.white.hypot(noise.slow),
+            ..noise
+        };
         let loglik = |n: &Coloured| n.log_likelihood(&data.bins.t_s, &means, &data.count[axis]);
         slow += noise.slow * noise.slow;
         whole += figures::rms(&after.axes[axis], &data.outlier[axis]).map_or(0.0, |r| r * r);
@@ -241,7 +280,12 @@ fn slow_leftover(
         return;
     }
     unattributed.present = true;
-    unattributed.variance_fraction = Some(unattributed.variance_fraction.unwrap_or(0.0).max(share * left));
+    unattributed.variance_fraction = Some(
+        unattributed
+            .variance_fraction
+            .unwrap_or(0.0)
+            .max(share * left),
+    );
     unattributed.depends_on.retain(|d| d.variable != "time");
     let entry = Dependence {
         variable: "time".to_owned(),
@@ -250,7 +294,9 @@ fn slow_leftover(
         p_value: ChiSquared::new(6.0).map_or(1.0, |law| law.sf(2.0 * gain)),
     };
     unattributed.depends_on.insert(0, entry);
-    unattributed.depends_on.sort_by(|a, b| b.variance_explained.total_cmp(&a.variance_explained));
+    unattributed
+        .depends_on
+        .sort_by(|a, b| b.variance_explained.total_cmp(&a.variance_explained));
 }
 
 fn finish(
@@ -267,7 +313,10 @@ fn finish(
     let chosen = &found.selection.chosen;
     let evidence = evidence(data, situation, noise, motion);
     let power = |r: &Residuals| -> f64 {
-        (0..3).filter_map(|a| figures::rms(&r.axes[a], &data.outlier[a])).map(|v| v * v).sum()
+        (0..3)
+            .filter_map(|a| figures::rms(&r.axes[a], &data.outlier[a]))
+            .map(|v| v * v)
+            .sum()
     };
     let whole = power(&before);
     let mut explained = Vec::new();
@@ -293,8 +342,9 @@ fn finish(
         chi2_per_dof: None,
         loglik_per_frame: Some(loglik_per_frame(data, r)),
     };
-    let outliers: Vec<bool> =
-        (0..data.t_s.len()).map(|k| (0..3).any(|a| data.outlier[a][k])).collect();
+    let outliers: Vec<bool> = (0..data.t_s.len())
+        .map(|k| (0..3).any(|a| data.outlier[a][k]))
+        .collect();
     let count = outliers.iter().filter(|o| **o).count();
     let report = Report {
         format: telemetry::report::REPORT_FORMAT.to_owned(),

@@ -68,8 +68,15 @@ pub(crate) fn search<'d>(
             folds,
             &borrowed(&candidates),
         )?;
-        let trial =
-            Trial { with_noise, data, folds, fitted: &fitted, candidates: &candidates, binned, noise };
+        let trial = Trial {
+            with_noise,
+            data,
+            folds,
+            fitted: &fitted,
+            candidates: &candidates,
+            binned,
+            noise,
+        };
         let base = trial.score(&chosen).ok_or(CloseError::Singular)?;
         let judged: Vec<Judgement> = (0..candidates.len())
             .into_par_iter()
@@ -84,7 +91,9 @@ pub(crate) fn search<'d>(
         let best = (0..candidates.len())
             .filter(|&g| !chosen.contains(&g) && !banned[g] && candidates[g].id() != EMPIRICAL)
             .filter(|&g| {
-                chosen.iter().all(|&c| fitted.groups[c].family != fitted.groups[g].family)
+                chosen
+                    .iter()
+                    .all(|&c| fitted.groups[c].family != fitted.groups[g].family)
             })
             .filter(|&g| judged[g].stands())
             .map(|g| {
@@ -95,7 +104,14 @@ pub(crate) fn search<'d>(
         noise = base.noise;
         let Some((added, _)) = best else {
             let fitted = fit(&with_noise(noise), folds, &borrowed(&candidates))?;
-            return Ok((Found { candidates, fitted, selection: Selection { chosen, judged } }, noise));
+            return Ok((
+                Found {
+                    candidates,
+                    fitted,
+                    selection: Selection { chosen, judged },
+                },
+                noise,
+            ));
         };
         chosen.push(added);
         if let Some(score) = trial.score(&chosen) {
@@ -118,13 +134,23 @@ pub(crate) fn rivals(
 ) -> Vec<(Vec<usize>, f64)> {
     let candidates = &found.candidates;
     let binned = with_noise(noise).binned(&borrowed(candidates));
-    let trial =
-        Trial { with_noise, data, folds, fitted: &found.fitted, candidates, binned, noise };
+    let trial = Trial {
+        with_noise,
+        data,
+        folds,
+        fitted: &found.fitted,
+        candidates,
+        binned,
+        noise,
+    };
     let mut sets: Vec<Vec<usize>> = vec![Vec::new()];
     sets.extend(found.selection.chosen.first().map(|&g| vec![g]));
     let channels = (0..candidates.len()).filter(|&g| {
         candidates[g].id() == EMPIRICAL
-            && candidates[g].selectors().get("variable").is_some_and(|v| v.starts_with("housekeeping:"))
+            && candidates[g]
+                .selectors()
+                .get("variable")
+                .is_some_and(|v| v.starts_with("housekeeping:"))
             && !found.fitted.groups[g].columns.is_empty()
     });
     sets.extend(channels.map(|g| vec![g]));
@@ -134,7 +160,10 @@ pub(crate) fn rivals(
         .collect();
     let best = scored
         .iter()
-        .filter(|(set, _)| set.first().is_some_and(|&g| candidates[g].id() == EMPIRICAL))
+        .filter(|(set, _)| {
+            set.first()
+                .is_some_and(|&g| candidates[g].id() == EMPIRICAL)
+        })
         .max_by(|a, b| a.1.total_cmp(&b.1))
         .map(|(set, _)| set.clone());
     if let (Some(&first), Some(best)) = (found.selection.chosen.first(), best) {
@@ -175,8 +204,14 @@ impl Trial<'_, '_> {
         } else {
             self.score(&others).map(|s| (base.clone(), s))
         };
-        let Some((with, without)) = scores else { return Judgement::UNSEEN };
-        let tried = self.candidates.iter().filter(|c| c.id() != EMPIRICAL).count();
+        let Some((with, without)) = scores else {
+            return Judgement::UNSEEN;
+        };
+        let tried = self
+            .candidates
+            .iter()
+            .filter(|c| c.id() != EMPIRICAL)
+            .count();
         let ratio = 2.0 * (with.loglik - without.loglik) / WIDENING;
         let freedom = (group.columns.len() + group.choices) as f64;
         let p = ChiSquared::new(freedom).map_or(1.0, |law| law.sf(ratio.max(0.0)));
@@ -190,8 +225,10 @@ impl Trial<'_, '_> {
 
     /// `chosen` at its own best noise.
     fn score(&self, chosen: &[usize]) -> Option<Scored> {
-        let candidates: Vec<&dyn Candidate> =
-            chosen.iter().map(|&g| self.candidates[g].as_ref()).collect();
+        let candidates: Vec<&dyn Candidate> = chosen
+            .iter()
+            .map(|&g| self.candidates[g].as_ref())
+            .collect();
         let columns = candidates.iter().map(|c| c.coefficients().len()).sum();
         let all: Vec<usize> = (0..candidates.len()).collect();
         let binned = self.columns(chosen);
@@ -208,11 +245,15 @@ impl Trial<'_, '_> {
                 noise[axis].refit(&self.data.bins.t_s, &residual[axis], &self.data.count[axis])
             });
             let credible = fitted.groups.iter().all(|group| {
-                group.columns.iter().zip(&group.bounds).all(|(c, [low, high])| {
-                    set.iter()
-                        .position(|s| s == c)
-                        .is_some_and(|i| (*low..=*high).contains(&estimate.value[i]))
-                })
+                group
+                    .columns
+                    .iter()
+                    .zip(&group.bounds)
+                    .all(|(c, [low, high])| {
+                        set.iter()
+                            .position(|s| s == c)
+                            .is_some_and(|i| (*low..=*high).contains(&estimate.value[i]))
+                    })
             });
             last = Some((self.loglik(&noise, &residual), credible));
         }
@@ -222,14 +263,22 @@ impl Trial<'_, '_> {
         let fitted = fit_design(&evidence, design.as_ref(), self.folds, &candidates).ok()?;
         let amplitudes = amplitudes(&fitted, self.folds, &all, columns)?;
         let predicted = evidence.generalised(self.folds, &binned, &amplitudes);
-        Some(Scored { noise, loglik, out_of_fold: self.loglik(&noise, &predicted), credible })
+        Some(Scored {
+            noise,
+            loglik,
+            out_of_fold: self.loglik(&noise, &predicted),
+            credible,
+        })
     }
 
     /// Binned columns of some candidates, constants first.
     fn columns(&self, chosen: &[usize]) -> DMatrix<f64> {
         let mut pick = vec![0, 1, 2];
         for &g in chosen {
-            let before: usize = self.candidates[..g].iter().map(|c| c.coefficients().len()).sum();
+            let before: usize = self.candidates[..g]
+                .iter()
+                .map(|c| c.coefficients().len())
+                .sum();
             pick.extend((0..self.candidates[g].coefficients().len()).map(|j| 3 + before + j));
         }
         self.binned.select_columns(&pick)
@@ -258,8 +307,9 @@ impl Trial<'_, '_> {
 
     fn loglik(&self, noise: &[Coloured; 3], residual: &[Vec<f64>; 3]) -> f64 {
         (0..3)
-            .map(|a| noise[a].log_likelihood(&self.data.bins.t_s, &residual[a], &self.data.count[a]))
+            .map(|a| {
+                noise[a].log_likelihood(&self.data.bins.t_s, &residual[a], &self.data.count[a])
+            })
             .sum()
     }
 }
-

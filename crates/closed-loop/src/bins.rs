@@ -37,7 +37,11 @@ impl Bins {
         let mut bins = Self {
             rows: Vec::new(),
             t_s: Vec::new(),
-            folds: Folds { blocks: Vec::new(), fold_of_block: folds.fold_of_block.clone(), count: folds.count },
+            folds: Folds {
+                blocks: Vec::new(),
+                fold_of_block: folds.fold_of_block.clone(),
+                count: folds.count,
+            },
         };
         for block in &folds.blocks {
             let first = bins.rows.len();
@@ -45,7 +49,8 @@ impl Bins {
             for k in block.clone() {
                 let last = k + 1 == block.end;
                 if last || k + 1 - start == size || t_s[k + 1] - t_s[k] > gap {
-                    bins.t_s.push(t_s[start..=k].iter().sum::<f64>() / (k + 1 - start) as f64);
+                    bins.t_s
+                        .push(t_s[start..=k].iter().sum::<f64>() / (k + 1 - start) as f64);
                     bins.rows.push(start..k + 1);
                     start = k + 1;
                 }
@@ -62,7 +67,9 @@ mod tests {
 
     #[test]
     fn bins_hold_every_row_once_and_cross_no_gap() {
-        let t_s: Vec<f64> = (0..10_007).map(|k| f64::from(k) + if k >= 5003 { 99.0 } else { 0.0 }).collect();
+        let t_s: Vec<f64> = (0..10_007)
+            .map(|k| f64::from(k) + if k >= 5003 { 99.0 } else { 0.0 })
+            .collect();
         let folds = Folds::cut(t_s.len());
         let bins = Bins::cut(&t_s, &folds);
         assert_eq!(bins.rows[0].start, 0);

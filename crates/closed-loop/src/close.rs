@@ -54,7 +54,11 @@ pub struct Rival {
 /// # Errors
 /// When model and bundle do not fit together, nothing can be compared, or too
 /// little data is left; see [`CloseError`].
-pub fn close(model: &Model, bundle: &Bundle, progress: &dyn Fn(&str)) -> Result<Closed, CloseError> {
+pub fn close(
+    model: &Model,
+    bundle: &Bundle,
+    progress: &dyn Fn(&str),
+) -> Result<Closed, CloseError> {
     let situation = Situation::join(model, bundle)?;
     if bundle.stars.is_some() {
         star_loop::run(&situation, progress)
@@ -65,5 +69,8 @@ pub fn close(model: &Model, bundle: &Bundle, progress: &dyn Fn(&str)) -> Result<
 
 /// Candidates of every effect of the catalogue that the scene allows.
 pub(crate) fn catalogue_candidates(scene: &effects::Scene<'_>) -> Vec<Box<dyn Candidate>> {
-    effects::catalogue().iter().flat_map(|kind| kind.candidates(scene)).collect()
+    effects::catalogue()
+        .iter()
+        .flat_map(|kind| kind.candidates(scene))
+        .collect()
 }

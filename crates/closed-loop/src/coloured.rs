@@ -37,7 +37,11 @@ pub(crate) struct Coloured {
 
 impl Coloured {
     /// Nothing known: rows count alike and stay as they are.
-    pub(crate) const WHITE: Self = Self { white: 1.0, slow: 0.0, tau_s: 1.0 };
+    pub(crate) const WHITE: Self = Self {
+        white: 1.0,
+        slow: 0.0,
+        tau_s: 1.0,
+    };
 
     /// The filter's decay, gain and 1/sqrt(innovation variance) at each row; a row
     /// that counts for nothing has gain 0 and weight 0.
@@ -48,7 +52,11 @@ impl Coloured {
         // Steps repeat: one exponential serves them all.
         let mut known = (f64::NAN, 0.0_f64);
         for k in 0..t_s.len() {
-            let step = if k == 0 { f64::INFINITY } else { t_s[k] - t_s[k - 1] };
+            let step = if k == 0 {
+                f64::INFINITY
+            } else {
+                t_s[k] - t_s[k - 1]
+            };
             if step.to_bits() != known.0.to_bits() {
                 known = (step, (-step / self.tau_s).exp());
             }
@@ -89,17 +97,28 @@ impl Coloured {
         let variance =
             kept.iter().map(|&k| y[k] * y[k] * count[k]).sum::<f64>() / kept.len().max(1) as f64;
         let rms = variance.sqrt().max(1e-12);
-        let white = Self { white: rms, slow: 0.0, tau_s: 1.0 };
-        let (Some(step), Some((first, last))) =
-            (crate::star_data::median_step(t_s), t_s.first().zip(t_s.last()))
-        else {
+        let white = Self {
+            white: rms,
+            slow: 0.0,
+            tau_s: 1.0,
+        };
+        let (Some(step), Some((first, last))) = (
+            crate::star_data::median_step(t_s),
+            t_s.first().zip(t_s.last()),
+        ) else {
             return white;
         };
         let span = last - first;
         if kept.len() < 30 || step <= 0.0 {
             return white;
         }
-        let problem = Likelihood { t_s, y, count, rms, bounds: [0.5 * step, 3.0 * span] };
+        let problem = Likelihood {
+            t_s,
+            y,
+            count,
+            rms,
+            bounds: [0.5 * step, 3.0 * span],
+        };
         // A likelihood in the correlation time has more than one hill: start on each.
         let best = [3.0 * step, (step * span).sqrt(), 0.1 * span]
             .into_iter()
@@ -117,9 +136,17 @@ impl Coloured {
         if self.slow <= 0.0 {
             return Self::fit(t_s, y, count);
         }
-        let Some(step) = crate::star_data::median_step(t_s) else { return *self };
+        let Some(step) = crate::star_data::median_step(t_s) else {
+            return *self;
+        };
         let span = t_s[t_s.len() - 1] - t_s[0];
-        let problem = Likelihood { t_s, y, count, rms: 1.0, bounds: [0.5 * step, 3.0 * span] };
+        let problem = Likelihood {
+            t_s,
+            y,
+            count,
+            rms: 1.0,
+            bounds: [0.5 * step, 3.0 * span],
+        };
         problem
             .climb([self.white.ln(), self.slow.ln(), self.tau_s.ln()], -0.3)
             .map_or(*self, |(_, noise)| noise)
@@ -173,7 +200,10 @@ impl Likelihood<'_> {
             simplex.push(corner);
         }
         let solver = NelderMead::new(simplex).with_sd_tolerance(1e-3).ok()?;
-        let result = Executor::new(self, solver).configure(|s| s.max_iters(120)).run().ok()?;
+        let result = Executor::new(self, solver)
+            .configure(|s| s.max_iters(120))
+            .run()
+            .ok()?;
         let noise = self.at(&result.state.best_param?);
         Some((noise.log_likelihood(self.t_s, self.y, self.count), noise))
     }
@@ -214,15 +244,23 @@ mod tests {
     /// standard error sqrt(2/n), the lag-one product 1/sqrt(n).
     #[test]
     fn whitened_noise_is_white_across_a_gap() {
-        let noise = Coloured { white: 0.5, slow: 1.5, tau_s: 40.0 };
-        let t_s: Vec<f64> =
-            (0..20_000).map(|k| f64::from(k) + if k > 9000 { 500.0 } else { 0.0 }).collect();
+        let noise = Coloured {
+            white: 0.5,
+            slow: 1.5,
+            tau_s: 40.0,
+        };
+        let t_s: Vec<f64> = (0..20_000)
+            .map(|k| f64::from(k) + if k > 9000 { 500.0 } else { 0.0 })
+            .collect();
         let mut y = series(&noise, &t_s, 11);
         noise.whiten(&t_s, &vec![1.0; y.len()], &mut [&mut y]);
         let n = y.len() as f64;
         let square = y.iter().map(|v| v * v).sum::<f64>() / n;
         let lag = y.windows(2).map(|w| w[0] * w[1]).sum::<f64>() / n;
-        assert!((square - 1.0).abs() < 5.0 * (2.0 / n).sqrt(), "mean square {square}");
+        assert!(
+            (square - 1.0).abs() < 5.0 * (2.0 / n).sqrt(),
+            "mean square {square}"
+        );
         assert!(lag.abs() < 5.0 / n.sqrt(), "lag one {lag}");
     }
 
@@ -230,23 +268,40 @@ mod tests {
     /// sqrt(tau/span) = 4.5 %, tau to twice that, the white part far better.
     #[test]
     fn the_fit_finds_the_noise() {
-        let truth = Coloured { white: 0.5, slow: 1.5, tau_s: 40.0 };
+        let truth = Coloured {
+            white: 0.5,
+            slow: 1.5,
+            tau_s: 40.0,
+        };
         let t_s: Vec<f64> = (0..20_000).map(f64::from).collect();
         let y = series(&truth, &t_s, 5);
         let found = Coloured::fit(&t_s, &y, &vec![1.0; y.len()]);
-        assert!((found.slow / truth.slow - 1.0).abs() < 5.0 * 0.045, "{found:?}");
-        assert!((found.tau_s / truth.tau_s - 1.0).abs() < 5.0 * 0.09, "{found:?}");
+        assert!(
+            (found.slow / truth.slow - 1.0).abs() < 5.0 * 0.045,
+            "{found:?}"
+        );
+        assert!(
+            (found.tau_s / truth.tau_s - 1.0).abs() < 5.0 * 0.09,
+            "{found:?}"
+        );
         assert!((found.white / truth.white - 1.0).abs() < 0.1, "{found:?}");
     }
 
     #[test]
     fn white_noise_stays_white() {
-        let truth = Coloured { white: 2.0, slow: 0.0, tau_s: 1.0 };
+        let truth = Coloured {
+            white: 2.0,
+            slow: 0.0,
+            tau_s: 1.0,
+        };
         let t_s: Vec<f64> = (0..5000).map(f64::from).collect();
         let y = series(&truth, &t_s, 3);
         let found = Coloured::fit(&t_s, &y, &vec![1.0; y.len()]);
         let total = found.white.hypot(found.slow);
-        assert!((total / 2.0 - 1.0).abs() < 5.0 * (0.5 / 5000.0_f64).sqrt() + 0.02, "{found:?}");
+        assert!(
+            (total / 2.0 - 1.0).abs() < 5.0 * (0.5 / 5000.0_f64).sqrt() + 0.02,
+            "{found:?}"
+        );
         assert!(found.slow < 0.5 || found.tau_s < 2.0, "{found:?}");
     }
 }

@@ -35,7 +35,11 @@ pub(crate) fn effects(situation: &Situation<'_>) -> Result<Vec<Arc<dyn Effect>>,
                 EffectValue::Number(number) => ParameterValue::Number(*number),
                 EffectValue::Text(text) => ParameterValue::Text(text.clone()),
                 EffectValue::Numbers(numbers) => ParameterValue::Text(
-                    numbers.iter().map(f64::to_string).collect::<Vec<_>>().join(","),
+                    numbers
+                        .iter()
+                        .map(f64::to_string)
+                        .collect::<Vec<_>>()
+                        .join(","),
                 ),
             };
             parameters.insert(name.clone(), value);

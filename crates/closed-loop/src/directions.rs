@@ -45,7 +45,10 @@ pub(crate) fn attitudes(
             v.clear();
             for row in frames.rows_of(k) {
                 if let Some(u) = direction[star[row]] {
-                    w.push(camera.direction(Pixel { x: frames.x_px[row], y: frames.y_px[row] }));
+                    w.push(camera.direction(Pixel {
+                        x: frames.x_px[row],
+                        y: frames.y_px[row],
+                    }));
                     v.push(u);
                 }
             }
@@ -59,10 +62,16 @@ pub(crate) fn attitudes(
 /// Directions and attitudes when neither is given. `star[row] < stars`.
 pub(crate) fn solve(camera: &Camera, frames: &StarFrames, star: &[usize], stars: usize) -> Solved {
     let seen: Vec<Vector3<f64>> = (0..frames.rows())
-        .map(|r| camera.direction(Pixel { x: frames.x_px[r], y: frames.y_px[r] }))
+        .map(|r| {
+            camera.direction(Pixel {
+                x: frames.x_px[r],
+                y: frames.y_px[r],
+            })
+        })
         .collect();
     let mut direction: Vec<Option<Vector3<f64>>> = vec![None; stars];
-    let fullest = (0..frames.frames()).max_by_key(|&k| (frames.rows_of(k).len(), std::cmp::Reverse(k)));
+    let fullest =
+        (0..frames.frames()).max_by_key(|&k| (frames.rows_of(k).len(), std::cmp::Reverse(k)));
     if let Some(k) = fullest {
         for row in frames.rows_of(k) {
             direction[star[row]] = Some(seen[row]);
@@ -87,6 +96,9 @@ pub(crate) fn solve(camera: &Camera, frames: &StarFrames, star: &[usize], stars:
     }
     Solved {
         attitude,
-        direction: direction.into_iter().map(|u| u.unwrap_or_else(Vector3::z)).collect(),
+        direction: direction
+            .into_iter()
+            .map(|u| u.unwrap_or_else(Vector3::z))
+            .collect(),
     }
 }

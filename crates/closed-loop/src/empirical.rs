@@ -93,9 +93,15 @@ impl Empirical {
             _ if stars => 4 * ORDERS,
             _ => 3 * ORDERS,
         };
-        let coefficients =
-            (0..count).map(|k| Coefficient::new(format!("c{k}"), "arcsec", f64::INFINITY)).collect();
-        Some(Self { variable, middle: 0.5 * (range[0] + range[1]), half, coefficients })
+        let coefficients = (0..count)
+            .map(|k| Coefficient::new(format!("c{k}"), "arcsec", f64::INFINITY))
+            .collect();
+        Some(Self {
+            variable,
+            middle: 0.5 * (range[0] + range[1]),
+            half,
+            coefficients,
+        })
     }
 
     fn scaled(&self, value: f64) -> f64 {
@@ -132,7 +138,11 @@ impl Candidate for Empirical {
 
     fn star_columns(&self, camera: &Camera, rows: &StarRows<'_>, out: PointsMut<'_>) -> bool {
         let n = rows.len();
-        assert_eq!(out.x.len(), self.coefficients.len() * n, "one block a coefficient");
+        assert_eq!(
+            out.x.len(),
+            self.coefficients.len() * n,
+            "one block a coefficient"
+        );
         out.x.fill(0.0);
         out.y.fill(0.0);
         let per_arcsec = camera.arcsec_per_px().map(|s| 1.0 / s);
@@ -161,19 +171,37 @@ impl Candidate for Empirical {
                     fields(legendre(z));
                 }
                 Variable::Position(axis) => {
-                    let p = if *axis == 0 { rows.x_px[i] } else { rows.y_px[i] };
+                    let p = if *axis == 0 {
+                        rows.x_px[i]
+                    } else {
+                        rows.y_px[i]
+                    };
                     for (k, g) in legendre(self.scaled(p)).into_iter().enumerate() {
                         put(2 * k, g, 0.0);
                         put(2 * k + 1, 0.0, g);
                     }
                 }
                 Variable::Phase(axis) => {
-                    let p = if *axis == 0 { rows.x_px[i] } else { rows.y_px[i] };
+                    let p = if *axis == 0 {
+                        rows.x_px[i]
+                    } else {
+                        rows.y_px[i]
+                    };
                     let phase = camera.phase_rad(p);
-                    for (k, g) in
-                        [phase.sin(), phase.cos(), (2.0 * phase).sin(), (2.0 * phase).cos()].into_iter().enumerate()
+                    for (k, g) in [
+                        phase.sin(),
+                        phase.cos(),
+                        (2.0 * phase).sin(),
+                        (2.0 * phase).cos(),
+                    ]
+                    .into_iter()
+                    .enumerate()
                     {
-                        if *axis == 0 { put(k, g, 0.0) } else { put(k, 0.0, g) }
+                        if *axis == 0 {
+                            put(k, g, 0.0)
+                        } else {
+                            put(k, 0.0, g)
+                        }
                     }
                 }
                 Variable::Rate | Variable::Acceleration => {
@@ -201,7 +229,11 @@ impl Candidate for Empirical {
 
     fn attitude_columns(&self, rows: &AttitudeRows<'_>, out: VectorsMut<'_>) -> bool {
         let n = rows.len();
-        assert_eq!(out.x.len(), self.coefficients.len() * n, "one block a coefficient");
+        assert_eq!(
+            out.x.len(),
+            self.coefficients.len() * n,
+            "one block a coefficient"
+        );
         let axes = [out.x, out.y, out.z];
         for axis in &axes {
             debug_assert_eq!(axis.len(), self.coefficients.len() * n);
@@ -217,7 +249,11 @@ impl Candidate for Empirical {
                     }
                     _ => return false,
                 };
-                for (k, g) in legendre(z).into_iter().enumerate().take(self.coefficients.len() / 3) {
+                for (k, g) in legendre(z)
+                    .into_iter()
+                    .enumerate()
+                    .take(self.coefficients.len() / 3)
+                {
                     axis[(3 * k + a) * n + i] = g * rad;
                 }
             }
@@ -226,6 +262,9 @@ impl Candidate for Empirical {
     }
 
     fn realise(&self, _: &[f64], _: &Surroundings<'_>) -> Result<Box<dyn Effect>, EffectError> {
-        Err(EffectError::UnknownEffect { id: EMPIRICAL.to_owned(), nearest: String::new() })
+        Err(EffectError::UnknownEffect {
+            id: EMPIRICAL.to_owned(),
+            nearest: String::new(),
+        })
     }
 }

@@ -13,7 +13,9 @@ pub enum CloseError {
     #[error(transparent)]
     Effect(#[from] effects::EffectError),
     /// Model and bundle describe different cameras.
-    #[error("the model's tracker and the bundle's differ: {what} is {model} in the model, {bundle} in the bundle")]
+    #[error(
+        "the model's tracker and the bundle's differ: {what} is {model} in the model, {bundle} in the bundle"
+    )]
     TrackersDiffer {
         /// The quantity.
         what: &'static str,
@@ -23,7 +25,9 @@ pub enum CloseError {
         bundle: f64,
     },
     /// Neither model nor bundle says what the camera is.
-    #[error("neither the model nor the bundle gives the tracker's pixels and focal length (or field of view)")]
+    #[error(
+        "neither the model nor the bundle gives the tracker's pixels and focal length (or field of view)"
+    )]
     NoCamera,
     /// Nothing can be compared with anything.
     #[error("nothing to compare: {0}")]
@@ -39,6 +43,8 @@ pub enum CloseError {
         why: &'static str,
     },
     /// The declared unknowns cannot be solved for.
-    #[error("the declared unknowns cannot be estimated from this data: the normal equations are singular")]
+    #[error(
+        "the declared unknowns cannot be estimated from this data: the normal equations are singular"
+    )]
     Singular,
 }

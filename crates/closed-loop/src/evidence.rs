@@ -41,5 +41,10 @@ pub(crate) trait Evidence: Sync {
     /// The columns with `candidates` in them.
     fn design<'a>(&'a self, candidates: &'a [&'a dyn Candidate]) -> Box<dyn Design + 'a>;
     /// Out-of-fold residuals of every row, outliers included.
-    fn residuals(&self, folds: &Folds, candidates: &[&dyn Candidate], amplitudes: &Amplitudes) -> Residuals;
+    fn residuals(
+        &self,
+        folds: &Folds,
+        candidates: &[&dyn Candidate],
+        amplitudes: &Amplitudes,
+    ) -> Residuals;
 }

@@ -14,7 +14,8 @@ use std::collections::BTreeMap;
 use effects::Surroundings;
 use nalgebra::DMatrix;
 use telemetry::report::{
-    Confusable, ConsideredEffect, Dependence, Estimate, FoundEffect, Selector, Unattributed, Verdict,
+    Confusable, ConsideredEffect, Dependence, Estimate, FoundEffect, Selector, Unattributed,
+    Verdict,
 };
 use telemetry::{EffectEntry, EffectValue};
 
@@ -39,7 +40,9 @@ pub(crate) fn effects_found(
     let set = columns_of(&found.fitted.groups, chosen);
     let mut effects = Vec::new();
     let mut entries = Vec::new();
-    let Some(estimate) = found.fitted.fits.estimate(&set) else { return Ok((effects, entries)) };
+    let Some(estimate) = found.fitted.fits.estimate(&set) else {
+        return Ok((effects, entries));
+    };
     for (k, &g) in chosen.iter().enumerate() {
         let candidate = found.candidates[g].as_ref();
         let (values, covariance) = amplitudes_of(found, g, &set, &estimate);
@@ -66,7 +69,10 @@ pub(crate) fn effects_found(
         }
         effects.push(FoundEffect {
             id: candidate.id().to_owned(),
-            selectors: selectors.iter().map(|(k, v)| (k.clone(), Selector::from(v.as_str()))).collect(),
+            selectors: selectors
+                .iter()
+                .map(|(k, v)| (k.clone(), Selector::from(v.as_str())))
+                .collect(),
             parameters,
             delta_loglik: judged.delta_loglik,
             p_value: judged.p_value,
@@ -86,10 +92,18 @@ fn amplitudes_of(
     set: &[usize],
     estimate: &crate::fit::Estimate,
 ) -> (Vec<f64>, DMatrix<f64>) {
-    let first: usize = found.candidates[..g].iter().map(|c| c.coefficients().len()).sum();
+    let first: usize = found.candidates[..g]
+        .iter()
+        .map(|c| c.coefficients().len())
+        .sum();
     let p = found.candidates[g].coefficients().len();
-    let at: Vec<Option<usize>> = (0..p).map(|j| set.iter().position(|&c| c == first + j)).collect();
-    let values = at.iter().map(|a| a.map_or(0.0, |i| estimate.value[i])).collect();
+    let at: Vec<Option<usize>> = (0..p)
+        .map(|j| set.iter().position(|&c| c == first + j))
+        .collect();
+    let values = at
+        .iter()
+        .map(|a| a.map_or(0.0, |i| estimate.value[i]))
+        .collect();
     let spread = estimate.cautious_covariance();
     let covariance = DMatrix::from_fn(p, p, |i, j| match (at[i], at[j]) {
         (Some(i), Some(j)) => spread[(i, j)],
@@ -119,7 +133,10 @@ fn confusable(found: &Found, g: usize) -> Vec<Confusable> {
     let mut list: Vec<Confusable> = best
         .into_iter()
         .filter(|(_, c)| c.abs() >= CONFUSABLE)
-        .map(|(id, correlation)| Confusable { id: id.to_owned(), correlation })
+        .map(|(id, correlation)| Confusable {
+            id: id.to_owned(),
+            correlation,
+        })
         .collect();
     list.sort_by(|a, b| b.correlation.abs().total_cmp(&a.correlation.abs()));
     list
@@ -129,7 +146,13 @@ fn confusable(found: &Found, g: usize) -> Vec<Confusable> {
 pub(crate) fn considered(found: &Found, excess: f64) -> Vec<ConsideredEffect> {
     effects::catalogue()
         .iter()
-        .filter(|kind| !found.selection.chosen.iter().any(|&g| found.candidates[g].id() == kind.id()))
+        .filter(|kind| {
+            !found
+                .selection
+                .chosen
+                .iter()
+                .any(|&g| found.candidates[g].id() == kind.id())
+        })
         .map(|kind| consider(found, kind.id(), excess))
         .collect()
 }
@@ -138,7 +161,9 @@ fn consider(found: &Found, id: &str, excess: f64) -> ConsideredEffect {
     let best = (0..found.candidates.len())
         .filter(|&g| found.candidates[g].id() == id && found.selection.judged[g].observable)
         .max_by(|&a, &b| {
-            found.selection.judged[a].delta_loglik.total_cmp(&found.selection.judged[b].delta_loglik)
+            found.selection.judged[a]
+                .delta_loglik
+                .total_cmp(&found.selection.judged[b].delta_loglik)
         });
     let mut entry = ConsideredEffect {
         id: id.to_owned(),
@@ -154,13 +179,17 @@ fn consider(found: &Found, id: &str, excess: f64) -> ConsideredEffect {
     let judged = &found.selection.judged[g];
     entry.delta_loglik = Some(judged.delta_loglik);
     entry.p_value = Some(judged.p_value);
-    let first: usize = found.candidates[..g].iter().map(|c| c.coefficients().len()).sum();
+    let first: usize = found.candidates[..g]
+        .iter()
+        .map(|c| c.coefficients().len())
+        .sum();
     let mut set = columns_of(&found.fitted.groups, &found.selection.chosen);
     let own = set.len();
     set.extend(&found.fitted.groups[g].columns);
-    if let (Some(estimate), Some(&column)) =
-        (found.fitted.fits.estimate(&set), found.fitted.groups[g].columns.first())
-    {
+    if let (Some(estimate), Some(&column)) = (
+        found.fitted.fits.estimate(&set),
+        found.fitted.groups[g].columns.first(),
+    ) {
         let coefficient = &found.candidates[g].coefficients()[column - first];
         entry.detectable = Some(5.0 * estimate.sigma(own));
         let information = found.fitted.fits.information(column);
@@ -176,7 +205,11 @@ fn consider(found: &Found, id: &str, excess: f64) -> ConsideredEffect {
 pub(crate) fn unattributed(found: &Found, left: f64) -> Unattributed {
     let chosen = &found.selection.chosen;
     let set = columns_of(&found.fitted.groups, chosen);
-    let base = found.fitted.fits.out_of_fold(&set).map_or(0.0, |o| o.total_sse());
+    let base = found
+        .fitted
+        .fits
+        .out_of_fold(&set)
+        .map_or(0.0, |o| o.total_sse());
     let mut depends_on: Vec<Dependence> = (0..found.candidates.len())
         .filter(|&g| found.candidates[g].id() == EMPIRICAL && found.selection.judged[g].observable)
         .filter_map(|g| {

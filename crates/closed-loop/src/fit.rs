@@ -82,8 +82,9 @@ impl Eliminated {
     ) -> Option<Self> {
         let n = layout.nuisance_precision.len();
         let (gram, scalars) = grams.sum(train);
-        let pick: Vec<usize> =
-            (n..n + layout.candidates).chain([layout.residual(fold)]).collect();
+        let pick: Vec<usize> = (n..n + layout.candidates)
+            .chain([layout.residual(fold)])
+            .collect();
         let mut normal = gram.view((0, 0), (n, n)).into_owned();
         // A column that nothing constrains (a gauge freedom, a star never seen in
         // training) gets a precision far below what one scalar of data brings.
@@ -92,17 +93,31 @@ impl Eliminated {
             normal[(k, k)] += precision * variance + floor;
         }
         let cross = DMatrix::from_fn(n, pick.len(), |i, j| gram[(i, pick[j])]);
-        let nuisance = if n == 0 { cross.clone() } else { Cholesky::new(normal)?.solve(&cross) };
+        let nuisance = if n == 0 {
+            cross.clone()
+        } else {
+            Cholesky::new(normal)?.solve(&cross)
+        };
         let reduced = DMatrix::from_fn(pick.len(), pick.len(), |i, j| gram[(pick[i], pick[j])])
             - cross.transpose() * &nuisance;
         let blocks = (0..grams.gram.len())
             .filter(|&b| judged(b))
-            .map(|b| (transformed(&grams.gram[b], n, &pick, &nuisance), grams.scalars[b]))
+            .map(|b| {
+                (
+                    transformed(&grams.gram[b], n, &pick, &nuisance),
+                    grams.scalars[b],
+                )
+            })
             .collect();
         // Columns under a tight prior cost less than one degree of freedom each;
         // counting them whole is the cautious side.
         let freedom = (scalars - n as f64).max(1.0);
-        Some(Self { nuisance, train: reduced, freedom, blocks })
+        Some(Self {
+            nuisance,
+            train: reduced,
+            freedom,
+            blocks,
+        })
     }
 
     /// Amplitudes of the candidate columns `set`, with prior precisions.
@@ -142,6 +157,8 @@ pub(crate) struct OutOfFold {
     pub(crate) sse: Vec<f64>,
     /// Log-likelihood of each block, nats, noise variance from the other folds.
     pub(crate) loglik: Vec<f64>,
+    /// Scalars of each block.
+    pub(crate) scalars: Vec<f64>,
 }
 
 impl OutOfFold {
@@ -175,9 +192,10 @@ impl Estimate {
         if which.is_empty() || b <= p {
             return 1.0;
         }
-        let (Some(robust), Some(white)) =
-            (self.distance(&self.covariance, which), self.distance(&self.white, which))
-        else {
+        let (Some(robust), Some(white)) = (
+            self.distance(&self.covariance, which),
+            self.distance(&self.white, which),
+        ) else {
             return 1.0;
         };
         let f = (b - p) / (p * (b - 1.0)) * robust;
@@ -188,13 +206,16 @@ impl Estimate {
     /// Squared distance of amplitudes `which` from zero in the metric of `covariance`.
     fn distance(&self, covariance: &DMatrix<f64>, which: &[usize]) -> Option<f64> {
         let value = DVector::from_fn(which.len(), |i, _| self.value[which[i]]);
-        let part = DMatrix::from_fn(which.len(), which.len(), |i, j| covariance[(which[i], which[j])]);
+        let part = DMatrix::from_fn(which.len(), which.len(), |i, j| {
+            covariance[(which[i], which[j])]
+        });
         Some(value.dot(&Cholesky::new(part)?.solve(&value)))
     }
 
     /// The cluster-robust covariance with no variance below that of white noise.
     pub(crate) fn cautious_covariance(&self) -> DMatrix<f64> {
-        let stretch = |k: usize| self.sigma(k) / self.covariance[(k, k)].sqrt().max(f64::MIN_POSITIVE);
+        let stretch =
+            |k: usize| self.sigma(k) / self.covariance[(k, k)].sqrt().max(f64::MIN_POSITIVE);
         DMatrix::from_fn(self.value.len(), self.value.len(), |i, j| {
             stretch(i) * self.covariance[(i, j)] * stretch(j)
         })
@@ -202,7 +223,10 @@ impl Estimate {
 
     /// Standard error of amplitude `k`.
     pub(crate) fn sigma(&self, k: usize) -> f64 {
-        self.covariance[(k, k)].max(self.white[(k, k)]).max(0.0).sqrt()
+        self.covariance[(k, k)]
+            .max(self.white[(k, k)])
+            .max(0.0)
+            .sqrt()
     }
 }
 
@@ -218,37 +242,60 @@ impl Fits {
     /// Eliminates the nuisance in every fold and on all data. `variance` is the
     /// noise variance of a scalar, which turns prior precisions into the unit of
     /// the Gram. `None` if the nuisance itself is singular.
-    pub(crate) fn new(grams: &BlockGrams, folds: &Folds, layout: &Layout, variance: f64) -> Option<Self> {
+    pub(crate) fn new(
+        grams: &BlockGrams,
+        folds: &Folds,
+        layout: &Layout,
+        variance: f64,
+    ) -> Option<Self> {
         let of = &folds.fold_of_block;
         let by_fold = (0..folds.count)
             .map(|f| {
-                Eliminated::new(grams, layout, variance, Some(f), |b| of[b] != f, |b| of[b] == f)
+                Eliminated::new(
+                    grams,
+                    layout,
+                    variance,
+                    Some(f),
+                    |b| of[b] != f,
+                    |b| of[b] == f,
+                )
             })
             .collect::<Option<Vec<_>>>()?;
         let all = Eliminated::new(grams, layout, variance, None, |_| true, |_| true)?;
-        Some(Self { folds: by_fold, all, blocks: of.len() })
+        Some(Self {
+            folds: by_fold,
+            all,
+            blocks: of.len(),
+        })
     }
 
     /// Out-of-fold error of the candidate columns `set`; `None` if they cannot
     /// be told apart in some fold.
     pub(crate) fn out_of_fold(&self, set: &[usize]) -> Option<OutOfFold> {
-        let (mut sse, mut loglik) = (Vec::new(), Vec::new());
+        let (mut sse, mut loglik, mut count) = (Vec::new(), Vec::new(), Vec::new());
         for fold in &self.folds {
             let (beta, _) = fold.amplitudes(set)?;
             let last = fold.train.ncols() - 1;
             let train_sse = fold.train[(last, last)]
-                - (0..set.len()).map(|i| beta[i] * fold.train[(set[i], last)]).sum::<f64>();
+                - (0..set.len())
+                    .map(|i| beta[i] * fold.train[(set[i], last)])
+                    .sum::<f64>();
             let variance =
                 (train_sse / (fold.freedom - set.len() as f64).max(1.0)).max(f64::MIN_POSITIVE);
             for (gram, scalars) in &fold.blocks {
                 let error = quadratic(gram, set, &beta);
                 sse.push(error);
+                count.push(*scalars);
                 loglik.push(
                     -0.5 * (scalars * (std::f64::consts::TAU * variance).ln() + error / variance),
                 );
             }
         }
-        Some(OutOfFold { sse, loglik })
+        Some(OutOfFold {
+            sse,
+            loglik,
+            scalars: count,
+        })
     }
 
     /// Amplitudes of `set` in fold `fold`'s training data.
@@ -258,9 +305,17 @@ impl Fits {
 
     /// Nuisance amplitudes that go with `beta` on `set`, in fold `fold`'s
     /// training data (`None`: all data).
-    pub(crate) fn nuisance(&self, fold: Option<usize>, set: &[usize], beta: &DVector<f64>) -> DVector<f64> {
+    pub(crate) fn nuisance(
+        &self,
+        fold: Option<usize>,
+        set: &[usize],
+        beta: &DVector<f64>,
+    ) -> DVector<f64> {
         let eliminated = fold.map_or(&self.all, |f| &self.folds[f]);
-        let mut nuisance = eliminated.nuisance.column(eliminated.nuisance.ncols() - 1).into_owned();
+        let mut nuisance = eliminated
+            .nuisance
+            .column(eliminated.nuisance.ncols() - 1)
+            .into_owned();
         for (i, &c) in set.iter().enumerate() {
             nuisance.axpy(-beta[i], &eliminated.nuisance.column(c), 1.0);
         }
@@ -276,7 +331,9 @@ impl Fits {
         for (gram, _) in &self.all.blocks {
             let score = DVector::from_fn(p, |i, _| {
                 gram[(set[i], last)]
-                    - (0..p).map(|j| gram[(set[i], set[j])] * value[j]).sum::<f64>()
+                    - (0..p)
+                        .map(|j| gram[(set[i], set[j])] * value[j])
+                        .sum::<f64>()
             });
             spread.ger(1.0, &score, &score, 1.0);
         }
@@ -286,13 +343,23 @@ impl Fits {
         let variance = self.variance(set)?;
         for i in 0..p {
             for j in 0..p {
-                let own: f64 = self.all.blocks.iter().map(|(gram, _)| gram[(set[i], set[j])]).sum();
+                let own: f64 = self
+                    .all
+                    .blocks
+                    .iter()
+                    .map(|(gram, _)| gram[(set[i], set[j])])
+                    .sum();
                 spread[(i, j)] += variance * (self.all.train[(set[i], set[j])] - own);
             }
         }
         let inverse = factor.inverse();
         let covariance = &inverse * spread * &inverse;
-        Some(Estimate { value, covariance, white: inverse * variance, blocks: self.blocks })
+        Some(Estimate {
+            value,
+            covariance,
+            white: inverse * variance,
+            blocks: self.blocks,
+        })
     }
 
     /// Correlation between two columns once the nuisance is out: how alike two
@@ -314,7 +381,9 @@ impl Fits {
         let (beta, _) = self.all.amplitudes(set)?;
         let last = self.all.train.ncols() - 1;
         let sse = self.all.train[(last, last)]
-            - (0..set.len()).map(|i| beta[i] * self.all.train[(set[i], last)]).sum::<f64>();
+            - (0..set.len())
+                .map(|i| beta[i] * self.all.train[(set[i], last)])
+                .sum::<f64>();
         Some(sse / (self.all.freedom - set.len() as f64).max(1.0))
     }
 }
@@ -377,7 +446,11 @@ mod tests {
     fn fits(table: &Table, precision: [f64; 2]) -> (Fits, Folds) {
         let folds = Folds::cut(table.0.nrows());
         let grams = BlockGrams::accumulate(table, &folds);
-        let layout = Layout { nuisance_precision: precision.to_vec(), candidates: 3, residuals: 1 };
+        let layout = Layout {
+            nuisance_precision: precision.to_vec(),
+            candidates: 3,
+            residuals: 1,
+        };
         (Fits::new(&grams, &folds, &layout, 1.0).unwrap(), folds)
     }
 
@@ -402,7 +475,10 @@ mod tests {
             }
         }
         let ours = fits.out_of_fold(&[0, 2]).unwrap().total_sse();
-        assert!((ours / direct - 1.0).abs() < 1e-9, "{ours} against {direct}");
+        assert!(
+            (ours / direct - 1.0).abs() < 1e-9,
+            "{ours} against {direct}"
+        );
     }
 
     /// Under noise that is correlated over 8 frames (blocks hold 33) the chance of

@@ -34,7 +34,11 @@ pub(crate) struct Folds {
 impl Folds {
     /// Cuts `frames` frames into folds of (nearly) equal numbers of frames.
     pub(crate) fn cut(frames: usize) -> Self {
-        let count = if frames < LEAVE_ONE_OUT_BELOW { frames.max(1) } else { FOLDS };
+        let count = if frames < LEAVE_ONE_OUT_BELOW {
+            frames.max(1)
+        } else {
+            FOLDS
+        };
         let per_fold = (frames / count / MIN_BLOCK_FRAMES).clamp(1, BLOCKS / FOLDS);
         let pieces = count * per_fold;
         let edge = |k: usize| k * frames / pieces;
@@ -49,7 +53,11 @@ impl Folds {
     pub(crate) fn fold_ranges(&self) -> Vec<Range<usize>> {
         (0..self.count)
             .map(|f| {
-                let mut of = self.blocks.iter().zip(&self.fold_of_block).filter(|(_, g)| **g == f);
+                let mut of = self
+                    .blocks
+                    .iter()
+                    .zip(&self.fold_of_block)
+                    .filter(|(_, g)| **g == f);
                 let first = of.next().map_or(0..0, |(b, _)| b.clone());
                 first.start..of.last().map_or(first.end, |(b, _)| b.end)
             })
@@ -58,7 +66,11 @@ impl Folds {
 
     /// One fold of everything, for what is not predicted.
     pub(crate) fn whole(frames: usize) -> Self {
-        Self { blocks: vec![0..frames], fold_of_block: vec![0], count: 1 }
+        Self {
+            blocks: vec![0..frames],
+            fold_of_block: vec![0],
+            count: 1,
+        }
     }
 
     /// The fold of each frame as tables have it.

@@ -1,9 +1,18 @@
 //! Which explanation of an image-level leftover the data supports.
 //!
-//! Centroids are formed anew with the dark map taken off, and again with an
-//! effective spot fitted to the pixels. Each step has to earn its place out of
-//! fold, block by block; a function of pixel phase, the rival explanation, is
-//! tried on every level on the same footing.
+//! Centroids are formed anew as first moments, as first moments less what the
+//! effective spot says that they are off by, and as positions of that spot, each
+//! with and without a dark map; a function of pixel phase, the rival explanation,
+//! is tried on all of them. Out of fold, block by block:
+//!
+//! - the map is claimed if the best account with it beats the best without it:
+//!   anything else that the windows allow may stand in for it;
+//! - the spot is claimed if first moments corrected by it beat first moments as they
+//!   are, and as well as any function of pixel phase does. That a fitted spot has less
+//!   noise than a first moment is no effect.
+//!
+//! Once either is claimed centroids are formed anew, and then in the way that predicts
+//! best: a fitted spot also feels what is left of a warm pixel less.
 //!
 //! Not physics: the comparison.
 
@@ -26,10 +35,11 @@ use crate::selection::{FAMILY_ALPHA, columns_of};
 use crate::star_data::StarData;
 use crate::star_design::StarEvidence;
 
-/// One way of forming centroids, and what it is called.
-pub(crate) struct Level<'a> {
-    pub(crate) name: &'static str,
-    pub(crate) evidence: &'a StarEvidence<'a>,
+/// Centroids formed with or without a map.
+pub(crate) struct Side<'a> {
+    pub(crate) moments: StarEvidence<'a>,
+    pub(crate) unbiased: StarEvidence<'a>,
+    pub(crate) fitted: StarEvidence<'a>,
 }
 
 /// What one step from a level to the next brought.
@@ -48,48 +58,164 @@ pub(crate) struct ImageLevel {
     pub(crate) rivals: Vec<Rival>,
     pub(crate) dark_map: Step,
     pub(crate) effective_psf: Step,
+    /// Positions of the spot predict better than moments.
+    pub(crate) fitted: bool,
 }
 
-/// Compares `[measured, dark map + first moments, dark map + effective spot]`.
+/// A level out of fold, by itself and with the best function of pixel phase.
+struct Scored {
+    alone: Score,
+    phase: Option<Score>,
+}
+
+impl Scored {
+    fn best(&self) -> &Score {
+        self.phase
+            .as_ref()
+            .filter(|p| p.total() > self.alone.total())
+            .unwrap_or(&self.alone)
+    }
+}
+
+/// Compares the measured centroids with those formed `[without, with]` a map.
 pub(crate) fn compare(
-    levels: &[Level<'_>; 3],
+    measured: &StarEvidence<'_>,
+    sides: &[Side<'_>; 2],
     phase: &[Box<dyn Candidate>],
     folds: &Folds,
     data: &StarData,
 ) -> Result<ImageLevel, CloseError> {
     let mut rivals = Vec::new();
-    let mut scores = Vec::new();
-    for level in levels {
-        scores.push(rivals_of(level, phase, folds, data, &mut rivals)?);
-    }
+    let mut tell = |name: &str, evidence: &StarEvidence<'_>| {
+        score(name, evidence, phase, folds, data, &mut rivals)
+    };
+    let measured = tell("declared model", measured)?;
+    let [bare, map] = sides;
+    let bare = [
+        tell("moments anew", &bare.moments)?,
+        tell("moments anew - spot", &bare.unbiased)?,
+        tell("effective_psf", &bare.fitted)?,
+    ];
+    let map = [
+        tell("dark_map", &map.moments)?,
+        tell("dark_map - spot", &map.unbiased)?,
+        tell("dark_map + effective_psf", &map.fitted)?,
+    ];
+    // What only leads to a decision is not an account to be shown.
+    rivals.retain(|r| !r.what.contains(" - spot"));
     let zero = rivals.first().map_or(0.0, |r| r.delta_loglik);
     for rival in &mut rivals {
         rival.delta_loglik -= zero;
     }
-    let whole = scores[0].total_sse();
-    let dark_map = step(&scores[1], &scores[0], whole);
-    let effective_psf = step(&scores[2], &scores[usize::from(dark_map.stands)], whole);
-    Ok(ImageLevel { rivals, dark_map, effective_psf })
+    let whole = measured.alone.sse.iter().sum::<f64>();
+    let best = |list: &[&Scored]| -> Score {
+        let better = |a: &Score, b: &Score| a.total().total_cmp(&b.total());
+        list.iter()
+            .map(|s| s.best().clone())
+            .max_by(better)
+            .unwrap_or_else(|| measured.alone.clone())
+    };
+    let claim = step(
+        &best(&[&map[0], &map[2]]),
+        &best(&[&measured, &bare[0], &bare[2]]),
+        whole,
+    );
+    // Without a map, plain moments are those of the table or those formed anew.
+    let plain = if bare[0].alone.total() > measured.alone.total() {
+        &bare[0]
+    } else {
+        &measured
+    };
+    let (moments, side) = if claim.stands {
+        (&map[0], &map)
+    } else {
+        (plain, &bare)
+    };
+    let spot = step(&side[1].alone, &moments.alone, whole);
+    let spot_stands = spot.stands && side[1].best().total() >= moments.best().total();
+    let corrected = if spot_stands { &side[1] } else { moments };
+    let fitted = step(&side[2].alone, &corrected.alone, whole).stands;
+    let last = if fitted { &side[2] } else { corrected };
+    let by_map = if spot_stands { &map[0] } else { last };
+    let dark_map = Step {
+        stands: claim.stands,
+        p_value: claim.p_value,
+        ..step(
+            if claim.stands {
+                &by_map.alone
+            } else {
+                &map[0].alone
+            },
+            &plain.alone,
+            whole,
+        )
+    };
+    let effective_psf = Step {
+        stands: spot_stands,
+        p_value: spot.p_value,
+        ..step(&last.alone, &moments.alone, whole)
+    };
+    Ok(ImageLevel {
+        rivals,
+        dark_map,
+        effective_psf,
+        fitted,
+    })
 }
 
-/// A level by itself and with the best phase term; returns the score by itself.
-fn rivals_of(
-    level: &Level<'_>,
+/// Squared error and log-likelihood of each block, out of fold.
+#[derive(Clone, Debug)]
+struct Score {
+    sse: Vec<f64>,
+    loglik: Vec<f64>,
+}
+
+impl Score {
+    /// The noise of a fold is that of the *predictions* of the others: what was
+    /// learned from windows follows their noise, and looks better on them than it is.
+    fn new(error: &OutOfFold, folds: &Folds) -> Self {
+        let of = &folds.fold_of_block;
+        let loglik = (0..error.sse.len())
+            .map(|b| {
+                let others = || (0..error.sse.len()).filter(|&o| of[o] != of[b]);
+                let scalars: f64 = others().map(|o| error.scalars[o]).sum();
+                let variance = others().map(|o| error.sse[o]).sum::<f64>() / scalars.max(1.0);
+                let variance = variance.max(f64::MIN_POSITIVE);
+                -0.5 * (error.scalars[b] * (std::f64::consts::TAU * variance).ln()
+                    + error.sse[b] / variance)
+            })
+            .collect();
+        Self {
+            sse: error.sse.clone(),
+            loglik,
+        }
+    }
+
+    fn total(&self) -> f64 {
+        self.loglik.iter().sum()
+    }
+}
+
+/// A level by itself and with the best phase term.
+fn score(
+    name: &str,
+    evidence: &StarEvidence<'_>,
     phase: &[Box<dyn Candidate>],
     folds: &Folds,
     data: &StarData,
     rivals: &mut Vec<Rival>,
-) -> Result<OutOfFold, CloseError> {
-    let fitted = fit(level.evidence, folds, &borrowed(phase))?;
-    let base = fitted.fits.out_of_fold(&[]).ok_or(CloseError::Singular)?;
+) -> Result<Scored, CloseError> {
+    let fitted = fit(evidence, folds, &borrowed(phase))?;
+    let scored = |set: &[usize]| fitted.fits.out_of_fold(set).map(|o| Score::new(&o, folds));
+    let alone = scored(&[]).ok_or(CloseError::Singular)?;
     let best = (0..phase.len())
         .filter(|&g| !fitted.groups[g].columns.is_empty())
-        .filter_map(|g| Some((g, fitted.fits.out_of_fold(&columns_of(&fitted.groups, &[g]))?)))
-        .max_by(|a, b| a.1.total_loglik().total_cmp(&b.1.total_loglik()));
+        .filter_map(|g| Some((g, scored(&columns_of(&fitted.groups, &[g]))?)))
+        .max_by(|a, b| a.1.total().total_cmp(&b.1.total()));
     let columns = phase.iter().map(|c| c.coefficients().len()).sum();
     let mut tell = |what: String, set: &[usize], loglik: f64| -> Result<(), CloseError> {
         let amplitudes = amplitudes(&fitted, folds, set, columns).ok_or(CloseError::Singular)?;
-        let residual = level.evidence.residuals(folds, &borrowed(phase), &amplitudes);
+        let residual = evidence.residuals(folds, &borrowed(phase), &amplitudes);
         rivals.push(Rival {
             what,
             rms_arcsec: figures::star_rms(&residual, data).to_vec(),
@@ -97,23 +223,36 @@ fn rivals_of(
         });
         Ok(())
     };
-    tell(level.name.to_owned(), &[], base.total_loglik())?;
-    if let Some((g, score)) = best {
-        tell(format!("{} + pixel_phase_harmonics", level.name), &[g], score.total_loglik())?;
+    tell(name.to_owned(), &[], alone.total())?;
+    if let Some((g, score)) = &best {
+        tell(
+            format!("{name} + pixel_phase_harmonics"),
+            &[*g],
+            score.total(),
+        )?;
     }
-    Ok(base)
+    Ok(Scored {
+        alone,
+        phase: best.map(|b| b.1),
+    })
 }
 
 /// Gain of one score over another, block by block: its mean against its scatter
 /// is honest however the errors within a block hang together.
-fn step(with: &OutOfFold, without: &OutOfFold, whole: f64) -> Step {
-    let gain: Vec<f64> = with.loglik.iter().zip(&without.loglik).map(|(a, b)| a - b).collect();
+fn step(with: &Score, without: &Score, whole: f64) -> Step {
+    let gain: Vec<f64> = with
+        .loglik
+        .iter()
+        .zip(&without.loglik)
+        .map(|(a, b)| a - b)
+        .collect();
     let total: f64 = gain.iter().sum();
     let p_value = one_sided(&gain);
+    let sse = |s: &Score| s.sse.iter().sum::<f64>();
     Step {
         delta_loglik: total,
         p_value,
-        explained: (without.total_sse() - with.total_sse()) / whole,
+        explained: (sse(without) - sse(with)) / whole,
         stands: total > 0.0 && p_value < FAMILY_ALPHA,
     }
 }
@@ -136,15 +275,33 @@ pub(crate) fn effects(level: &ImageLevel, formed: &Formed) -> Vec<(FoundEffect, 
         let pixels = formed.map.pixels.len() as f64;
         let rms = formed.map.rms_dn();
         // The rms of n independent pixels is known to rms/sqrt(2 n).
-        let numbers = [("pixels", pixels, None, ""), ("rms_dn", rms, Some(rms / (2.0 * pixels.max(1.0)).sqrt()), "DN")];
-        out.push(entry(DARK_MAP, &level.dark_map, Some(DARK_MAP_FILE), &numbers));
+        let numbers = [
+            ("pixels", pixels, None, ""),
+            (
+                "rms_dn",
+                rms,
+                Some(rms / (2.0 * pixels.max(1.0)).sqrt()),
+                "DN",
+            ),
+        ];
+        out.push(entry(
+            DARK_MAP,
+            &level.dark_map,
+            Some(DARK_MAP_FILE),
+            &numbers,
+        ));
     }
     if level.effective_psf.stands {
         let mut widths: Vec<f64> = formed.fwhm_px.clone();
         let fwhm = crate::robust::median(&mut widths).unwrap_or(f64::NAN);
         let n = widths.len().max(1) as f64;
         let scatter = (widths.iter().map(|w| (w - fwhm).powi(2)).sum::<f64>() / n).sqrt();
-        out.push(entry(EFFECTIVE_PSF, &level.effective_psf, None, &[("fwhm_px", fwhm, Some(scatter), "px")]));
+        out.push(entry(
+            EFFECTIVE_PSF,
+            &level.effective_psf,
+            None,
+            &[("fwhm_px", fwhm, Some(scatter), "px")],
+        ));
     }
     out
 }
@@ -164,8 +321,15 @@ fn entry(
     let mut parameters = BTreeMap::new();
     for &(name, value, sigma, unit) in numbers {
         written.insert(name.to_owned(), EffectValue::Number(value));
-        parameters
-            .insert(name.to_owned(), Estimate { value, sigma, unit: unit.to_owned(), interval: None });
+        parameters.insert(
+            name.to_owned(),
+            Estimate {
+                value,
+                sigma,
+                unit: unit.to_owned(),
+                interval: None,
+            },
+        );
     }
     let effect = FoundEffect {
         id: id.to_owned(),

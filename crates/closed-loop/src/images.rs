@@ -75,20 +75,33 @@ impl DarkMap {
     }
 }
 
-/// Centroids formed anew, and the map behind them. Every list holds one variant a
-/// fold, learned outside it, and a last one learned on all data.
+/// Centroids formed anew in one way: one variant a fold, learned outside it, and a
+/// last one learned on all data; px, `[x, y]` of every star row.
+pub(crate) type Variants = Vec<[Vec<f64>; 2]>;
+
+/// Centroids formed anew with or without a map.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Centroids {
+    /// First moments.
+    pub(crate) moments: Variants,
+    /// First moments less what the effective spot says that they are off by: what
+    /// the spot explains, apart from the noise that fitting it saves.
+    pub(crate) unbiased: Variants,
+    /// Positions fitted with the effective spot.
+    pub(crate) fitted: Variants,
+    /// Rows that kept the centroid of the table, at most in any variant.
+    pub(crate) fallback_rows: usize,
+}
+
+/// Centroids formed anew, and the map behind them.
 #[derive(Clone, Debug)]
 pub(crate) struct Formed {
-    /// First moments with the map taken off, px, `[x, y]` of every star row.
-    pub(crate) moments: Vec<[Vec<f64>; 2]>,
-    /// Positions fitted with the effective spot, px.
-    pub(crate) fitted: Vec<[Vec<f64>; 2]>,
+    pub(crate) without_map: Centroids,
+    pub(crate) with_map: Centroids,
     /// The map from all data.
     pub(crate) map: DarkMap,
     /// Full width at half maximum of each star's spot, px.
     pub(crate) fwhm_px: Vec<f64>,
-    /// Rows that kept the centroid of the table.
-    pub(crate) fallback_rows: usize,
 }
 
 /// Knots of a spot, px: fine enough for the sharpest spot that a window samples.
@@ -118,55 +131,67 @@ pub(crate) fn form(data: &StarData, windows: &WindowTable, folds: &Folds) -> Opt
     let grid = Grid::new(sample.reach_px() + MARGIN_PX, KNOTS_PX);
     let length_px = data.camera.half_size_px().into_iter().fold(0.0, f64::max);
     let fold = folds.fold_of_frame();
-    let mut learned: Vec<Learned> = (0..=folds.count)
-        .into_par_iter()
-        .map(|k| {
-            let taken: Vec<usize> = (0..fold.len()).filter(|&f| fold[f] != k).collect();
-            learn::learn(&sample, &taken, grid, length_px, k == folds.count)
-        })
-        .collect();
-    let mut formed = Formed {
-        moments: Vec::new(),
-        fitted: Vec::new(),
-        map: DarkMap::default(),
-        fwhm_px: Vec::new(),
-        fallback_rows: 0,
+    let learn = |mapped: bool| -> Vec<Learned> {
+        (0..=folds.count)
+            .into_par_iter()
+            .map(|k| {
+                let taken: Vec<usize> = (0..fold.len()).filter(|&f| fold[f] != k).collect();
+                let last = k == folds.count;
+                learn::learn(&sample, &taken, grid, length_px, mapped, mapped && last)
+            })
+            .collect()
     };
+    let (mut learned, bare) = rayon::join(|| learn(true), || learn(false));
+    let with_map = centroids(data, &sample, &learned);
+    let without_map = centroids(data, &sample, &bare);
+    let all = learned.pop()?;
+    let width = |s: &learn::Spot| {
+        if s.psi.is_empty() {
+            f64::NAN
+        } else {
+            spot::fwhm_px(&grid, &s.psi)
+        }
+    };
+    Some(Formed {
+        without_map,
+        with_map,
+        fwhm_px: all.spots.iter().map(width).collect(),
+        map: map::of(&sample, &learned, &all),
+    })
+}
+
+/// Centroids of every star row from each of `learned`; rows whose window does not
+/// give all of them keep the centroid of the table.
+fn centroids(data: &StarData, sample: &Sample, learned: &[Learned]) -> Centroids {
     let table = [data.frames.x_px.clone(), data.frames.y_px.clone()];
-    for one in &learned {
+    let mut out = Centroids::default();
+    for one in learned {
         let mut pixels = Pixels::default();
-        let (mut moments, mut fitted) = (table.clone(), table.clone());
-        let mut without = data.t_s.len() - sample.windows();
+        let mut variant = [table.clone(), table.clone(), table.clone()];
+        let mut fallback = data.t_s.len() - sample.windows();
         for w in 0..sample.windows() {
-            let row = sample.row[w];
-            match (one.moment(&sample, w), one.fitted(&sample, w, &mut pixels)) {
-                (Some(m), Some(f)) => {
-                    for axis in 0..2 {
-                        moments[axis][row] = m[axis];
-                        fitted[axis][row] = f[axis];
-                    }
+            let formed = one.fitted(sample, w, &mut pixels).and_then(|f| {
+                let m = one.moment(sample, w, &pixels)?;
+                let b = one.moment_bias(sample, w, f, &pixels)?;
+                Some([m, [m[0] - b[0], m[1] - b[1]], f])
+            });
+            let Some(formed) = formed else {
+                fallback += 1;
+                continue;
+            };
+            for (variant, at) in variant.iter_mut().zip(formed) {
+                for axis in 0..2 {
+                    variant[axis][sample.row[w]] = at[axis];
                 }
-                _ => without += 1,
             }
         }
-        formed.fallback_rows = formed.fallback_rows.max(without);
-        formed.moments.push(moments);
-        formed.fitted.push(fitted);
+        let [moments, unbiased, fitted] = variant;
+        out.moments.push(moments);
+        out.unbiased.push(unbiased);
+        out.fitted.push(fitted);
+        out.fallback_rows = out.fallback_rows.max(fallback);
     }
-    let all = learned.pop()?;
-    formed.fwhm_px = all
-        .spots
-        .iter()
-        .map(|s| {
-            if s.psi.is_empty() {
-                f64::NAN
-            } else {
-                spot::fwhm_px(&grid, &s.psi)
-            }
-        })
-        .collect();
-    formed.map = map::of(&sample, &learned, &all);
-    Some(formed)
+    out
 }
 
 /// The windows of the star rows, frame by frame; a row without one has no entry.

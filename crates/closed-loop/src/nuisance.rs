@@ -58,7 +58,11 @@ impl StarNuisance {
                 })
             }),
             distortion,
-            directions: if data.free_directions { data.stars.len() } else { 0 },
+            directions: if data.free_directions {
+                data.stars.len()
+            } else {
+                0
+            },
             direction_sigma: data.camera.arcsec_per_px()[0],
             moments,
         }
@@ -71,7 +75,10 @@ impl StarNuisance {
             precision.extend(sigma.map(|s| if s.is_finite() { 1.0 / (s * s) } else { 0.0 }));
         }
         if let Some((_, sigma)) = self.distortion {
-            precision.extend(std::iter::repeat_n(1.0 / (sigma * sigma), 2 * (self.moments.len() - 1)));
+            precision.extend(std::iter::repeat_n(
+                1.0 / (sigma * sigma),
+                2 * (self.moments.len() - 1),
+            ));
         }
         let direction = 1.0 / (self.direction_sigma * self.direction_sigma);
         precision.extend(std::iter::repeat_n(direction, 2 * self.directions));
@@ -95,14 +102,21 @@ impl StarNuisance {
         scratch: &mut Vec<f64>,
         put: &mut impl FnMut(usize, f64, f64),
     ) {
-        let at = Pixel { x: data.modelled[0][row], y: data.modelled[1][row] };
+        let at = Pixel {
+            x: data.modelled[0][row],
+            y: data.modelled[1][row],
+        };
         let scale = data.camera.arcsec_per_px();
         let per_rad = scale.map(|s| s / focal_plane::ARCSEC_PER_RAD);
         let mut column = 0;
         if self.misalignment.is_some() {
             let jacobian = data.camera.rotation_jacobian(at);
             for k in 0..3 {
-                put(column, jacobian[0][k] * per_rad[0], jacobian[1][k] * per_rad[1]);
+                put(
+                    column,
+                    jacobian[0][k] * per_rad[0],
+                    jacobian[1][k] * per_rad[1],
+                );
                 column += 1;
             }
         }
@@ -135,7 +149,11 @@ impl StarNuisance {
 
 /// Two unit vectors across `u`; any pair serves, the amplitudes are never read.
 fn tangent_axes(u: &Vector3<f64>) -> [Vector3<f64>; 2] {
-    let seed = if u.z.abs() < 0.9 { Vector3::z() } else { Vector3::x() };
+    let seed = if u.z.abs() < 0.9 {
+        Vector3::z()
+    } else {
+        Vector3::x()
+    };
     let east = seed.cross(u).normalize();
     [east, u.cross(&east)]
 }
@@ -163,4 +181,3 @@ fn coefficient_sigma(order: usize, circular_arcsec: f64) -> f64 {
     }
     circular_arcsec / (2.0 * variance).sqrt()
 }
-

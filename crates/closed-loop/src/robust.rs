@@ -41,7 +41,12 @@ pub(crate) fn centre_and_scale(values: impl Iterator<Item = f64>) -> Option<(f64
 
 /// Marks the outliers of each group in `outlier` (already marked rows are not
 /// asked and stay marked); returns how many were added. `group[i] < groups`.
-pub(crate) fn mark_outliers(values: &[f64], group: &[usize], groups: usize, outlier: &mut [bool]) -> usize {
+pub(crate) fn mark_outliers(
+    values: &[f64],
+    group: &[usize],
+    groups: usize,
+    outlier: &mut [bool],
+) -> usize {
     let mut members = vec![Vec::new(); groups];
     for (i, &g) in group.iter().enumerate() {
         if !outlier[i] && values[i].is_finite() {
@@ -50,7 +55,9 @@ pub(crate) fn mark_outliers(values: &[f64], group: &[usize], groups: usize, outl
     }
     let mut added = 0;
     for rows in &members {
-        let Some((centre, scale)) = centre_and_scale(rows.iter().map(|&i| values[i])) else { continue };
+        let Some((centre, scale)) = centre_and_scale(rows.iter().map(|&i| values[i])) else {
+            continue;
+        };
         // A series that is constant to rounding has no scale to judge by.
         if scale <= 0.0 {
             continue;

@@ -46,7 +46,12 @@ pub(crate) fn fit(
     folds: &Folds,
     candidates: &[&dyn Candidate],
 ) -> Result<Fitted, CloseError> {
-    fit_design(evidence, evidence.design(candidates).as_ref(), folds, candidates)
+    fit_design(
+        evidence,
+        evidence.design(candidates).as_ref(),
+        folds,
+        candidates,
+    )
 }
 
 /// As [`fit`], on columns that are there already.
@@ -66,7 +71,10 @@ pub(crate) fn fit_design(
     let mut fits = None;
     for _ in 0..2 {
         let found = Fits::new(&grams, folds, &layout, variance).ok_or(CloseError::Singular)?;
-        variance = found.variance(&[]).unwrap_or(variance).max(f64::MIN_POSITIVE);
+        variance = found
+            .variance(&[])
+            .unwrap_or(variance)
+            .max(f64::MIN_POSITIVE);
         fits = Some(found);
     }
     let fits = fits.ok_or(CloseError::Singular)?;
@@ -82,7 +90,10 @@ pub(crate) fn fit_design(
                 raw > 0.0 && fits.information(c) > OBSERVABLE_SHARE * raw
             })
             .collect();
-        let bounds = columns.iter().map(|c| credible(&candidate.coefficients()[c - column])).collect();
+        let bounds = columns
+            .iter()
+            .map(|c| credible(&candidate.coefficients()[c - column]))
+            .collect();
         groups.push(Group {
             columns,
             bounds,
@@ -91,7 +102,11 @@ pub(crate) fn fit_design(
         });
         column += p;
     }
-    Ok(Fitted { fits, groups, scalars })
+    Ok(Fitted {
+        fits,
+        groups,
+        scalars,
+    })
 }
 
 /// Sizes of a coefficient that are still credible.
@@ -136,7 +151,11 @@ pub(crate) fn search(
         let selection = select(&fitted.fits, &fitted.groups, &may, fitted.scalars);
         let settled = selection.chosen == before || round == ROUNDS;
         if selection.chosen.is_empty() || settled {
-            return Ok(Found { candidates, fitted, selection });
+            return Ok(Found {
+                candidates,
+                fitted,
+                selection,
+            });
         }
         before.clone_from(&selection.chosen);
         polish(evidence, folds, &mut candidates, &fitted, &selection.chosen)?;
@@ -158,11 +177,18 @@ pub(crate) fn polish(
     chosen: &[usize],
 ) -> Result<(), CloseError> {
     let set = columns_of(&fitted.groups, chosen);
-    let Some(estimate) = fitted.fits.estimate(&set) else { return Ok(()) };
+    let Some(estimate) = fitted.fits.estimate(&set) else {
+        return Ok(());
+    };
     let mut first = 0;
     for &g in chosen {
         let columns = &fitted.groups[g].columns;
-        let values: Vec<f64> = estimate.value.rows(first, columns.len()).iter().copied().collect();
+        let values: Vec<f64> = estimate
+            .value
+            .rows(first, columns.len())
+            .iter()
+            .copied()
+            .collect();
         first += columns.len();
         if columns.len() == candidates[g].coefficients().len()
             && let Some(better) = candidates[g].refined(&values)
@@ -198,12 +224,18 @@ fn scan(
         let variants = trial.len();
         // The others stay in the fit beside each variant.
         let mut tried = borrowed(&trial);
-        tried.extend(chosen.iter().filter(|&&c| c != g).map(|&c| candidates[c].as_ref()));
+        tried.extend(
+            chosen
+                .iter()
+                .filter(|&&c| c != g)
+                .map(|&c| candidates[c].as_ref()),
+        );
         let fitted = fit(evidence, folds, &tried)?;
         let best = (0..variants)
             .filter_map(|v| {
-                let set: Vec<usize> =
-                    std::iter::once(v).chain(variants..fitted.groups.len()).collect();
+                let set: Vec<usize> = std::iter::once(v)
+                    .chain(variants..fitted.groups.len())
+                    .collect();
                 Some((v, fitted.fits.variance(&columns_of(&fitted.groups, &set))?))
             })
             .min_by(|a, b| a.1.total_cmp(&b.1));
@@ -215,9 +247,17 @@ fn scan(
 }
 
 /// Amplitudes of `chosen`, each fold from the others.
-pub(crate) fn amplitudes(found: &Fitted, folds: &Folds, chosen: &[usize], columns: usize) -> Option<Amplitudes> {
+pub(crate) fn amplitudes(
+    found: &Fitted,
+    folds: &Folds,
+    chosen: &[usize],
+    columns: usize,
+) -> Option<Amplitudes> {
     let set = columns_of(&found.groups, chosen);
-    let mut out = Amplitudes { nuisance: Vec::new(), candidates: Vec::new() };
+    let mut out = Amplitudes {
+        nuisance: Vec::new(),
+        candidates: Vec::new(),
+    };
     for f in 0..folds.count {
         let beta = found.fits.amplitudes_without(f, &set)?;
         out.nuisance.push(found.fits.nuisance(Some(f), &set, &beta));

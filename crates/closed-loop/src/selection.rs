@@ -54,7 +54,12 @@ pub(crate) struct Judgement {
 
 impl Judgement {
     /// Nothing can be said of it.
-    pub(crate) const UNSEEN: Self = Self { delta_loglik: 0.0, p_value: 1.0, credible: false, observable: false };
+    pub(crate) const UNSEEN: Self = Self {
+        delta_loglik: 0.0,
+        p_value: 1.0,
+        credible: false,
+        observable: false,
+    };
 
     /// It may be claimed.
     pub(crate) fn stands(&self) -> bool {
@@ -73,7 +78,10 @@ pub(crate) struct Selection {
 
 /// All candidate columns of `chosen`, in order.
 pub(crate) fn columns_of(groups: &[Group], chosen: &[usize]) -> Vec<usize> {
-    chosen.iter().flat_map(|&g| groups[g].columns.iter().copied()).collect()
+    chosen
+        .iter()
+        .flat_map(|&g| groups[g].columns.iter().copied())
+        .collect()
 }
 
 /// Runs the search. `scalars` is the number of independent scalars in the data;
@@ -92,7 +100,9 @@ pub(crate) fn select(fits: &Fits, groups: &[Group], may: &[bool], scalars: f64) 
             .filter_map(|g| {
                 let judgement = judge(fits, groups, &chosen, g, base.as_ref()?, tried);
                 let rank = judgement.delta_loglik
-                    - 0.5 * (groups[g].columns.len() + groups[g].choices) as f64 * scalars.max(2.0).ln();
+                    - 0.5
+                        * (groups[g].columns.len() + groups[g].choices) as f64
+                        * scalars.max(2.0).ln();
                 judgement.stands().then_some((g, rank))
             })
             .max_by(|a, b| a.1.total_cmp(&b.1));
@@ -113,7 +123,13 @@ pub(crate) fn select(fits: &Fits, groups: &[Group], may: &[bool], scalars: f64) 
 }
 
 /// Drops chosen groups that no longer stand beside the others.
-fn prune(fits: &Fits, groups: &[Group], chosen: &mut Vec<usize>, banned: &mut [bool], tried: usize) {
+fn prune(
+    fits: &Fits,
+    groups: &[Group],
+    chosen: &mut Vec<usize>,
+    banned: &mut [bool],
+    tried: usize,
+) {
     loop {
         let fallen = chosen.iter().copied().find(|&g| {
             let others: Vec<usize> = chosen.iter().copied().filter(|&c| c != g).collect();
@@ -132,7 +148,14 @@ fn out_of_fold(fits: &Fits, groups: &[Group], chosen: &[usize]) -> Option<OutOfF
     fits.out_of_fold(&columns_of(groups, chosen))
 }
 
-fn judge(fits: &Fits, groups: &[Group], others: &[usize], g: usize, base: &OutOfFold, tried: usize) -> Judgement {
+fn judge(
+    fits: &Fits,
+    groups: &[Group],
+    others: &[usize],
+    g: usize,
+    base: &OutOfFold,
+    tried: usize,
+) -> Judgement {
     let mut set = columns_of(groups, others);
     let first = set.len();
     set.extend(&groups[g].columns);

@@ -39,8 +39,13 @@ impl<'a> Situation<'a> {
             .as_ref()
             .map(|s| &s.t_s)
             .or(bundle.attitude.as_ref().map(|a| &a.t_s))
-            .ok_or(CloseError::NothingToCompare("the bundle has neither stars nor attitude"))?;
-        let span_s = [t_s.first().copied().unwrap_or(0.0), t_s.last().copied().unwrap_or(0.0)];
+            .ok_or(CloseError::NothingToCompare(
+                "the bundle has neither stars nor attitude",
+            ))?;
+        let span_s = [
+            t_s.first().copied().unwrap_or(0.0),
+            t_s.last().copied().unwrap_or(0.0),
+        ];
         let mut channels = BTreeMap::new();
         if let Some(housekeeping) = &bundle.housekeeping {
             for (name, values) in &housekeeping.channels {
@@ -65,7 +70,10 @@ impl<'a> Situation<'a> {
                 quaternion_signs: f.quaternion_signs.known(),
             }),
             reference: reference(bundle),
-            year: bundle.meta.julian_year(0.5 * (span_s[0] + span_s[1])).unwrap_or(2000.0),
+            year: bundle
+                .meta
+                .julian_year(0.5 * (span_s[0] + span_s[1]))
+                .unwrap_or(2000.0),
             span_s,
         })
     }
@@ -85,12 +93,20 @@ impl<'a> Situation<'a> {
         let catalogue = self.bundle.catalog.as_ref()?;
         let index = catalogue.index_of(id)?;
         let star = &catalogue.stars()[index];
-        Some(Star { id, mag: star.mag, bv: star.bv, direction: catalogue.direction_at(index, self.year) })
+        Some(Star {
+            id,
+            mag: star.mag,
+            bv: star.bv,
+            direction: catalogue.direction_at(index, self.year),
+        })
     }
 
     /// The exposure, the model's before the bundle's.
     pub(crate) fn exposure_s(&self) -> Option<f64> {
-        self.model.tracker.exposure_s.or(self.bundle.meta.tracker.exposure_s)
+        self.model
+            .tracker
+            .exposure_s
+            .or(self.bundle.meta.tracker.exposure_s)
     }
 }
 
@@ -99,9 +115,13 @@ impl<'a> Situation<'a> {
 fn reference(bundle: &Bundle) -> Option<AttitudeSeries> {
     let table = bundle.reference.as_ref()?;
     let gap = GAP_STEPS * median_step(&table.t_s)?;
-    AttitudeSeries::new(table.t_s.clone(), table.q.clone(), table.rates_rad_s.clone())
-        .ok()
-        .map(|series| series.with_max_gap_s(gap))
+    AttitudeSeries::new(
+        table.t_s.clone(),
+        table.q.clone(),
+        table.rates_rad_s.clone(),
+    )
+    .ok()
+    .map(|series| series.with_max_gap_s(gap))
 }
 
 fn camera(model: &Model, bundle: &Bundle) -> Result<Camera, CloseError> {
@@ -128,9 +148,16 @@ fn camera(model: &Model, bundle: &Bundle) -> Result<Camera, CloseError> {
                         bundle: f64::from(b),
                     });
                 }
-                let (a, b) = (model.focal_length_px()[axis], measured.focal_length_px()[axis]);
+                let (a, b) = (
+                    model.focal_length_px()[axis],
+                    measured.focal_length_px()[axis],
+                );
                 if (a / b - 1.0).abs() > FOCAL_TOLERANCE {
-                    return Err(CloseError::TrackersDiffer { what: "the focal length, px,", model: a, bundle: b });
+                    return Err(CloseError::TrackersDiffer {
+                        what: "the focal length, px,",
+                        model: a,
+                        bundle: b,
+                    });
                 }
             }
             Ok(model)

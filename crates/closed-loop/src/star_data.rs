@@ -100,7 +100,12 @@ impl StarData {
             let index = *index_of.entry(id).or_insert_with(|| {
                 let known = inputs.catalogue.and_then(|find| find(id));
                 let mag = inputs.frames.mag.as_ref().map_or(f64::NAN, |m| m[row]);
-                stars.push(known.unwrap_or(Star { id, mag, bv: f64::NAN, direction: Vector3::zeros() }));
+                stars.push(known.unwrap_or(Star {
+                    id,
+                    mag,
+                    bv: f64::NAN,
+                    direction: Vector3::zeros(),
+                }));
                 stars.len() - 1
             });
             star.push(index);
@@ -142,7 +147,10 @@ impl StarData {
             for (k, q) in attitude.iter().enumerate() {
                 if let Some(q) = q {
                     for row in frames.rows_of(k) {
-                        let at = Pixel { x: frames.x_px[row], y: frames.y_px[row] };
+                        let at = Pixel {
+                            x: frames.x_px[row],
+                            y: frames.y_px[row],
+                        };
                         sum[star[row]] += q.inverse() * camera.direction(at);
                     }
                 }
@@ -223,7 +231,9 @@ impl StarData {
                 let centre = self.position(&self.attitude[k], &u);
                 self.projected[0][row] = centre[0];
                 self.projected[1][row] = centre[1];
-                let Some([before, after]) = &around else { continue };
+                let Some([before, after]) = &around else {
+                    continue;
+                };
                 let (p, q) = (self.position(before, &u), self.position(after, &u));
                 for axis in 0..2 {
                     self.velocity[axis][row] = (q[axis] - p[axis]) / (2.0 * h);
@@ -246,14 +256,19 @@ impl StarData {
             return;
         }
         let own = self.own_motion();
-        let Some(motion) = reference.or(own.as_ref()) else { return };
+        let Some(motion) = reference.or(own.as_ref()) else {
+            return;
+        };
         let mut tracker = Pbm::new(self.camera.clone());
         for effect in effects {
             let disturbance: Arc<dyn Disturbance> = effect.clone();
             tracker = tracker.with_disturbance(disturbance);
         }
         let component = |axis: usize| -> Vec<f64> {
-            self.star.iter().map(|&s| self.stars[s].direction[axis]).collect()
+            self.star
+                .iter()
+                .map(|&s| self.stars[s].direction[axis])
+                .collect()
         };
         let (x, y, z) = (component(0), component(1), component(2));
         let [px, py] = &mut self.projected;
@@ -266,7 +281,11 @@ impl StarData {
                 star_id: &self.frames.star_id,
                 mag: &self.mag,
                 bv: &self.bv,
-                direction: Vectors { x: &x, y: &y, z: &z },
+                direction: Vectors {
+                    x: &x,
+                    y: &y,
+                    z: &z,
+                },
             },
             &mut Scratch::default(),
             PointsMut { x: px, y: py },
@@ -280,7 +299,9 @@ impl StarData {
     }
 
     fn position(&self, q: &UnitQuaternion<f64>, u: &Vector3<f64>) -> [f64; 2] {
-        self.camera.project(&(q * u)).map_or([f64::NAN; 2], |p| [p.x, p.y])
+        self.camera
+            .project(&(q * u))
+            .map_or([f64::NAN; 2], |p| [p.x, p.y])
     }
 
     /// Moves the modelled positions to projection + `shift` (arcsec, the fitted
@@ -299,7 +320,10 @@ impl StarData {
 
     fn update_phase(&mut self, phase: &CentroidError) {
         let [x, y] = &mut self.phase_error;
-        let at = Points { x: &self.modelled[0], y: &self.modelled[1] };
+        let at = Points {
+            x: &self.modelled[0],
+            y: &self.modelled[1],
+        };
         phase
             .scaled(self.camera.arcsec_per_px().map(|s| 1.0 / s))
             .error_into(at, self.camera.pixel_centre(), PointsMut { x, y });

@@ -73,10 +73,11 @@ impl StarDesign<'_> {
         for frame in frames {
             for row in data.frames.rows_of(frame) {
                 let i = row - rows.start;
-                self.nuisance.row(data, frame, row, &mut scratch, &mut |column, dx, dy| {
-                    out[(i, column)] = dx;
-                    out[(n + i, column)] = dy;
-                });
+                self.nuisance
+                    .row(data, frame, row, &mut scratch, &mut |column, dx, dy| {
+                        out[(i, column)] = dx;
+                        out[(n + i, column)] = dy;
+                    });
             }
         }
         let mut column = self.nuisance.columns();
@@ -89,7 +90,14 @@ impl StarDesign<'_> {
             x.resize(p * n, 0.0);
             y.clear();
             y.resize(p * n, 0.0);
-            if candidate.star_columns(&data.camera, &seen, PointsMut { x: &mut x, y: &mut y }) {
+            if candidate.star_columns(
+                &data.camera,
+                &seen,
+                PointsMut {
+                    x: &mut x,
+                    y: &mut y,
+                },
+            ) {
                 for j in 0..p {
                     for i in 0..n {
                         out[(i, column + j)] = x[j * n + i] * scale[0];
@@ -123,7 +131,9 @@ impl StarDesign<'_> {
         if !data.free_attitude {
             return 2 * (0..n).filter(|i| !data.outlier[first + i]).count();
         }
-        frames.map(|frame| project_frame(data, frame, first, out)).sum()
+        frames
+            .map(|frame| project_frame(data, frame, first, out))
+            .sum()
     }
 }
 
@@ -140,7 +150,10 @@ impl Design for StarDesign<'_> {
 
 /// Rotation columns of one row, arcsec per arcsec.
 pub(crate) fn rotation_row(data: &StarData, row: usize) -> [[f64; 3]; 2] {
-    let at = Pixel { x: data.modelled[0][row], y: data.modelled[1][row] };
+    let at = Pixel {
+        x: data.modelled[0][row],
+        y: data.modelled[1][row],
+    };
     let scale = data.camera.arcsec_per_px();
     let mut jacobian = data.camera.rotation_jacobian(at);
     for axis in 0..2 {
@@ -238,7 +251,12 @@ impl Evidence for StarEvidence<'_> {
         })
     }
 
-    fn residuals(&self, folds: &Folds, candidates: &[&dyn Candidate], amplitudes: &Amplitudes) -> Residuals {
+    fn residuals(
+        &self,
+        folds: &Folds,
+        candidates: &[&dyn Candidate],
+        amplitudes: &Amplitudes,
+    ) -> Residuals {
         let data = self.data;
         let design = StarDesign {
             data,
@@ -248,7 +266,10 @@ impl Evidence for StarEvidence<'_> {
             motion: self.motion,
         };
         let rows = data.t_s.len();
-        let mut out = Residuals { axes: vec![vec![0.0; rows]; 2], modelled: vec![vec![0.0; rows]; 2] };
+        let mut out = Residuals {
+            axes: vec![vec![0.0; rows]; 2],
+            modelled: vec![vec![0.0; rows]; 2],
+        };
         let mut filled = DMatrix::zeros(0, design.width());
         for (frame, fold) in folds.fold_of_frame().into_iter().enumerate() {
             let (nuisance, candidate) = (&amplitudes.nuisance[fold], &amplitudes.candidates[fold]);
@@ -282,14 +303,19 @@ fn remove_attitude(data: &StarData, frame: usize, residual: &mut [Vec<f64>]) {
     for row in data.frames.rows_of(frame) {
         let jacobian = rotation_row(data, row);
         for axis in 0..2 {
-            residual[axis][row] = theta
-                .map_or(f64::NAN, |t| residual[axis][row] - Vector3::from(jacobian[axis]).dot(&t));
+            residual[axis][row] = theta.map_or(f64::NAN, |t| {
+                residual[axis][row] - Vector3::from(jacobian[axis]).dot(&t)
+            });
         }
     }
 }
 
 /// The rotation, arcsec, that a frame's star shifts amount to, by least squares.
-pub(crate) fn rotation_of(data: &StarData, frame: usize, shift: &[Vec<f64>]) -> Option<Vector3<f64>> {
+pub(crate) fn rotation_of(
+    data: &StarData,
+    frame: usize,
+    shift: &[Vec<f64>],
+) -> Option<Vector3<f64>> {
     let inverse = rotation_inverse(data, frame)?;
     let mut moment = Vector3::zeros();
     for row in data.frames.rows_of(frame).filter(|&r| !data.outlier[r]) {

@@ -22,7 +22,7 @@ use crate::error::CloseError;
 use crate::evidence::{Evidence, Residuals};
 use crate::figures;
 use crate::folds::Folds;
-use crate::image_level::{self, ImageLevel, Level};
+use crate::image_level::{self, ImageLevel, Side};
 use crate::images::{self, Formed};
 use crate::motion;
 use crate::nuisance::StarNuisance;
@@ -38,8 +38,15 @@ const MIN_FRAMES: usize = 4;
 /// Fits of the declared unknowns, each at better modelled positions.
 const SETTLING_ROUNDS: usize = 4;
 
-pub(crate) fn run(situation: &Situation<'_>, progress: &dyn Fn(&str)) -> Result<Closed, CloseError> {
-    let frames = situation.bundle.stars.as_ref().ok_or(CloseError::NothingToCompare("no stars"))?;
+pub(crate) fn run(
+    situation: &Situation<'_>,
+    progress: &dyn Fn(&str),
+) -> Result<Closed, CloseError> {
+    let frames = situation
+        .bundle
+        .stars
+        .as_ref()
+        .ok_or(CloseError::NothingToCompare("no stars"))?;
     progress("joining stars, reference and catalogue");
     let phase = declared::centroid_error(situation.model);
     let find = |id: i64| -> Option<Star> { situation.star(id) };
@@ -47,7 +54,11 @@ pub(crate) fn run(situation: &Situation<'_>, progress: &dyn Fn(&str)) -> Result<
         camera: &situation.camera,
         frames,
         reference: situation.reference.as_ref(),
-        catalogue: situation.bundle.catalog.is_some().then_some(&find as &dyn Fn(i64) -> Option<Star>),
+        catalogue: situation
+            .bundle
+            .catalog
+            .is_some()
+            .then_some(&find as &dyn Fn(i64) -> Option<Star>),
         phase: &phase,
         effects: &declared::effects(situation)?,
     });
@@ -84,29 +95,46 @@ pub(crate) fn run(situation: &Situation<'_>, progress: &dyn Fn(&str)) -> Result<
             .collect();
         evidence(&data, situation, residuals, motion)
     };
-    let levels = formed.as_ref().map(|f| [anew(&f.moments), anew(&f.fitted)]);
+    let sides = formed.as_ref().map(|f| {
+        [&f.without_map, &f.with_map].map(|c| Side {
+            moments: anew(&c.moments),
+            unbiased: anew(&c.unbiased),
+            fitted: anew(&c.fitted),
+        })
+    });
 
     progress("searching for causes");
-    let facts: Vec<StarFacts> =
-        data.stars.iter().map(|s| StarFacts { star_id: s.id, mag: s.mag, bv: s.bv }).collect();
+    let facts: Vec<StarFacts> = data
+        .stars
+        .iter()
+        .map(|s| StarFacts {
+            star_id: s.id,
+            mag: s.mag,
+            bv: s.bv,
+        })
+        .collect();
     let rows = all_rows(&data, motion);
     let scene = scene(situation, &data, &facts, &rows);
-    let image = match &levels {
-        Some([moments, fitted]) => {
+    let image = match &sides {
+        Some(sides) => {
             let mut phase = catalogue_candidates(&scene);
             phase.retain(|c| c.id() == "pixel_phase_harmonics");
-            let levels = [
-                Level { name: "declared model", evidence: &measured },
-                Level { name: "dark_map", evidence: moments },
-                Level { name: "dark_map + effective_psf", evidence: fitted },
-            ];
-            Some(image_level::compare(&levels, &phase, &folds, &data)?)
+            Some(image_level::compare(
+                &measured, sides, &phase, &folds, &data,
+            )?)
         }
         None => None,
     };
-    let level = match (&levels, &image) {
-        (Some([_, fitted]), Some(image)) if image.effective_psf.stands => fitted,
-        (Some([moments, _]), Some(image)) if image.dark_map.stands => moments,
+    let level = match (&sides, &image) {
+        (Some([bare, map]), Some(image)) => {
+            let side = if image.dark_map.stands { map } else { bare };
+            match (image.dark_map.stands, image.effective_psf.stands) {
+                (false, false) => &measured,
+                _ if image.fitted => &side.fitted,
+                (_, true) => &side.unbiased,
+                (_, false) => &side.moments,
+            }
+        }
         _ => &measured,
     };
     let candidates = || {
@@ -215,10 +243,13 @@ fn scene<'a>(
 /// Every variable that the bundle gives values of.
 fn leftover_terms(situation: &Situation<'_>, data: &StarData) -> Vec<Box<dyn Candidate>> {
     let range = |series: &[&[f64]]| {
-        series.iter().flat_map(|s| s.iter()).filter(|v| v.is_finite()).fold(
-            [f64::INFINITY, f64::NEG_INFINITY],
-            |[low, high], &v| [low.min(v), high.max(v)],
-        )
+        series
+            .iter()
+            .flat_map(|s| s.iter())
+            .filter(|v| v.is_finite())
+            .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], &v| {
+                [low.min(v), high.max(v)]
+            })
     };
     let largest = |series: &[Vec<f64>; 2]| {
         let [low, high] = range(&[&series[0], &series[1]]);
@@ -241,10 +272,16 @@ fn leftover_terms(situation: &Situation<'_>, data: &StarData) -> Vec<Box<dyn Can
     add(Variable::Magnitude, range(&[&data.mag]));
     add(Variable::Colour, range(&[&data.bv]));
     if !data.free_directions && data.stars.len() <= 64 {
-        add(Variable::Star(data.stars.iter().map(|s| s.id).collect()), [0.0, 1.0]);
+        add(
+            Variable::Star(data.stars.iter().map(|s| s.id).collect()),
+            [0.0, 1.0],
+        );
     }
     for (name, series) in channels_of_interest(&situation.channels) {
-        add(Variable::Housekeeping(name, series.clone()), range(&[series.value()]));
+        add(
+            Variable::Housekeeping(name, series.clone()),
+            range(&[series.value()]),
+        );
     }
     terms
 }
@@ -263,18 +300,38 @@ struct Finish<'a> {
 
 impl Finish<'_> {
     fn residuals(&self, chosen: &[usize]) -> Result<Residuals, CloseError> {
-        let columns = self.found.candidates.iter().map(|c| c.coefficients().len()).sum();
+        let columns = self
+            .found
+            .candidates
+            .iter()
+            .map(|c| c.coefficients().len())
+            .sum();
         let amplitudes = amplitudes(&self.found.fitted, self.folds, chosen, columns)
             .ok_or(CloseError::Singular)?;
-        Ok(self.level.residuals(self.folds, &borrowed(&self.found.candidates), &amplitudes))
+        Ok(self
+            .level
+            .residuals(self.folds, &borrowed(&self.found.candidates), &amplitudes))
     }
 
     fn power(&self, residual: &Residuals) -> f64 {
-        figures::star_rms(residual, self.data).iter().map(|v| v * v).sum()
+        figures::star_rms(residual, self.data)
+            .iter()
+            .map(|v| v * v)
+            .sum()
     }
 
-    fn errors(&self, residual: &Residuals, loglik: Option<f64>, attitude: Option<[f64; 3]>) -> Errors {
-        let declared = self.situation.model.noise.temporal_arcsec.filter(|s| *s > 0.0);
+    fn errors(
+        &self,
+        residual: &Residuals,
+        loglik: Option<f64>,
+        attitude: Option<[f64; 3]>,
+    ) -> Errors {
+        let declared = self
+            .situation
+            .model
+            .noise
+            .temporal_arcsec
+            .filter(|s| *s > 0.0);
         let rms = figures::star_rms(residual, self.data);
         Errors {
             star_rms_arcsec: Some(rms),
@@ -317,9 +374,10 @@ fn finish(f: &Finish<'_>) -> Result<Closed, CloseError> {
     let excess = excess(f, last);
     let mut considered = figures::considered(f.found, excess);
     if let Some((level, _)) = f.image {
-        for (id, step) in
-            [(images::DARK_MAP, &level.dark_map), (images::EFFECTIVE_PSF, &level.effective_psf)]
-        {
+        for (id, step) in [
+            (images::DARK_MAP, &level.dark_map),
+            (images::EFFECTIVE_PSF, &level.effective_psf),
+        ] {
             considered.retain(|c| !(step.stands && c.id == id));
             for entry in considered.iter_mut().filter(|c| c.id == id) {
                 entry.delta_loglik = Some(step.delta_loglik);
@@ -336,7 +394,12 @@ fn finish(f: &Finish<'_>) -> Result<Closed, CloseError> {
     let before_fit = fit(f.measured, f.folds, &[])?;
     let before_loglik = before_fit.fits.out_of_fold(&[]).map(|o| o.total_loglik());
     let set = columns_of(&f.found.fitted.groups, chosen);
-    let after_loglik = f.found.fitted.fits.out_of_fold(&set).map(|o| o.total_loglik());
+    let after_loglik = f
+        .found
+        .fitted
+        .fits
+        .out_of_fold(&set)
+        .map(|o| o.total_loglik());
     let outliers = f.data.outlier.iter().filter(|o| **o).count();
     let report = Report {
         format: telemetry::report::REPORT_FORMAT.to_owned(),
@@ -350,12 +413,16 @@ fn finish(f: &Finish<'_>) -> Result<Closed, CloseError> {
         before: f.errors(
             f.before,
             before_loglik,
-            attitude.as_ref().map(|a| attitude_rms(&a.before_arcsec, &a.outlier)),
+            attitude
+                .as_ref()
+                .map(|a| attitude_rms(&a.before_arcsec, &a.outlier)),
         ),
         after: f.errors(
             &after,
             after_loglik,
-            attitude.as_ref().map(|a| attitude_rms(&a.after_arcsec, &a.outlier)),
+            attitude
+                .as_ref()
+                .map(|a| attitude_rms(&a.after_arcsec, &a.outlier)),
         ),
         effects,
         considered,
@@ -392,7 +459,10 @@ fn finish(f: &Finish<'_>) -> Result<Closed, CloseError> {
                 dn: formed.map.pixels.iter().map(|p| p.dn).collect(),
                 sigma_dn: formed.map.pixels.iter().map(|p| p.sigma_dn).collect(),
             }),
-        rivals: f.image.map(|(level, _)| level.rivals.clone()).unwrap_or_default(),
+        rivals: f
+            .image
+            .map(|(level, _)| level.rivals.clone())
+            .unwrap_or_default(),
     })
 }
 
@@ -400,11 +470,9 @@ fn finish(f: &Finish<'_>) -> Result<Closed, CloseError> {
 /// over scalars; 0 where no noise is declared.
 fn excess(f: &Finish<'_>, power: f64) -> f64 {
     let rows = f.data.outlier.iter().filter(|o| !**o).count() as f64;
-    f.situation
-        .model
-        .noise
-        .temporal_arcsec
-        .map_or(0.0, |s| (rows * power - 0.5 * s * s * f.found.fitted.scalars).max(0.0))
+    f.situation.model.noise.temporal_arcsec.map_or(0.0, |s| {
+        (rows * power - 0.5 * s * s * f.found.fitted.scalars).max(0.0)
+    })
 }
 
 /// The tracker's own attitude beside the stars: its error against the reference,
@@ -427,15 +495,22 @@ fn attitude_residuals(f: &Finish<'_>, after: &Residuals) -> Option<AttitudeResid
     };
     let (shift_before, shift_after) = (shift(f.before), shift(after));
     let fold = f.folds.column();
-    let own: BTreeMap<u64, usize> =
-        table.t_s.iter().enumerate().map(|(k, t)| (t.to_bits(), k)).collect();
+    let own: BTreeMap<u64, usize> = table
+        .t_s
+        .iter()
+        .enumerate()
+        .map(|(k, t)| (t.to_bits(), k))
+        .collect();
     let mut out = AttitudeResiduals::default();
     for k in 0..data.frames.frames() {
-        let Some(&at) = own.get(&data.frames.t_s[k].to_bits()) else { continue };
+        let Some(&at) = own.get(&data.frames.t_s[k].to_bits()) else {
+            continue;
+        };
         let theta = rotation_vector(&table.q[at], &data.attitude[k]) * focal_plane::ARCSEC_PER_RAD;
-        let (Some(b), Some(a)) =
-            (rotation_of(data, k, &shift_before), rotation_of(data, k, &shift_after))
-        else {
+        let (Some(b), Some(a)) = (
+            rotation_of(data, k, &shift_before),
+            rotation_of(data, k, &shift_after),
+        ) else {
             continue;
         };
         out.t_s.push(data.frames.t_s[k]);

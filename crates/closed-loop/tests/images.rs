@@ -497,7 +497,6 @@ fn particle_hits_leave_map_and_residual_alone() {
 /// Spots much sharper than a pixel: the first moment errs with the pixel phase, and no
 /// pixel adds anything. The map is not the explanation.
 #[test]
-#[ignore = "the step to the map is credited with the level that its first moments also follow"]
 fn pixel_phase_is_not_mistaken_for_warm_pixels() {
     for size in [[4, 4], [3, 3]] {
         let closed = run(&Scene {

@@ -57,9 +57,7 @@ impl EffectKind for Kind {
         let known = ["k1", "k2", "p1", "p2", "cx_px", "cy_px"];
         let reader = Reader::new(ID, parameters, &known)?;
         // Terms not given are not there, and are not reported as zeros.
-        let terms: Vec<usize> = (0..TERMS.len())
-            .filter(|&k| reader.has(TERMS[k]))
-            .collect();
+        let terms: Vec<usize> = (0..TERMS.len()).filter(|&k| reader.has(TERMS[k])).collect();
         let values = terms
             .iter()
             .map(|&k| reader.required(TERMS[k]))

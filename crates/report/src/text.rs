@@ -28,10 +28,17 @@ macro_rules! line {
 fn verdict(out: &mut String, report: &Report) {
     let names: Vec<&str> = report.effects.iter().map(|e| e.id.as_str()).collect();
     let sentence = match report.verdict {
-        Verdict::Consistent => "the data follows the declared model; nothing is left to explain".to_owned(),
+        Verdict::Consistent => {
+            "the data follows the declared model; nothing is left to explain".to_owned()
+        }
         Verdict::Explained => format!("explained by {}; nothing is left", names.join(" + ")),
-        Verdict::PartlyExplained => format!("partly explained by {}; something is left", names.join(" + ")),
-        Verdict::Unexplained => "something is left that no effect of the catalogue explains".to_owned(),
+        Verdict::PartlyExplained => format!(
+            "partly explained by {}; something is left",
+            names.join(" + ")
+        ),
+        Verdict::Unexplained => {
+            "something is left that no effect of the catalogue explains".to_owned()
+        }
     };
     line!(out, "Verdict   {sentence}");
     line!(
@@ -46,7 +53,14 @@ fn verdict(out: &mut String, report: &Report) {
 }
 
 fn figures(out: &mut String, report: &Report) {
-    line!(out, "{:<28}{:>12}{:>12}{:>10}", "", "before", "after", "ratio");
+    line!(
+        out,
+        "{:<28}{:>12}{:>12}{:>10}",
+        "",
+        "before",
+        "after",
+        "ratio"
+    );
     let (before, after) = (&report.before, &report.after);
     if let (Some(b), Some(a)) = (before.star_rms_arcsec, after.star_rms_arcsec) {
         for (k, axis) in ["x", "y"].into_iter().enumerate() {
@@ -55,11 +69,19 @@ fn figures(out: &mut String, report: &Report) {
     }
     if let (Some(b), Some(a)) = (before.attitude_rms_arcsec, after.attitude_rms_arcsec) {
         for (k, axis) in ["X", "Y", "Z"].into_iter().enumerate() {
-            figure(out, &format!("attitude residual {axis}, arcsec"), b[k], a[k]);
+            figure(
+                out,
+                &format!("attitude residual {axis}, arcsec"),
+                b[k],
+                a[k],
+            );
         }
     }
     for (name, get) in [
-        ("chi2 per degree of freedom", (|e: &Errors| e.chi2_per_dof) as fn(&Errors) -> Option<f64>),
+        (
+            "chi2 per degree of freedom",
+            (|e: &Errors| e.chi2_per_dof) as fn(&Errors) -> Option<f64>,
+        ),
         ("log-likelihood per frame", |e| e.loglik_per_frame),
     ] {
         if let (Some(b), Some(a)) = (get(before), get(after)) {
@@ -71,25 +93,43 @@ fn figures(out: &mut String, report: &Report) {
 
 fn figure(out: &mut String, name: &str, before: f64, after: f64) {
     let digits = if before < 1.0 { 4 } else { 3 };
-    line!(out, "{name:<28}{before:>12.digits$}{after:>12.digits$}{:>10.3}", after / before);
+    line!(
+        out,
+        "{name:<28}{before:>12.digits$}{after:>12.digits$}{:>10.3}",
+        after / before
+    );
 }
 
 fn effects(out: &mut String, report: &Report) {
     for effect in &report.effects {
         line!(out, "Added     {}{}", effect.id, selectors(effect));
         for (name, estimate) in &effect.parameters {
-            let unit = if estimate.unit.is_empty() { String::new() } else { format!(" {}", estimate.unit) };
+            let unit = if estimate.unit.is_empty() {
+                String::new()
+            } else {
+                format!(" {}", estimate.unit)
+            };
             match estimate.sigma {
                 Some(sigma) => {
-                    line!(out, "            {name} = {} +- {}{unit}", number(estimate.value), number(sigma));
+                    line!(
+                        out,
+                        "            {name} = {} +- {}{unit}",
+                        number(estimate.value),
+                        number(sigma)
+                    );
                 }
                 None => line!(out, "            {name} = {}{unit}", number(estimate.value)),
             }
         }
-        let share = effect
-            .variance_explained
-            .map_or(String::new(), |v| format!(", {:.1} % of the variance before", 100.0 * v));
-        line!(out, "            gain {:.1} nats out of fold, p = {:.1e}{share}", effect.delta_loglik, effect.p_value);
+        let share = effect.variance_explained.map_or(String::new(), |v| {
+            format!(", {:.1} % of the variance before", 100.0 * v)
+        });
+        line!(
+            out,
+            "            gain {:.1} nats out of fold, p = {:.1e}{share}",
+            effect.delta_loglik,
+            effect.p_value
+        );
         let alike: Vec<String> = effect
             .confusable_with
             .iter()
@@ -124,7 +164,11 @@ fn rivals(out: &mut String, closed: &Closed) {
     if closed.rivals.is_empty() {
         return;
     }
-    let axes: &[&str] = if closed.stars.is_some() { &["x", "y"] } else { &["X", "Y", "Z"] };
+    let axes: &[&str] = if closed.stars.is_some() {
+        &["x", "y"]
+    } else {
+        &["X", "Y", "Z"]
+    };
     let mut row = format!("{:<52}", "Rival explanations, rms in arcsec out of fold");
     for axis in axes {
         let _ = write!(row, "{axis:>9}");
@@ -143,15 +187,29 @@ fn rivals(out: &mut String, closed: &Closed) {
 fn considered(out: &mut String, report: &Report) {
     let (seen, unseen): (Vec<_>, Vec<_>) = report.considered.iter().partition(|c| c.observable);
     let mut tried = seen;
-    tried.sort_by(|a, b| b.delta_loglik.unwrap_or(0.0).total_cmp(&a.delta_loglik.unwrap_or(0.0)));
+    tried.sort_by(|a, b| {
+        b.delta_loglik
+            .unwrap_or(0.0)
+            .total_cmp(&a.delta_loglik.unwrap_or(0.0))
+    });
     if !tried.is_empty() {
-        line!(out, "Considered and not added (gain in nats; size that would have shown at 5 sigma):");
+        line!(
+            out,
+            "Considered and not added (gain in nats; size that would have shown at 5 sigma):"
+        );
         for c in tried.iter().take(8) {
             let size = match (&c.parameter, c.detectable, &c.unit) {
-                (Some(parameter), Some(d), Some(unit)) => format!("{parameter} {} {unit}", number(d)),
+                (Some(parameter), Some(d), Some(unit)) => {
+                    format!("{parameter} {} {unit}", number(d))
+                }
                 _ => String::new(),
             };
-            line!(out, "  {:<26}{:>9.1}   {size}", c.id, c.delta_loglik.unwrap_or(0.0));
+            line!(
+                out,
+                "  {:<26}{:>9.1}   {size}",
+                c.id,
+                c.delta_loglik.unwrap_or(0.0)
+            );
         }
     }
     if !unseen.is_empty() {
@@ -173,9 +231,24 @@ fn leftover(out: &mut String, report: &Report) {
     if !report.unattributed.present {
         return;
     }
-    line!(out, "What is left follows (share of its variance, out of fold):");
-    for d in report.unattributed.depends_on.iter().filter(|d| d.variance_explained > 0.0).take(5) {
-        line!(out, "  {:<34}{:>7.1} %   p = {:.1e}", d.variable, 100.0 * d.variance_explained, d.p_value);
+    line!(
+        out,
+        "What is left follows (share of its variance, out of fold):"
+    );
+    for d in report
+        .unattributed
+        .depends_on
+        .iter()
+        .filter(|d| d.variance_explained > 0.0)
+        .take(5)
+    {
+        line!(
+            out,
+            "  {:<34}{:>7.1} %   p = {:.1e}",
+            d.variable,
+            100.0 * d.variance_explained,
+            d.p_value
+        );
     }
 }
 
@@ -183,7 +256,13 @@ fn leftover(out: &mut String, report: &Report) {
 fn number(value: f64) -> String {
     let size = value.abs();
     if value == 0.0 || (1e-3..1e6).contains(&size) {
-        let digits = if size >= 1000.0 { 0 } else if size >= 1.0 { 3 } else { 5 };
+        let digits = if size >= 1000.0 {
+            0
+        } else if size >= 1.0 {
+            3
+        } else {
+            5
+        };
         let text = format!("{value:.digits$}");
         return if text.contains('.') {
             text.trim_end_matches('0').trim_end_matches('.').to_owned()

@@ -19,7 +19,8 @@ pub(crate) fn run(options: &Close, console: &Console) -> anyhow::Result<()> {
             (Model::read(model)?, Bundle::read(bundle)?, title)
         }
         _ => {
-            let title = "the example inside the binary: simulated, with an effect that its model lacks";
+            let title =
+                "the example inside the binary: simulated, with an effect that its model lacks";
             (example::model()?, example::bundle()?, title.to_owned())
         }
     };
@@ -39,12 +40,16 @@ pub(crate) fn run(options: &Close, console: &Console) -> anyhow::Result<()> {
     }
     console.say(&format!("Input     {title}\n{text}"));
     if console.json() {
-        console.machine(&serde_json::to_string_pretty(&closed.report).context("the report as JSON")?);
+        console
+            .machine(&serde_json::to_string_pretty(&closed.report).context("the report as JSON")?);
     }
     Ok(())
 }
 
-#[expect(clippy::exit, reason = "the answer to Ctrl-C, after the partial output is gone")]
+#[expect(
+    clippy::exit,
+    reason = "the answer to Ctrl-C, after the partial output is gone"
+)]
 fn interrupted() {
     std::process::exit(130)
 }
@@ -53,7 +58,9 @@ fn write(closed: &Closed, text: &str, output: &Output) -> anyhow::Result<()> {
     let json = serde_json::to_string_pretty(&closed.report).context("the report as JSON")?;
     output.write("report.json", |to| writeln!(to, "{json}"))?;
     output.write("summary.txt", |to| to.write_all(text.as_bytes()))?;
-    output.write("model.toml", |to| to.write_all(closed.model.to_toml().as_bytes()))?;
+    output.write("model.toml", |to| {
+        to.write_all(closed.model.to_toml().as_bytes())
+    })?;
     if let Some(stars) = &closed.stars {
         stars.write(output)?;
     }

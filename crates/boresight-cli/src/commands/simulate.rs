@@ -21,9 +21,12 @@ pub(crate) fn run(options: &Simulate, console: &Console) -> anyhow::Result<()> {
     let frames = bundle.stars.as_ref().map_or(0, |s| s.frames());
     let rows = bundle.stars.as_ref().map_or(0, |s| s.rows());
     let out = options.out.display();
-    console.say(&format!("{frames} frames, {rows} star rows written to {out}"));
+    console.say(&format!(
+        "{frames} frames, {rows} star rows written to {out}"
+    ));
     console.machine(
-        &serde_json::json!({ "bundle": out.to_string(), "frames": frames, "star_rows": rows }).to_string(),
+        &serde_json::json!({ "bundle": out.to_string(), "frames": frames, "star_rows": rows })
+            .to_string(),
     );
     Ok(())
 }

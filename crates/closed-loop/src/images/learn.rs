@@ -88,11 +88,13 @@ struct State {
 }
 
 /// Learns from the frames `taken`. `length_px` is the scale of the field, px.
+/// Unless `mapped`, the map stays at zero: the spots explain what they can.
 pub(crate) fn learn(
     sample: &Sample,
     taken: &[usize],
     grid: Grid,
     length_px: f64,
+    mapped: bool,
     with_variance: bool,
 ) -> Learned {
     let windows = usable(sample, taken);
@@ -134,7 +136,7 @@ pub(crate) fn learn(
     for outer in 0..OUTER {
         place(sample, taken, &mut state, &star_weight, length_px);
         weigh(sample, &windows, &mut state, learned.noise);
-        let sums = learned.learn_spots_and_dark(sample, &windows, &ordered, &state);
+        let sums = learned.learn_spots_and_dark(sample, &windows, &ordered, &state, mapped);
         if with_variance && outer == OUTER - 1 {
             learned.dark_variance = learned.marginal_variance(&sums);
         }
@@ -234,6 +236,7 @@ impl Learned {
         windows: &[Vec<usize>],
         ordered: &[Vec<[usize; 3]>],
         state: &State,
+        mapped: bool,
     ) -> Vec<(Normal, Coupling)> {
         let (grid, level) = (self.grid, |w: usize| state.fitted[w].background);
         let (flux, at, weight) = (&state.flux, &state.at, &state.weight);
@@ -272,7 +275,7 @@ impl Learned {
                 factor.solve(&mut spot.psi);
                 coupling.tell_pixels(&spot.psi, &mut moment, &mut total);
             }
-            if self.dark.update(&moment, &total, &sample.group) < STANDS_STILL {
+            if !mapped || self.dark.update(&moment, &total, &sample.group) < STANDS_STILL {
                 break;
             }
         }
@@ -425,21 +428,53 @@ impl Learned {
         window_fit::fit(&known, sample, w, &start, FINAL_STEPS, pixels).map(|f| f.at)
     }
 
-    /// First moment of window `w`, map and a constant level taken off.
-    pub(crate) fn moment(&self, sample: &Sample, w: usize) -> Option<[f64; 2]> {
-        let spot = &self.spots[sample.star[w]];
+    /// First moment of window `w`, map and a constant level taken off. Pixels with a
+    /// particle hit, as [`fitted`](Self::fitted) left them in `pixels`, take their
+    /// value from the spot.
+    pub(crate) fn moment(&self, sample: &Sample, w: usize, pixels: &Pixels) -> Option<[f64; 2]> {
         let cells = sample.cells_of(w);
-        if spot.psi.is_empty() || !sample.valid[cells.clone()].iter().all(|v| *v) {
+        if !sample.valid[cells.clone()].iter().all(|v| *v) {
+            return None;
+        }
+        let values = sample.z[cells]
+            .iter()
+            .zip(&pixels.good)
+            .zip(&pixels.model)
+            .map(|((&z, &good), &model)| if good { z } else { model });
+        self.moment_of(sample, w, values)
+            .filter(|&at| sample.near(w, at))
+    }
+
+    /// How far the first moment of the noise-free spot of window `w`, at the position
+    /// that [`fitted`](Self::fitted) found and left in `pixels`, is from that position.
+    pub(crate) fn moment_bias(
+        &self,
+        sample: &Sample,
+        w: usize,
+        at: [f64; 2],
+        pixels: &Pixels,
+    ) -> Option<[f64; 2]> {
+        let [x, y] = self.moment_of(sample, w, pixels.model.iter().copied())?;
+        Some([x - at[0], y - at[1]])
+    }
+
+    fn moment_of(
+        &self,
+        sample: &Sample,
+        w: usize,
+        values: impl Iterator<Item = f64>,
+    ) -> Option<[f64; 2]> {
+        let spot = &self.spots[sample.star[w]];
+        if spot.psi.is_empty() {
             return None;
         }
         let mut sum = [0.0; 3];
-        for (i, &[c, r]) in cells.zip(&sample.cells) {
-            let q = sample.z[i] - spot.level - self.dark.value[sample.pixel[i]];
+        for ((i, z), &[c, r]) in sample.cells_of(w).zip(values).zip(&sample.cells) {
+            let q = z - spot.level - self.dark.value[sample.pixel[i]];
             sum = [sum[0] + q, sum[1] + q * c as f64, sum[2] + q * r as f64];
         }
         let corner = sample.corner[w];
-        let at = [corner[0] + sum[1] / sum[0], corner[1] + sum[2] / sum[0]];
-        (sum[0] > 0.0 && sample.near(w, at)).then_some(at)
+        (sum[0] > 0.0).then(|| [corner[0] + sum[1] / sum[0], corner[1] + sum[2] / sum[0]])
     }
 }
 

@@ -110,7 +110,7 @@ fn errors_of_the_map_are_honest() {
     let formed = formed(&made);
     let rms = rms_of(&pulls(&made, &formed.map, &warm));
     assert!((0.8..1.32).contains(&rms), "deviations of {rms} sigma");
-    assert_eq!(formed.fallback_rows, 0);
+    assert_eq!(formed.with_map.fallback_rows, 0);
 }
 
 /// First moments with the map off are better than plain ones on a clean detector,
@@ -131,8 +131,8 @@ fn warm_pixels_stop_moving_the_stars() {
     .make();
     let floor = rms(&clean, &table(&clean), &every);
     let formed = formed(&made);
-    let moments = rms(&made, &out_of_fold(&made, &formed.moments), &every);
-    let fitted = rms(&made, &out_of_fold(&made, &formed.fitted), &every);
+    let moments = rms(&made, &out_of_fold(&made, &formed.with_map.moments), &every);
+    let fitted = rms(&made, &out_of_fold(&made, &formed.with_map.fitted), &every);
     let before = rms(&made, &table(&made), &every);
     assert!(before > 3.0 * floor, "{before} {floor}");
     assert!(moments < floor, "moments {moments}, clean {floor}");
@@ -156,8 +156,8 @@ fn a_clean_detector_gets_no_map() {
         assert!(deviation < 1.0, "{deviation}");
         assert!(formed.map.rms_dn() < 0.1, "{}", formed.map.rms_dn());
         let before = rms(&made, &table(&made), &every);
-        let moments = rms(&made, &out_of_fold(&made, &formed.moments), &every);
-        let fitted = rms(&made, &out_of_fold(&made, &formed.fitted), &every);
+        let moments = rms(&made, &out_of_fold(&made, &formed.with_map.moments), &every);
+        let fitted = rms(&made, &out_of_fold(&made, &formed.with_map.fitted), &every);
         assert!(moments < 1.01 * before, "{moments} {before}");
         assert!(fitted < 0.9 * before, "{fitted} {before}");
         // sqrt(sigma^2 + 1/12) 2.3548, to the area's cells of 0.05 px
@@ -180,7 +180,7 @@ fn a_particle_hit_costs_its_pixel_only() {
     }
     .make();
     let formed = formed(&made);
-    let fitted = out_of_fold(&made, &formed.fitted);
+    let fitted = out_of_fold(&made, &formed.with_map.fitted);
     let (struck, others) = (rms(&made, &fitted, &hit), rms(&made, &fitted, &|r| !hit(r)));
     let before = rms(&made, &table(&made), &hit);
     assert!(before > 0.2, "{before}");
@@ -244,7 +244,7 @@ fn a_map_belongs_to_the_detector() {
 
     let (without_second, without_first) = (make(&dark, 1), make(&dark, 0));
     let (first, second) = (formed(&without_second), formed(&without_first));
-    assert_eq!(first.fallback_rows, 800);
+    assert_eq!(first.with_map.fallback_rows, 800);
     let (a, b) = (pixel(&first.map), pixel(&second.map));
     for p in [a, b, pixel(&whole)] {
         assert!((p.dn - size).abs() < 5.0 * p.sigma_dn + 1.0, "{p:?}");
@@ -300,9 +300,10 @@ fn the_number_of_threads_does_not_matter() {
             .unwrap();
         let formed = pool.install(|| formed(&made));
         let positions = formed
+            .with_map
             .fitted
             .iter()
-            .chain(&formed.moments)
+            .chain(&formed.with_map.moments)
             .flatten()
             .flatten();
         let map = formed.map.pixels.iter().flat_map(|p| [p.dn, p.sigma_dn]);
@@ -338,7 +339,9 @@ fn a_fold_takes_no_part_in_what_it_is_judged_by() {
         (0..made.truth[0].len())
             .filter(|r| ![8, 48].contains(r))
             .filter(|&r| {
-                let bits = |f: &Formed| [&f.fitted, &f.moments].map(|v| v[variant][0][r].to_bits());
+                let bits = |f: &Formed| {
+                    [&f.with_map.fitted, &f.with_map.moments].map(|v| v[variant][0][r].to_bits())
+                };
                 bits(&before) != bits(&after)
             })
             .count()
@@ -362,9 +365,10 @@ fn little_or_foreign_data_is_no_failure() {
         .make();
         let formed = formed(&made);
         let numbers = formed
+            .with_map
             .fitted
             .iter()
-            .chain(&formed.moments)
+            .chain(&formed.with_map.moments)
             .flatten()
             .flatten();
         assert!(numbers.copied().all(f64::is_finite));
@@ -419,9 +423,9 @@ fn stars_may_come_and_go() {
     // no spot can be learned from five windows
     let missing = (0..400).flat_map(|k| (0..4).map(move |s| (k, s)));
     let missing = missing.filter(|&(k, s)| s == 2 || !kept(k, s)).count();
-    assert_eq!(formed.fallback_rows, missing);
+    assert_eq!(formed.with_map.fallback_rows, missing);
     assert!(formed.fwhm_px[2].is_nan() && formed.fwhm_px[0] > 2.0);
-    let fitted = out_of_fold(&made, &formed.fitted);
+    let fitted = out_of_fold(&made, &formed.with_map.fitted);
     let used = |r: usize| r % 4 == 3 && kept(r / 4, 3);
     let (before, after) = (rms(&made, &table(&made), &used), rms(&made, &fitted, &used));
     assert!(after < 0.5 * before, "{after} {before}");
@@ -521,7 +525,7 @@ mod measured {
         )
         .unwrap();
         let formed = form(&data, &windows, &Folds::cut(data.frames.frames())).unwrap();
-        assert_eq!(formed.fallback_rows, 0);
+        assert_eq!(formed.with_map.fallback_rows, 0);
         let table = [data.frames.x_px.clone(), data.frames.y_px.clone()];
         let before = residual(&data, &sample, &[&table; 5], f64::INFINITY);
         let mut outlier = vec![false; data.t_s.len()];
@@ -543,10 +547,10 @@ mod measured {
         };
         let start = rms(&before);
         let (moments, fitted) = (
-            of(&formed.moments, f64::INFINITY),
-            of(&formed.fitted, f64::INFINITY),
+            of(&formed.with_map.moments, f64::INFINITY),
+            of(&formed.with_map.fitted, f64::INFINITY),
         );
-        let bent = of(&formed.fitted, 512.0);
+        let bent = of(&formed.with_map.fitted, 512.0);
         assert!(start.iter().all(|v| (0.25..0.30).contains(v)), "{start:?}");
         assert!(moments.iter().all(|v| *v <= 0.065), "{moments:?}");
         assert!(fitted.iter().all(|v| *v <= 0.04), "{fitted:?}");

@@ -3,4 +3,5 @@
 mod inputs;
 mod invariances;
 mod kit;
+mod nulls;
 mod power;
