@@ -6,7 +6,7 @@
 //! b_k+1 = a b_k + n_k     a = exp(-dt/tau),  n ~ N(0, s_b^2 (1 - a^2))
 //! ```
 //!
-//! A row may be the mean of `count` measurements: its white variance is s_w^2/count.
+//! A row may be the mean of `count` measurements: its white variance is `s_w^2/count`.
 //! The scalar Kalman filter of this model turns the series into independent
 //! unit-variance innovations, at any spacing and across gaps. It is linear and
 //! its gains depend on the times alone, so that regressors go through the same
@@ -264,7 +264,7 @@ mod tests {
         assert!(lag.abs() < 5.0 / n.sqrt(), "lag one {lag}");
     }
 
-    /// The span is 500 tau and slow dominates: sigma_b is known to about
+    /// The span is 500 tau and slow dominates: `sigma_b` is known to about
     /// sqrt(tau/span) = 4.5 %, tau to twice that, the white part far better.
     #[test]
     fn the_fit_finds_the_noise() {

@@ -110,7 +110,7 @@ impl Empirical {
     }
 }
 
-/// Legendre polynomials P_1..P_3.
+/// Legendre polynomials `P_1`..`P_3`.
 fn legendre(z: f64) -> [f64; ORDERS] {
     [z, 1.5 * z * z - 0.5, z * (2.5 * z * z - 1.5)]
 }
@@ -198,9 +198,9 @@ impl Candidate for Empirical {
                     .enumerate()
                     {
                         if *axis == 0 {
-                            put(k, g, 0.0)
+                            put(k, g, 0.0);
                         } else {
-                            put(k, 0.0, g)
+                            put(k, 0.0, g);
                         }
                     }
                 }

@@ -19,7 +19,7 @@
 //! F = (B - p) / (p (B - 1)) beta^T V^-1 beta ~ F(p, B - p)    (Hotelling)
 //! ```
 //!
-//! S - sum_b S_b is what the prior of the nuisance adds: a drawn distortion is
+//! `S - sum_b S_b` is what the prior of the nuisance adds: a drawn distortion is
 //! one draw for all blocks, and its share of the score shows in none of them.
 //! Few blocks, or a column that lives in few of them, make V too small by chance:
 //! neither the standard error nor the p-value is let below that of white noise,

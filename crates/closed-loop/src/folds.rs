@@ -59,7 +59,7 @@ impl Folds {
                     .zip(&self.fold_of_block)
                     .filter(|(_, g)| **g == f);
                 let first = of.next().map_or(0..0, |(b, _)| b.clone());
-                first.start..of.last().map_or(first.end, |(b, _)| b.end)
+                first.start..of.next_back().map_or(first.end, |(b, _)| b.end)
             })
             .collect()
     }
@@ -67,7 +67,7 @@ impl Folds {
     /// One fold of everything, for what is not predicted.
     pub(crate) fn whole(frames: usize) -> Self {
         Self {
-            blocks: vec![0..frames],
+            blocks: std::iter::once(0..frames).collect(),
             fold_of_block: vec![0],
             count: 1,
         }

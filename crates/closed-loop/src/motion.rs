@@ -11,7 +11,7 @@
 //! e_k = q_k - (-q_{k-2} + 4 q_{k-1} + 4 q_{k+1} - q_{k+2}) / 6
 //! ```
 //!
-//! against the step q_{k+1} - q_k: for white noise of variance s^2 they have
+//! against the step `q_{k+1} - q_k`: for white noise of variance s^2 they have
 //! variances (1 + 34/36) s^2 and 2 s^2, so nearly alike; for a resolved motion the
 //! error is of fourth order in the step.
 //!

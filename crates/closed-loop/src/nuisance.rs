@@ -7,7 +7,7 @@
 //! directions     dx = f/Z-projection of q (e a + n b)   two angles a star, prior: a pixel
 //! ```
 //!
-//! The distortion's draw is N(0,1) scaled to sigma_LSF, so the spread of its
+//! The distortion's draw is N(0,1) scaled to `sigma_LSF`, so the spread of its
 //! coefficients differs from draw to draw by 0.58 to 2.2 times (1 to 99 %): the
 //! prior is widened by that 2.2, or everything constant per star raises alarms
 //! when the stars hardly move.
@@ -170,7 +170,7 @@ fn moments(order: usize) -> Vec<f64> {
 }
 
 /// 1 sigma of a coefficient such that the expected per-axis variance over the
-/// field is sigma_LSF^2 / 2: `sum_jk s^2 (m_2j,2k - m_jk^2) = sigma_LSF^2 / 2`.
+/// field is `sigma_LSF^2 / 2`: `sum_jk s^2 (m_2j,2k - m_jk^2) = sigma_LSF^2 / 2`.
 fn coefficient_sigma(order: usize, circular_arcsec: f64) -> f64 {
     let mut variance = 0.0;
     for k in 0..=order {
