@@ -1,4 +1,6 @@
 //! Why a centroid could not be formed.
+//!
+//! Not physics: the reasons, with their numbers.
 
 /// Why a window has no centroid, or a model no meaning.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]

@@ -72,7 +72,8 @@ pub(crate) fn run(
     let with_noise = |noise: [Coloured; 3]| evidence(&data, situation, noise, motion);
     let start = fit_noise(&data, &before);
     let bins = &data.bins.folds;
-    let (found, noise) = attitude_search::search(&with_noise, &data, bins, candidates, start)?;
+    let (found, noise) =
+        attitude_search::search(&with_noise, &data, bins, &folds, candidates, start)?;
     let after = residuals(&with_noise(noise), &folds, &found, &found.selection.chosen)?;
     let mut rivals = Vec::new();
     for (set, gain) in attitude_search::rivals(&with_noise, &data, bins, &found, noise) {

@@ -12,6 +12,10 @@
 //! for the whole search; the gain that is reported and ranked is out of fold, each
 //! side predicted with amplitudes of the other folds under its own noise.
 //!
+//! A likelihood of coloured noise may rise where the error itself grows: a step
+//! makes the noise look whiter. What is added has to lower the error out of fold,
+//! in units of each axis's white noise, and on every axis whose sign was chosen.
+//!
 //! Source: Wilks 1938 (likelihood ratio); Cochrane & Orcutt 1949 (the alternation).
 
 use effects::Candidate;
@@ -23,7 +27,8 @@ use crate::attitude_data::{AttitudeData, AttitudeEvidence};
 use crate::coloured::Coloured;
 use crate::empirical::EMPIRICAL;
 use crate::error::CloseError;
-use crate::evidence::Amplitudes;
+use crate::evidence::{Amplitudes, Evidence};
+use crate::figures;
 use crate::folds::Folds;
 use crate::search::{Fitted, Found, amplitudes, borrowed, fit, fit_design, polish};
 use crate::selection::{Judgement, Selection, columns_of};
@@ -49,11 +54,12 @@ struct Scored {
     credible: bool,
 }
 
-/// The search, and the noise it ends with.
+/// The search, and the noise it ends with; `rows` are the folds of the unbinned rows.
 pub(crate) fn search<'d>(
     with_noise: &WithNoise<'d>,
     data: &AttitudeData,
     folds: &Folds,
+    rows: &Folds,
     mut candidates: Vec<Box<dyn Candidate>>,
     start: [Coloured; 3],
 ) -> Result<(Found, [Coloured; 3]), CloseError> {
@@ -87,22 +93,15 @@ pub(crate) fn search<'d>(
             chosen.retain(|&g| g != fallen);
             continue;
         }
-        let scalars = fitted.scalars.max(2.0);
-        let best = (0..candidates.len())
-            .filter(|&g| !chosen.contains(&g) && !banned[g] && candidates[g].id() != EMPIRICAL)
-            .filter(|&g| {
-                chosen
-                    .iter()
-                    .all(|&c| fitted.groups[c].family != fitted.groups[g].family)
-            })
-            .filter(|&g| judged[g].stands())
-            .map(|g| {
-                let paid = fitted.groups[g].columns.len() + fitted.groups[g].choices;
-                (g, judged[g].delta_loglik - 0.5 * paid as f64 * scalars.ln())
-            })
-            .max_by(|a, b| a.1.total_cmp(&b.1));
+        let mut ranked = trial.ranked(&chosen, &banned, &judged);
+        while let Some(&g) = ranked.first()
+            && !trial.lowers_the_error(rows, &chosen, g)
+        {
+            banned[g] = true;
+            ranked.remove(0);
+        }
         noise = base.noise;
-        let Some((added, _)) = best else {
+        let Some(&added) = ranked.first() else {
             let fitted = fit(&with_noise(noise), folds, &borrowed(&candidates))?;
             return Ok((
                 Found {
@@ -190,6 +189,51 @@ struct Trial<'a, 'd> {
 }
 
 impl Trial<'_, '_> {
+    /// Candidates that may be added, best first: by the gain out of fold after a
+    /// price for every parameter and choice.
+    fn ranked(&self, chosen: &[usize], banned: &[bool], judged: &[Judgement]) -> Vec<usize> {
+        let groups = &self.fitted.groups;
+        let price = 0.5 * self.fitted.scalars.max(2.0).ln();
+        let score = |g: usize| {
+            let paid = groups[g].columns.len() + groups[g].choices;
+            judged[g].delta_loglik - paid as f64 * price
+        };
+        let mut ranked: Vec<usize> = (0..self.candidates.len())
+            .filter(|g| !chosen.contains(g) && !banned[*g] && judged[*g].stands())
+            .filter(|&g| self.candidates[g].id() != EMPIRICAL)
+            .filter(|&g| chosen.iter().all(|&c| groups[c].family != groups[g].family))
+            .collect();
+        ranked.sort_by(|&a, &b| score(b).total_cmp(&score(a)));
+        ranked
+    }
+
+    /// Whether the residual out of fold is smaller with `g` than without.
+    fn lowers_the_error(&self, rows: &Folds, chosen: &[usize], g: usize) -> bool {
+        let mut with = chosen.to_vec();
+        with.push(g);
+        let (Some(without), Some(with)) = (
+            self.mean_squares(rows, chosen),
+            self.mean_squares(rows, &with),
+        ) else {
+            return false;
+        };
+        let rise: f64 = (0..3)
+            .map(|a| (with[a] - without[a]) / self.noise[a].white.powi(2).max(f64::MIN_POSITIVE))
+            .sum();
+        let claimed = self.fitted.groups[g].choices > 0;
+        rise < 0.0 && !(claimed && (0..3).any(|a| with[a] > without[a]))
+    }
+
+    /// Mean square of the residual per axis, out of fold, arcsec².
+    fn mean_squares(&self, rows: &Folds, chosen: &[usize]) -> Option<[f64; 3]> {
+        let columns = self.candidates.iter().map(|c| c.coefficients().len()).sum();
+        let amplitudes = amplitudes(self.fitted, self.folds, chosen, columns)?;
+        let evidence = (self.with_noise)(self.noise);
+        let residual = evidence.residuals(rows, &borrowed(self.candidates), &amplitudes);
+        let rms = |a: usize| figures::rms(&residual.axes[a], &self.data.outlier[a]);
+        Some([rms(0)?, rms(1)?, rms(2)?].map(|r| r * r))
+    }
+
     /// Standing of group `g` beside the others of `chosen`.
     fn judge(&self, chosen: &[usize], g: usize, base: &Scored) -> Judgement {
         let group = &self.fitted.groups[g];
