@@ -1,7 +1,10 @@
-//! The physics-based star tracker model: truth attitude in, centroids and attitude out.
+//! The star tracker models of \[M23\], physics-based and hybrid: truth attitude in, centroids and
+//! attitude out.
 //!
 //! - [`Pbm`]: distortion, centroid error, noise and QUEST over a batch of frames (\[M23\] Fig. 4), one
 //!   frame being a batch of one; [`Rows`] in, [`Measured`] out, all memory the caller's;
+//! - [`Hem`]: the hybrid model (\[M23\] Fig. 5), distortion by the stars and a Gauss-Markov process
+//!   with white noise per attitude axis;
 //! - [`Disturbance`], [`Stages`]: the places where an effect may act, in the order of the light;
 //! - [`StarField`], [`CatalogueTracking`]: which stars are tracked;
 //! - [`sigma`]: which sigma is meant; [`stream`]: which random numbers.
@@ -47,6 +50,7 @@
 
 mod disturbance;
 mod error;
+mod hem;
 mod noise;
 mod pbm;
 mod quadrature;
@@ -57,6 +61,7 @@ mod streams;
 
 pub use disturbance::{Disturbance, Stages, StarView};
 pub use error::TrackerError;
+pub use hem::{Hem, HemState, k0, k0_as_printed};
 pub use noise::TemporalNoise;
 pub use pbm::{Pbm, Scratch};
 pub use rows::{Measured, Rows};

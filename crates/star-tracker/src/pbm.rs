@@ -251,6 +251,33 @@ impl Pbm {
         self.solve(rows, scratch, out);
     }
 
+    /// Steps 1 to 3 and 5: attitudes of stars without noise, equally weighted. Spikes are added, as
+    /// they belong to a disturbance; the stream of noise is left as it is.
+    pub(crate) fn solve_without_noise(
+        &self,
+        truth: &dyn AttitudeSource,
+        rows: Rows<'_>,
+        streams: &mut NoiseStreams,
+        scratch: &mut Scratch,
+        out: &mut Measured,
+    ) {
+        out.resize(rows.frames(), rows.len());
+        let noise_free = PointsMut {
+            x: &mut out.noise_free_x_px,
+            y: &mut out.noise_free_y_px,
+        };
+        out.rows_left_out = self.positions_into(truth, rows, scratch, noise_free);
+        out.x_px.copy_from_slice(&out.noise_free_x_px);
+        out.y_px.copy_from_slice(&out.noise_free_y_px);
+        for (weight, x) in scratch.weight.iter_mut().zip(&out.x_px) {
+            *weight = if x.is_nan() { 0.0 } else { 1.0 };
+        }
+        if self.stages.spike {
+            self.add_spikes(rows, &mut streams.spikes, out);
+        }
+        self.solve(rows, scratch, out);
+    }
+
     /// Step 1 where no row needs its own instant: one attitude a frame.
     fn ideal_frame_by_frame(
         &self,

@@ -42,6 +42,8 @@ pub enum Purpose {
     Housekeeping = 9,
     /// Resampling and other estimation.
     Estimation = 10,
+    /// Attitude noise of the hybrid model.
+    HybridNoise = 11,
 }
 
 /// The stream of this seed, draw and purpose.
