@@ -33,7 +33,7 @@ pub(crate) enum Command {
     Close(Close),
     /// Make the bundle that a tracker would have sent
     #[command(
-        after_help = "Example:\n  boresight simulate fixtures/scenarios/example.toml --out bundle/"
+        after_help = "Examples:\n  boresight simulate fixtures/scenarios/example.toml --out bundle/\n  boresight simulate --preset iht --out bundle/\n  boresight simulate --print-preset pitt > my.toml"
     )]
     Simulate(Simulate),
 }
@@ -54,11 +54,17 @@ pub(crate) struct Close {
 #[derive(Debug, Args)]
 pub(crate) struct Simulate {
     /// Scenario file: a model with [motion], [sky] and [run]
-    #[arg(value_name = "SCENARIO.toml")]
-    pub(crate) scenario: PathBuf,
+    #[arg(value_name = "SCENARIO.toml", required_unless_present_any = ["preset", "print_preset"])]
+    pub(crate) scenario: Option<PathBuf>,
+    /// A scenario of the paper: iht, iht-distance, ict1, ict2, pitt, st2-iht, st2-iht-distance, st2-ict1, st2-ict2
+    #[arg(long, value_name = "NAME", conflicts_with = "scenario")]
+    pub(crate) preset: Option<String>,
+    /// Print the file of a preset, to be edited, and do nothing else
+    #[arg(long, value_name = "NAME", num_args = 0..=1, default_missing_value = "", conflicts_with = "scenario")]
+    pub(crate) print_preset: Option<String>,
     /// Folder of the bundle
-    #[arg(long, value_name = "BUNDLE")]
-    pub(crate) out: PathBuf,
+    #[arg(long, value_name = "BUNDLE", required_unless_present = "print_preset")]
+    pub(crate) out: Option<PathBuf>,
     /// How tables are written
     #[arg(long, value_enum, default_value_t = Tables::CsvGz)]
     pub(crate) tables: Tables,

@@ -48,6 +48,13 @@ impl Console {
         }
     }
 
+    /// A file that was asked for, as it is, whatever the flags.
+    #[expect(clippy::print_stdout, reason = "results go to stdout, here alone")]
+    pub(crate) fn text(&self, text: &str) {
+        self.bar.finish_and_clear();
+        print!("{text}");
+    }
+
     /// A result for machines; nothing without `--json`.
     #[expect(clippy::print_stdout, reason = "results go to stdout, here alone")]
     pub(crate) fn machine(&self, text: &str) {

@@ -207,3 +207,36 @@ fn a_simulated_bundle_closes() -> Done {
     assert_eq!(report["effects"][0]["id"], "rolling_shutter");
     Ok(())
 }
+
+/// A printed preset is a scenario that `simulate` reads; a wrong name is answered with the nearest.
+#[test]
+fn a_preset_is_printed_edited_and_simulated() -> Done {
+    let dir = tempfile::tempdir()?;
+    let printed = boresight()
+        .args(["simulate", "--print-preset", "pitt"])
+        .output()?;
+    let same = boresight()
+        .args(["simulate", "--preset", "pitt", "--print-preset"])
+        .output()?;
+    assert!(printed.status.success() && printed.stdout == same.stdout);
+    let text = String::from_utf8(printed.stdout)?;
+    let edited = text.replacen("duration_s = 10440.0", "duration_s = 5.0", 1);
+    assert_ne!(text, edited);
+    let (file, out) = (dir.path().join("mine.toml"), dir.path().join("bundle"));
+    fs::write(&file, edited)?;
+    let done = boresight()
+        .arg("simulate")
+        .arg(&file)
+        .arg("--out")
+        .arg(&out)
+        .output()?;
+    assert!(done.status.success());
+    assert!(String::from_utf8(done.stdout)?.starts_with("50 frames, 700 star rows"));
+    let wrong = boresight()
+        .args(["simulate", "--preset", "ith", "--out"])
+        .arg(&out)
+        .output()?;
+    assert_eq!(wrong.status.code(), Some(2));
+    assert!(String::from_utf8(wrong.stderr)?.contains("`iht`"));
+    Ok(())
+}

@@ -3,6 +3,7 @@
 use distortion::DistortionError;
 use effects::EffectError;
 use focal_plane::{AttitudeError, CameraError, CatalogueError, SeriesError};
+use fogm_fit::FogmError;
 use star_tracker::TrackerError;
 use telemetry::TelemetryError;
 
@@ -29,9 +30,22 @@ pub enum ScenarioError {
         /// The key.
         name: &'static str,
     },
-    /// The model does not describe centroids.
-    #[error("a scenario needs a model of kind \"pbm\"")]
-    NotPhysicsBased,
+    /// Star positions are asked of a model that does not describe centroids.
+    #[error("a model of kind \"hem\" makes no star positions: leave \"stars\" out of run.tables")]
+    NoCentroids,
+    /// A preset that does not exist.
+    #[error("no preset `{name}`; the nearest that exists is `{nearest}` (all: {all})")]
+    NoPreset {
+        /// Asked for.
+        name: String,
+        /// Nearest name.
+        nearest: &'static str,
+        /// All names.
+        all: String,
+    },
+    /// The hybrid model.
+    #[error(transparent)]
+    Fogm(#[from] FogmError),
     /// Several numbers where the effect takes one.
     #[error("effect `{effect}`: `{name}` is a list, expected one number or text")]
     EffectList {

@@ -7,6 +7,7 @@
 mod error;
 mod housekeeping;
 mod motion;
+mod preset;
 mod reference;
 mod run;
 mod scenario;
@@ -16,8 +17,9 @@ mod sky;
 pub use error::ScenarioError;
 pub use housekeeping::{Channel, Housekeeping, OrbitVelocity, SinusoidChannel, Thermostat};
 pub use motion::{
-    ClosedLoop, Hold, Motion, Pointing, Recorded, RecordedTable, Sinusoid, Slew, Slews,
+    ClosedLoop, Hold, Motion, PhasePlane, Pointing, Recorded, RecordedTable, Sinusoid, Slew, Slews,
 };
+pub use preset::{PRESETS, Preset, preset};
 pub use reference::{Gyro, Reference};
 pub use run::{Reported, Run};
 pub use scenario::Scenario;

@@ -15,6 +15,7 @@
 mod hold;
 mod integrate;
 mod jitter;
+pub(crate) mod phase_plane;
 mod recorded;
 mod slews;
 
@@ -29,6 +30,7 @@ use crate::ScenarioError;
 
 pub use hold::Hold;
 pub use jitter::{ClosedLoop, Sinusoid};
+pub use phase_plane::PhasePlane;
 pub use recorded::{Recorded, RecordedTable};
 pub use slews::{Slew, Slews};
 
@@ -44,6 +46,8 @@ pub enum Motion {
     Hold(Hold),
     /// `slews`: smooth slews with holds between them.
     Slews(Slews),
+    /// `phase_plane`: the limit cycle of a thruster controller.
+    PhasePlane(PhasePlane),
     /// `recorded`: the attitude of another bundle.
     Recorded(Recorded),
 }
@@ -65,6 +69,7 @@ impl Motion {
         match self {
             Self::Hold(hold) => hold.truth(span_s, rng),
             Self::Slews(slews) => slews.truth(span_s, rng),
+            Self::PhasePlane(cycle) => cycle.truth(span_s, rng),
             Self::Recorded(recorded) => recorded.truth(folder),
         }
     }

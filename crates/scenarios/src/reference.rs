@@ -1,24 +1,29 @@
 //! The better estimate, and the gyro: the truth with an error of its own.
 //!
 //! ```text
-//! q_ref = exp(e) q_true,   e = white + wander,   tracker axes
+//! q_ref = exp(C e) q_true,   e = white + wander,   axes of the reference
 //! wander[k+1] = a wander[k] + sqrt(1 - a^2) sigma n,   a = exp(-dt/tau)
 //! ```
+//!
+//! C turns the axes of the reference, which are the tracker's turned about `cant_axis` by `cant_deg`,
+//! into the tracker's: a second sensor has an uncertainty of its own shape. What the bundle holds is
+//! the tracker's attitude by that reference, in tracker axes.
 //!
 //! The wander is a stationary first-order Gauss-Markov process per axis, exact at any step. Rates that
 //! go with the reference are true: a filter's rate error is a thing of the gyro.
 //!
-//! Source: [M23] Eq. 15 (first-order Gauss-Markov process); the attitude errors of filters as white
-//! plus coloured are an assumption of the scenario that uses them.
+//! Source: [M23] Eq. 15 (first-order Gauss-Markov process); Section 4.3.1 for the second sensor; the
+//! attitude errors of filters as white plus coloured are an assumption of the scenario that uses them.
 
 use focal_plane::{Angle, AttitudeSeries, AttitudeSource, rotation_from_vector};
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 use rand_core::Rng;
 use rand_distr::{Distribution, StandardNormal};
 use serde::Deserialize;
 use telemetry::{RateTable, ReferenceTable};
 
 use crate::ScenarioError;
+use crate::motion::phase_plane::{cant, y_axis};
 
 /// `[reference]`: perfect unless errors are given.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -28,9 +33,14 @@ pub struct Reference {
     pub rate_hz: Option<f64>,
     /// Whether it comes with rates; default yes.
     pub rates: bool,
-    /// White error of each sample, 1 sigma per axis, arcsec; default 0.
+    /// Axis about which the reference is turned against the tracker; its length does not matter;
+    /// default y.
+    pub cant_axis: [f64; 3],
+    /// Angle of that turn, deg; default 0.
+    pub cant_deg: f64,
+    /// White error of each sample, 1 sigma about each axis of the reference, arcsec; default 0.
     pub white_arcsec: [f64; 3],
-    /// Standard deviation of the wander, arcsec; default 0.
+    /// Standard deviation of the wander about each axis of the reference, arcsec; default 0.
     pub wander_arcsec: [f64; 3],
     /// Correlation time of the wander, s; default 100.
     pub wander_tau_s: [f64; 3],
@@ -41,6 +51,8 @@ impl Default for Reference {
         Self {
             rate_hz: None,
             rates: true,
+            cant_axis: y_axis(),
+            cant_deg: 0.0,
             white_arcsec: [0.0; 3],
             wander_arcsec: [0.0; 3],
             wander_tau_s: [100.0; 3],
@@ -86,15 +98,18 @@ impl Reference {
             ScenarioError::check_not_negative("reference.wander_arcsec", own.sigma_arcsec[axis])?;
             ScenarioError::check_positive("reference.wander_tau_s", own.tau_s[axis])?;
         }
-        let wanders: Vec<Wander> = core::iter::once(own)
-            .chain(others.iter().copied())
-            .collect();
+        let names = ["reference.cant_axis", "reference.cant_deg"];
+        let to_tracker = cant(names, self.cant_axis, self.cant_deg)?;
         let mut error = vec![Vector3::<f64>::zeros(); t_s.len()];
-        for wander in &wanders {
-            wander.add(t_s, rng, &mut error);
+        own.add(t_s, rng, &mut error);
+        // effects act in tracker axes
+        let mut foreign = vec![Vector3::<f64>::zeros(); t_s.len()];
+        for wander in others {
+            wander.add(t_s, rng, &mut foreign);
         }
-        for error in &mut error {
+        for (error, foreign) in error.iter_mut().zip(&foreign) {
             *error += Vector3::from_fn(|axis, _| self.white_arcsec[axis] * normal(rng));
+            *error = to_tracker * *error + foreign;
         }
         let mut table = ReferenceTable::default();
         let mut rates = Vec::new();
@@ -108,7 +123,11 @@ impl Reference {
             rates.push(rate);
         }
         // only what it declares of itself: nobody tells a filter about the wander of an effect
-        let sigma = [0, 1, 2].map(|axis| self.white_arcsec[axis].hypot(self.wander_arcsec[axis]));
+        let own = Vector3::from_fn(|axis, _| {
+            self.white_arcsec[axis].powi(2) + self.wander_arcsec[axis].powi(2)
+        });
+        let covariance = to_tracker * Matrix3::from_diagonal(&own) * to_tracker.inverse();
+        let sigma = [0, 1, 2].map(|axis| covariance[(axis, axis)].sqrt());
         if sigma.iter().any(|sigma| *sigma > 0.0) {
             table.sigma_arcsec = Some(vec![sigma; table.t_s.len()]);
         }
@@ -222,9 +241,43 @@ mod tests {
                 "axis {axis}: {lag} against {a}"
             );
         }
-        assert_eq!(
-            Vector3::from(table.sigma_arcsec.unwrap()[7]),
-            Vector3::new(2.0, 0.5, 3.0)
-        );
+        let declared = Vector3::from(table.sigma_arcsec.unwrap()[7]);
+        // a square and its root: rounding
+        assert!((declared - Vector3::new(2.0, 0.5, 3.0)).norm() < 1e-12);
+    }
+
+    /// [M23] Section 4.3.1: (1.5, 1.5, 124) arcsec, 3 sigma, about the axes of a camera canted by 15 deg
+    /// are (32, 1.5, 120) about those of the tracker, to the digits printed; and the errors themselves
+    /// have these deviations: 5 sqrt(1 / 2n) of n white samples.
+    #[test]
+    fn a_canted_reference_has_its_uncertainty_in_its_own_axes() {
+        let n = 20_000_u32;
+        let t_s: Vec<f64> = (0..n).map(f64::from).collect();
+        let still = vec![UnitQuaternion::identity(); 2];
+        let truth = AttitudeSeries::new(vec![0.0, f64::from(n)], still, None).unwrap();
+        let draco = Reference {
+            cant_deg: 15.0,
+            white_arcsec: [0.5, 0.5, 124.0 / 3.0],
+            ..Reference::default()
+        };
+        let mut rng = stream(4, 0, Purpose::Reference);
+        let table = draco.table(&truth, &t_s, &[], &mut rng).unwrap();
+        let declared = table.sigma_arcsec.unwrap()[0];
+        for (axis, printed) in [32.0, 1.5, 120.0].into_iter().enumerate() {
+            let half_digit = if axis == 1 { 0.05 } else { 0.5 };
+            let three_sigma = 3.0 * declared[axis];
+            assert!((three_sigma - printed).abs() < half_digit, "{three_sigma}");
+            let square = |q: &UnitQuaternion<f64>| {
+                Angle::from_rad(rotation_vector(q, &UnitQuaternion::identity())[axis])
+                    .arcsec()
+                    .powi(2)
+            };
+            let sigma = (table.q.iter().map(square).sum::<f64>() / f64::from(n)).sqrt();
+            let tolerance = 5.0 * (0.5 / f64::from(n)).sqrt();
+            assert!(
+                (sigma / declared[axis] - 1.0).abs() < tolerance,
+                "axis {axis}: {sigma}"
+            );
+        }
     }
 }

@@ -3,7 +3,7 @@
 //! Not physics: settings.
 
 use serde::Deserialize;
-use telemetry::{Epoch, TimeScale};
+use telemetry::{Epoch, ModelKind, TimeScale};
 
 use crate::ScenarioError;
 
@@ -40,9 +40,10 @@ pub struct Run {
     /// Step of the reported positions, px: they are rounded to its multiples. Default 0, no rounding.
     #[serde(default)]
     pub position_step_px: f64,
-    /// Tables of what the tracker reports; default `["stars", "attitude", "catalog"]`.
-    #[serde(default = "all")]
-    pub tables: Vec<Reported>,
+    /// Tables of what the tracker reports; default `["stars", "attitude", "catalog"]`, and
+    /// `["attitude"]` of a model of kind `"hem"`, which has no centroids.
+    #[serde(default)]
+    pub tables: Option<Vec<Reported>>,
 }
 
 /// Tables of what the tracker reports.
@@ -65,10 +66,6 @@ fn five() -> f64 {
     5.0
 }
 
-fn all() -> Vec<Reported> {
-    vec![Reported::Stars, Reported::Attitude, Reported::Catalog]
-}
-
 fn epoch<'de, D: serde::Deserializer<'de>>(from: D) -> Result<Option<Epoch>, D::Error> {
     let text = String::deserialize(from)?;
     let wrong = || {
@@ -88,12 +85,16 @@ fn time_scale<'de, D: serde::Deserializer<'de>>(from: D) -> Result<Option<TimeSc
 }
 
 impl Run {
-    /// Whether a table is asked for.
-    pub fn reports(&self, table: Reported) -> bool {
-        self.tables.contains(&table)
+    /// Whether a table is asked for, of a model of this kind.
+    pub fn reports(&self, table: Reported, kind: ModelKind) -> bool {
+        match (&self.tables, kind) {
+            (Some(tables), _) => tables.contains(&table),
+            (None, ModelKind::Pbm) => true,
+            (None, ModelKind::Hem) => table == Reported::Attitude,
+        }
     }
 
-    pub(crate) fn check(&self) -> Result<(), ScenarioError> {
+    pub(crate) fn check(&self, kind: ModelKind) -> Result<(), ScenarioError> {
         if let Some(duration_s) = self.duration_s {
             ScenarioError::check_positive("run.duration_s", duration_s)?;
         }
@@ -102,7 +103,11 @@ impl Run {
         }
         ScenarioError::check_not_negative("run.margin_s", self.margin_s)?;
         ScenarioError::check_not_negative("run.position_step_px", self.position_step_px)?;
-        if !self.reports(Reported::Stars) && !self.reports(Reported::Attitude) {
+        let stars = self.reports(Reported::Stars, kind);
+        if stars && kind == ModelKind::Hem {
+            return Err(ScenarioError::NoCentroids);
+        }
+        if !stars && !self.reports(Reported::Attitude, kind) {
             return Err(ScenarioError::Missing {
                 name: "\"stars\" or \"attitude\" in run.tables",
             });

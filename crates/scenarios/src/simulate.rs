@@ -2,13 +2,14 @@
 //!
 //! ```text
 //! motion -> truth -> sky -> rows -> physics-based model with the effects -> stars, attitude
+//!             |                 \-> or hybrid model with the effects -> attitude
 //!             \-> reference, rates        housekeeping -> effects
 //! ```
 //!
 //! Every random number comes from the stream of its purpose (seed, draw, purpose), and everything runs
 //! in one order on one thread: the same scenario gives the same bundle anywhere.
 //!
-//! Source: [M23] Section 2.6 and Fig. 4.
+//! Source: [M23] Section 2.6 and Figs. 4 and 5.
 
 use std::sync::Arc;
 
@@ -16,13 +17,15 @@ use centroid::{CentroidError, Triangle};
 use distortion::{DistortionField, LsfSigma};
 use effects::{Effect, FrameGeometry, ParameterValue, Parameters, Surroundings, VectorFrame};
 use focal_plane::{Angle, AttitudeSeries, AttitudeSource, Camera, StarFrames, Vectors};
+use fogm_fit::{Fogm, FogmWhite};
 use nalgebra::Vector3;
 use rand_distr::{Distribution, StandardNormal};
 use star_tracker::{
-    Disturbance, Measured, NoiseStreams, Pbm, Purpose, Rows, Scratch, Stages, TemporalNoise, stream,
+    Disturbance, Hem, HemState, Measured, NoiseStreams, Pbm, Purpose, Rows, Scratch, Stages,
+    TemporalNoise, stream,
 };
 use telemetry::{
-    AttitudeTable, Bundle, EffectEntry, EffectValue, Frames, Metadata, Model, ModelKind,
+    AttitudeTable, Bundle, EffectEntry, EffectValue, Frames, HemAxis, Metadata, Model, ModelKind,
     QuaternionSigns, TrackerMeta,
 };
 
@@ -42,11 +45,14 @@ pub struct Simulated {
     pub bundle: Bundle,
     /// True attitude.
     pub truth: AttitudeSeries,
-    /// The tracker with everything that acts in it.
+    /// The tracker with everything that acts in it; of a hybrid model the part that follows the stars.
     pub pbm: Pbm,
+    /// The hybrid model, where the scenario's is of that kind.
+    pub hem: Option<Hem>,
     /// The effects of the scenario, in its order; they are among the disturbances of `pbm` too.
     pub effects: Vec<Arc<dyn Effect>>,
-    /// Stars asked for and what came out, row by row of the frames of the run, rows left out included.
+    /// Stars asked for and what came out, row by row of the frames of the run, rows left out included;
+    /// a hybrid model has no positions, and without distortion no stars.
     pub measured: Measured,
     /// True inertial directions of these rows: x, y, z.
     pub direction: [Vec<f64>; 3],
@@ -68,11 +74,8 @@ pub fn simulate(scenario: &Scenario) -> Result<Bundle, ScenarioError> {
 /// # Errors
 /// As [`simulate`].
 pub fn simulate_with_truth(scenario: &Scenario, draw: u64) -> Result<Simulated, ScenarioError> {
-    scenario.run.check()?;
     let model = &scenario.model;
-    if model.kind != ModelKind::Pbm {
-        return Err(ScenarioError::NotPhysicsBased);
-    }
+    scenario.run.check(model.kind)?;
     let seed = scenario.run.seed;
     let camera = camera(model)?;
     let rate_hz = scenario
@@ -87,14 +90,6 @@ pub fn simulate_with_truth(scenario: &Scenario, draw: u64) -> Result<Simulated, 
         .run
         .epoch
         .map_or(crate::sky::CATALOGUE_YEAR, |epoch| epoch.julian_year(0.0));
-    let seen = scenario.sky.follow(
-        &camera,
-        &truth,
-        &t_s,
-        model.tracker.max_stars,
-        year,
-        &mut stream(seed, draw, Purpose::StarField),
-    )?;
     let channels = match &scenario.housekeeping {
         Some(housekeeping) => housekeeping.channels(
             truth.span_s(),
@@ -114,24 +109,30 @@ pub fn simulate_with_truth(scenario: &Scenario, draw: u64) -> Result<Simulated, 
         let disturbance: Arc<dyn Disturbance> = effect.clone();
         pbm = pbm.with_disturbance(disturbance);
     }
-    let measured = measure(&pbm, &truth, &seen, NoiseStreams::new(seed, draw));
+    let hem = hybrid(model, &pbm)?;
+    let seen = if hem.as_ref().is_none_or(Hem::needs_stars) {
+        scenario.sky.follow(
+            &camera,
+            &truth,
+            &t_s,
+            model.tracker.max_stars,
+            year,
+            &mut stream(seed, draw, Purpose::StarField),
+        )?
+    } else {
+        Seen::without_stars(&t_s)?
+    };
+    let measured = measure(&pbm, hem.as_ref(), &truth, &seen, seed, draw);
+    let reports = |table| scenario.run.reports(table, model.kind);
     let bundle = Bundle {
         meta: metadata(scenario, rate_hz, draw, channels.vectors),
         camera: Some(camera),
-        attitude: scenario
-            .run
-            .reports(Reported::Attitude)
-            .then(|| attitude_table(&t_s, &measured)),
-        stars: scenario
-            .run
-            .reports(Reported::Stars)
+        attitude: reports(Reported::Attitude).then(|| attitude_table(&t_s, &measured)),
+        stars: reports(Reported::Stars)
             .then(|| star_frames(&seen.frames, &measured, scenario.run.position_step_px)),
         reference: reference(scenario, &truth, &t_s, rate_hz, &effects, draw)?,
         rates: rates(scenario, &truth, &t_s, rate_hz, draw)?,
-        catalog: scenario
-            .run
-            .reports(Reported::Catalog)
-            .then_some(seen.catalogue),
+        catalog: reports(Reported::Catalog).then_some(seen.catalogue),
         housekeeping: channels.table,
         ..Bundle::default()
     };
@@ -139,6 +140,7 @@ pub fn simulate_with_truth(scenario: &Scenario, draw: u64) -> Result<Simulated, 
         bundle,
         truth,
         pbm,
+        hem,
         effects,
         measured,
         direction: seen.direction,
@@ -216,10 +218,12 @@ fn truth_and_times(
 fn tracker(model: &Model, camera: &Camera, seed: u64, draw: u64) -> Result<Pbm, ScenarioError> {
     let noise = &model.noise;
     let mut pbm = Pbm::new(camera.clone());
-    if let Some(sigma_arcsec) = noise.temporal_arcsec {
+    // the processes of a hybrid model stand for both
+    let physical = model.kind == ModelKind::Pbm;
+    if let Some(sigma_arcsec) = noise.temporal_arcsec.filter(|_| physical) {
         pbm = pbm.with_noise(TemporalNoise::circular_arcsec(sigma_arcsec)?);
     }
-    if let Some(peak_arcsec) = noise.centroid_arcsec {
+    if let Some(peak_arcsec) = noise.centroid_arcsec.filter(|_| physical) {
         pbm = pbm.with_centroid_error(CentroidError::Triangle(Triangle::from_peak(peak_arcsec)));
     }
     if let Some(sigma_arcsec) = noise.distortion_arcsec {
@@ -238,6 +242,30 @@ fn tracker(model: &Model, camera: &Camera, seed: u64, draw: u64) -> Result<Pbm, 
         pbm = pbm.with_disturbance(bias);
     }
     Ok(pbm)
+}
+
+/// The hybrid model over the optics of `pbm`, if the model is of that kind.
+fn hybrid(model: &Model, pbm: &Pbm) -> Result<Option<Hem>, ScenarioError> {
+    let (ModelKind::Hem, Some(axes)) = (model.kind, &model.hem) else {
+        return Ok(None);
+    };
+    let process = |axis: &HemAxis| -> Result<FogmWhite, ScenarioError> {
+        let fogm = Fogm::new(axis.sigma_hsf_arcsec, axis.tau_hsf_s)?;
+        Ok(FogmWhite::new(fogm, axis.sigma_tn_arcsec)?)
+    };
+    let axes = [process(&axes.x)?, process(&axes.y)?, process(&axes.z)?];
+    let mut hem = Hem::new(pbm.camera().clone(), axes);
+    if model
+        .noise
+        .distortion_arcsec
+        .is_some_and(|sigma| sigma > 0.0)
+    {
+        hem = hem.with_distortion(pbm.distortion().clone());
+    }
+    for disturbance in pbm.disturbances() {
+        hem = hem.with_disturbance(disturbance.clone());
+    }
+    Ok(Some(hem))
 }
 
 /// The unknown constant misalignment of one draw: part of the declared model, so no effect.
@@ -289,7 +317,14 @@ fn parameters(entry: &EffectEntry) -> Result<Parameters, ScenarioError> {
     entry.parameters.iter().map(value).collect()
 }
 
-fn measure(pbm: &Pbm, truth: &AttitudeSeries, seen: &Seen, mut streams: NoiseStreams) -> Measured {
+fn measure(
+    pbm: &Pbm,
+    hem: Option<&Hem>,
+    truth: &AttitudeSeries,
+    seen: &Seen,
+    seed: u64,
+    draw: u64,
+) -> Measured {
     let [x, y, z] = &seen.direction;
     let rows = Rows {
         t_s: &seen.frames.t_s,
@@ -300,8 +335,22 @@ fn measure(pbm: &Pbm, truth: &AttitudeSeries, seen: &Seen, mut streams: NoiseStr
         bv: &seen.bv,
         direction: Vectors { x, y, z },
     };
-    let mut out = Measured::default();
-    pbm.measure_into(truth, rows, &mut streams, &mut Scratch::default(), &mut out);
+    let (mut out, mut scratch) = (Measured::default(), Scratch::default());
+    let mut streams = NoiseStreams::new(seed, draw);
+    match hem {
+        Some(hem) => {
+            let mut state = HemState::new(seed, draw);
+            hem.measure_into(
+                truth,
+                rows,
+                &mut state,
+                &mut streams,
+                &mut scratch,
+                &mut out,
+            );
+        }
+        None => pbm.measure_into(truth, rows, &mut streams, &mut scratch, &mut out),
+    }
     out
 }
 

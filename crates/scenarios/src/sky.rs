@@ -87,6 +87,23 @@ pub(crate) struct Seen {
     pub(crate) catalogue: Catalogue,
 }
 
+impl Seen {
+    /// Frames that nobody looks into.
+    pub(crate) fn without_stars(t_s: &[f64]) -> Result<Self, ScenarioError> {
+        let mut frames = StarFrames::default();
+        for &t in t_s {
+            frames.begin(t);
+        }
+        Ok(Self {
+            frames,
+            direction: [const { Vec::new() }; 3],
+            mag: Vec::new(),
+            bv: Vec::new(),
+            catalogue: Catalogue::new(CATALOGUE_YEAR, Vec::new())?,
+        })
+    }
+}
+
 impl Sky {
     /// Follows the truth through all frames.
     ///

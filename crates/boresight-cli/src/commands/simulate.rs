@@ -1,14 +1,29 @@
 //! `boresight simulate`: a bundle from a scenario.
 
-use boresight::scenarios::{Scenario, simulate};
+use anyhow::Context as _;
+use boresight::scenarios::{Scenario, preset, simulate};
 use boresight::telemetry::TableFormat;
 
 use crate::arguments::{Simulate, Tables};
 use crate::console::Console;
 
 pub(crate) fn run(options: &Simulate, console: &Console) -> anyhow::Result<()> {
+    if let Some(name) = options.print_preset.as_deref() {
+        let name = if name.is_empty() {
+            options.preset.as_deref()
+        } else {
+            Some(name)
+        };
+        console.text(preset(name.context("--print-preset needs a name")?)?.text);
+        return Ok(());
+    }
+    let out = options.out.as_ref().context("--out needs a folder")?;
     console.progress("reading the scenario");
-    let scenario = Scenario::read(&options.scenario)?;
+    let scenario = match (&options.preset, &options.scenario) {
+        (Some(name), _) => preset(name)?.scenario()?,
+        (None, Some(path)) => Scenario::read(path)?,
+        (None, None) => anyhow::bail!("a scenario file or --preset is needed"),
+    };
     console.progress("simulating");
     let bundle = simulate(&scenario)?;
     console.progress("writing the bundle");
@@ -17,10 +32,11 @@ pub(crate) fn run(options: &Simulate, console: &Console) -> anyhow::Result<()> {
         Tables::CsvGz => TableFormat::CsvGz,
         Tables::Parquet => TableFormat::Parquet,
     };
-    bundle.write(&options.out, format)?;
-    let frames = bundle.stars.as_ref().map_or(0, |s| s.frames());
+    bundle.write(out, format)?;
+    let solved = bundle.attitude.as_ref().map_or(0, |a| a.t_s.len());
+    let frames = bundle.stars.as_ref().map_or(solved, |s| s.frames());
     let rows = bundle.stars.as_ref().map_or(0, |s| s.rows());
-    let out = options.out.display();
+    let out = out.display();
     console.say(&format!(
         "{frames} frames, {rows} star rows written to {out}"
     ));
