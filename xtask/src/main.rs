@@ -51,6 +51,16 @@ const TASKS: &[Task] = &[
         what: "make the project's own fixtures again",
         run: fixtures,
     },
+    Task {
+        name: "paper",
+        what: "compute the papers' claims, write docs/paper-regression.md",
+        run: paper,
+    },
+    Task {
+        name: "paper --check",
+        what: "the same, and fail if the page is not current",
+        run: paper_check,
+    },
 ];
 
 const FORMAT: Step = Step {
@@ -97,6 +107,34 @@ const FIXTURES: &[Step] = &[Step {
     env: &[],
 }];
 
+const PAPER: Step = Step {
+    name: "paper",
+    args: &[
+        "run",
+        "--release",
+        "--quiet",
+        "--package",
+        "paper-regression",
+        "--",
+        "docs/paper-regression.md",
+    ],
+    env: &[],
+};
+const PAPER_CHECK: Step = Step {
+    name: "paper --check",
+    args: &[
+        "run",
+        "--release",
+        "--quiet",
+        "--package",
+        "paper-regression",
+        "--",
+        "--check",
+        "docs/paper-regression.md",
+    ],
+    env: &[],
+};
+
 fn ci(root: &Path) -> Result<(), String> {
     // Tests last: the output then ends with cargo's own account of them. A
     // failing check does not keep them from running.
@@ -133,6 +171,14 @@ fn fixtures(root: &Path) -> Result<(), String> {
     run_all(root, FIXTURES)
 }
 
+fn paper(root: &Path) -> Result<(), String> {
+    run_all(root, &[PAPER])
+}
+
+fn paper_check(root: &Path) -> Result<(), String> {
+    run_all(root, &[PAPER_CHECK])
+}
+
 /// The workspace: the folder above this crate.
 fn root() -> PathBuf {
     let here = env::var_os("CARGO_MANIFEST_DIR")
@@ -140,18 +186,16 @@ fn root() -> PathBuf {
     here.parent().map_or(here.clone(), Path::to_path_buf)
 }
 
-/// The task that the arguments ask for; anything but one known word is none.
+/// The task that the arguments ask for; anything but the words of one task is none.
 fn task(args: &[String]) -> Option<&'static Task> {
-    match args {
-        [name] => TASKS.iter().find(|task| task.name == name),
-        _ => None,
-    }
+    let words = args.join(" ");
+    TASKS.iter().find(|task| task.name == words)
 }
 
 fn usage() -> String {
     let mut text = String::from("usage: cargo xtask TASK\n\n");
     for task in TASKS {
-        text.push_str(&format!("  {:<10}{}\n", task.name, task.what));
+        text.push_str(&format!("  {:<15}{}\n", task.name, task.what));
     }
     text
 }
@@ -183,9 +227,11 @@ mod tests {
     }
 
     #[test]
-    fn only_one_known_word_is_a_task() {
-        assert_eq!(task(&words("tidy")).map(|t| t.name), Some("tidy"));
-        for wrong in ["", "tidi", "tidy now", "--help"] {
+    fn only_the_words_of_a_task_are_one() {
+        for name in ["tidy", "paper", "paper --check"] {
+            assert_eq!(task(&words(name)).map(|t| t.name), Some(name));
+        }
+        for wrong in ["", "tidi", "tidy now", "tidy --check", "--check", "--help"] {
             assert!(task(&words(wrong)).is_none(), "`{wrong}`");
         }
     }

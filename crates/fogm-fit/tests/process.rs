@@ -114,6 +114,24 @@ fn level(y: &[f64], fs_hz: f64, bins: std::ops::Range<usize>, density: impl Fn(f
     sum / count
 }
 
+/// Erratum E16: Eq. 15 prints `exp(-tau/tau_HSF)`, which grows without bound for negative lags. An
+/// autocovariance is even and nowhere above its value at zero.
+#[test]
+fn autocovariance_is_even_in_the_lag() -> Result<(), FogmError> {
+    let process = FogmWhite::new(Fogm::new(3.58, 161.0)?, 7.43)?;
+    for lag_s in [0.1, 50.0, 161.0, 2000.0] {
+        let (later, earlier) = (
+            process.autocovariance(lag_s),
+            process.autocovariance(-lag_s),
+        );
+        assert!((later - earlier).abs() < 1e-14, "{later} {earlier}");
+        let expected = 3.58 * 3.58 * f64::exp(-lag_s / 161.0);
+        assert!((earlier - expected).abs() < 1e-13, "{earlier} {expected}");
+        assert!(earlier < process.autocovariance(0.0));
+    }
+    Ok(())
+}
+
 /// E6: a simulated FOGM has the one-sided level, twice the printed one. 40 bins near and below the
 /// corner in each of 10 series: relative standard error 1/sqrt(400) = 0.05.
 #[test]
