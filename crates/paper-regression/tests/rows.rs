@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
+use std::process::Command;
 
 use paper_regression::{Group, Inputs, m23, page};
 
@@ -115,4 +116,20 @@ fn threads_change_nothing() {
         pool.install(|| m23::readings(&inputs).unwrap())
     };
     assert_eq!(with(1), with(3));
+}
+
+/// The command says how it is used rather than compute for minutes.
+#[test]
+fn wrong_words_are_answered_at_once() {
+    for words in [
+        &[][..],
+        &["--check"],
+        &["--chek", "page.md"],
+        &["a.md", "b.md"],
+    ] {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_paper-regression"));
+        let done = command.args(words).output().unwrap();
+        assert_eq!(done.status.code(), Some(2), "{words:?}");
+        assert!(String::from_utf8_lossy(&done.stderr).starts_with("usage: "));
+    }
 }

@@ -41,7 +41,7 @@ pub const PRESETS: &[Preset] = presets![
     "st2-ict2": "PSP IMU Calibration Test of 5 December 2020, tracker 2",
 ];
 
-/// The preset of that name.
+/// The preset of that name; `st2` alone is the second tracker in the inertial hold.
 ///
 /// # Errors
 /// [`ScenarioError::NoPreset`], with the nearest name.
@@ -50,9 +50,11 @@ pub const PRESETS: &[Preset] = presets![
 /// let iht = scenarios::preset("iht")?;
 /// assert!(iht.text.contains("drift_arcsec_s"));
 /// assert!(scenarios::preset("ith").unwrap_err().to_string().contains("`iht`"));
+/// assert_eq!(scenarios::preset("st2")?.name, "st2-iht");
 /// # Ok::<(), scenarios::ScenarioError>(())
 /// ```
 pub fn preset(name: &str) -> Result<&'static Preset, ScenarioError> {
+    let name = if name == "st2" { "st2-iht" } else { name };
     let found = PRESETS.iter().find(|preset| preset.name == name);
     found.ok_or_else(|| {
         let names = PRESETS.iter().map(|preset| preset.name);

@@ -262,6 +262,18 @@ mod tests {
         };
         let mut rng = stream(4, 0, Purpose::Reference);
         let table = draco.table(&truth, &t_s, &[], &mut rng).unwrap();
+        // the camera's boresight is (sin 15, 0, cos 15) in tracker axes, and its large error is about it:
+        // about x and z the errors go together, by sin 15 cos 15 of (41.3^2 - 0.5^2) arcsec^2. A product of
+        // two errors that are nearly the same one scatters by sqrt 2 of its mean
+        let product = |q: &UnitQuaternion<f64>| {
+            let e = rotation_vector(q, &UnitQuaternion::identity());
+            Angle::from_rad(e.x).arcsec() * Angle::from_rad(e.z).arcsec()
+        };
+        let together = table.q.iter().map(product).sum::<f64>() / f64::from(n);
+        let (sin, cos) = 15_f64.to_radians().sin_cos();
+        let expected = sin * cos * ((124.0_f64 / 3.0).powi(2) - 0.25);
+        let tolerance = 5.0 * (2.0 / f64::from(n)).sqrt();
+        assert!((together / expected - 1.0).abs() < tolerance, "{together}");
         let declared = table.sigma_arcsec.unwrap()[0];
         for (axis, printed) in [32.0, 1.5, 120.0].into_iter().enumerate() {
             let half_digit = if axis == 1 { 0.05 } else { 0.5 };

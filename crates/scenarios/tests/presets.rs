@@ -97,9 +97,25 @@ fn every_number_is_printed_or_assumed() {
 
 /// E10: by the printed periods a star crosses a pixel in x in 765 s and one in y in 486.5 s; by the
 /// distances it moves 8.78 px in 4 h. The loop's mode (2 arcsec, 0.03 px) and the scale (70.3 to 71.0
-/// arcsec a pixel, 1 %) leave 2 % and 0.1 px.
+/// arcsec a pixel, 1 %) leave 2 % and 0.1 px. The drifts themselves hold the printed numbers at 70.3125
+/// arcsec a pixel, to their last digit.
 #[test]
 fn both_readings_of_the_hold_are_there() {
+    for (name, about_x, about_y) in [
+        ("iht", 1.0 / 486.5, 1.0 / 765.0),
+        ("st2-iht", 1.0 / 486.5, 1.0 / 765.0),
+        ("iht-distance", 7.4 / 14_400.0, 4.7 / 14_400.0),
+        ("st2-iht-distance", 7.4 / 14_400.0, 4.7 / 14_400.0),
+    ] {
+        let Motion::Hold(hold) = shortened(name, 1.0).motion else {
+            panic!("{name} holds");
+        };
+        let [x, y, z] = hold.drift_arcsec_s;
+        // a turn about +x moves stars to +y, one about +y to -x
+        assert!((x - 70.3125 * about_x).abs() < 1e-5, "{name}: {x}");
+        assert!((y + 70.3125 * about_y).abs() < 1e-5, "{name}: {y}");
+        assert!(z.abs() < 1e-12);
+    }
     let periods = simulate_with_truth(&shortened("iht", 7200.0), 0).unwrap();
     let Pixel { x, y } = moved(&periods, 0.0, 7200.0);
     assert!((x * 765.0 / 7200.0 - 1.0).abs() < 0.03, "{x}");
@@ -207,6 +223,12 @@ fn a_hybrid_scenario_makes_an_attitude() {
         bent.hem
             .as_ref()
             .is_some_and(star_tracker::Hem::needs_stars)
+    );
+    // centroid error and noise of the stars are in the processes
+    assert!(bent.pbm.noise().base_arcsec().abs() < 1e-12);
+    assert_eq!(
+        bent.pbm.centroid_error(),
+        &centroid::CentroidError::default()
     );
     scenario.model.noise.distortion_arcsec = None;
     scenario.model.noise.bias_arcsec = None;

@@ -104,6 +104,7 @@ mod tests {
         assert!(misfit.over() && !misfit.under());
         let less = Misfit::of(&[flat(1.0), flat(1.0)], &model, 1, [0.5, 1.5]);
         assert!((less.db + misfit.db).abs() < 1e-12 && less.under() && !less.over());
+        assert!((less.error_db - misfit.error_db).abs() < 1e-12);
         let vague = Misfit {
             error_db: 1.1,
             ..misfit
