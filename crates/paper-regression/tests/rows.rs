@@ -75,7 +75,10 @@ fn rows_follow_their_inputs() {
 /// The distortion enters where the paper says, and the centroid error.
 #[test]
 fn other_sigmas_change_their_rows() {
-    let inputs = little();
+    let inputs = Inputs {
+        duration: 0.04,
+        ..little()
+    };
     let bent = Inputs {
         sigma_lsf_arcsec: 2.0 * inputs.sigma_lsf_arcsec,
         ..inputs
@@ -107,7 +110,10 @@ fn other_sigmas_change_their_rows() {
 /// The same numbers for any number of threads.
 #[test]
 fn threads_change_nothing() {
-    let inputs = little();
+    let inputs = Inputs {
+        duration: 0.04,
+        ..little()
+    };
     let with = |threads| {
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(threads)
