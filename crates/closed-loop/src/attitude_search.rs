@@ -31,7 +31,7 @@ use crate::evidence::{Amplitudes, Evidence};
 use crate::figures;
 use crate::folds::Folds;
 use crate::search::{Fitted, Found, amplitudes, borrowed, fit, fit_design, polish};
-use crate::selection::{Judgement, Selection, columns_of};
+use crate::selection::{Judgement, Selection, columns_of, price};
 
 /// Rounds of generalised least squares and noise fit.
 const ALTERNATIONS: usize = 3;
@@ -193,11 +193,7 @@ impl Trial<'_, '_> {
     /// price for every parameter and choice.
     fn ranked(&self, chosen: &[usize], banned: &[bool], judged: &[Judgement]) -> Vec<usize> {
         let groups = &self.fitted.groups;
-        let price = 0.5 * self.fitted.scalars.max(2.0).ln();
-        let score = |g: usize| {
-            let paid = groups[g].columns.len() + groups[g].choices;
-            judged[g].delta_loglik - paid as f64 * price
-        };
+        let score = |g: usize| judged[g].delta_loglik - price(&groups[g], self.fitted.scalars);
         let mut ranked: Vec<usize> = (0..self.candidates.len())
             .filter(|g| !chosen.contains(g) && !banned[*g] && judged[*g].stands())
             .filter(|&g| self.candidates[g].id() != EMPIRICAL)

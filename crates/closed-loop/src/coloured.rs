@@ -152,6 +152,34 @@ impl Coloured {
             .map_or(*self, |(_, noise)| noise)
     }
 
+    /// Standard errors of the slow part relative to it, of sigma and of tau, from
+    /// the curvature of the log-likelihood; `None` where it has no summit.
+    pub(crate) fn relative_sigma(&self, t_s: &[f64], y: &[f64], count: &[f64]) -> Option<[f64; 2]> {
+        const STEP: f64 = 0.05;
+        let height = |d: [f64; 3]| {
+            Self {
+                white: self.white * d[0].exp(),
+                slow: self.slow * d[1].exp(),
+                tau_s: self.tau_s * d[2].exp(),
+            }
+            .log_likelihood(t_s, y, count)
+        };
+        let shifted = |i: usize, a: f64, j: usize, b: f64| {
+            let mut d = [0.0; 3];
+            d[i] += a;
+            d[j] += b;
+            height(d)
+        };
+        let information = nalgebra::Matrix3::from_fn(|i, j| {
+            (shifted(i, STEP, j, -STEP) + shifted(i, -STEP, j, STEP)
+                - shifted(i, STEP, j, STEP)
+                - shifted(i, -STEP, j, -STEP))
+                / (4.0 * STEP * STEP)
+        });
+        let covariance = information.cholesky()?.inverse();
+        Some([covariance[(1, 1)].sqrt(), covariance[(2, 2)].sqrt()])
+    }
+
     /// Whitens a series in place: independent, unit variance; masked rows are 0.
     pub(crate) fn whiten(&self, t_s: &[f64], count: &[f64], columns: &mut [&mut [f64]]) {
         let gains = self.gains(t_s, count);

@@ -38,6 +38,11 @@ pub(crate) trait Evidence: Sync {
     fn residual_columns(&self) -> usize;
     /// First guess of the noise variance of a scalar of the design.
     fn variance_guess(&self) -> f64;
+    /// What the log-likelihood of the design's scalars lacks to that of the
+    /// measurements in arcsec, nats.
+    fn log_scale(&self) -> f64 {
+        0.0
+    }
     /// The columns with `candidates` in them.
     fn design<'a>(&'a self, candidates: &'a [&'a dyn Candidate]) -> Box<dyn Design + 'a>;
     /// Out-of-fold residuals of every row, outliers included.

@@ -65,6 +65,10 @@ struct Eliminated {
     nuisance: DMatrix<f64>,
     /// Training Gram of the candidates and the residual (last), nuisance removed.
     train: DMatrix<f64>,
+    /// ln det of the nuisance's normal matrix.
+    log_det: f64,
+    /// Training scalars.
+    scalars: f64,
     /// Training scalars less the nuisance freedom.
     freedom: f64,
     /// Gram of each judged block in the transformed columns, and its scalars.
@@ -93,10 +97,11 @@ impl Eliminated {
             normal[(k, k)] += precision * variance + floor;
         }
         let cross = DMatrix::from_fn(n, pick.len(), |i, j| gram[(i, pick[j])]);
-        let nuisance = if n == 0 {
-            cross.clone()
+        let (nuisance, log_det) = if n == 0 {
+            (cross.clone(), 0.0)
         } else {
-            Cholesky::new(normal)?.solve(&cross)
+            let factor = Cholesky::new(normal)?;
+            (factor.solve(&cross), factor.ln_determinant())
         };
         let reduced = DMatrix::from_fn(pick.len(), pick.len(), |i, j| gram[(pick[i], pick[j])])
             - cross.transpose() * &nuisance;
@@ -115,6 +120,8 @@ impl Eliminated {
         Some(Self {
             nuisance,
             train: reduced,
+            log_det,
+            scalars,
             freedom,
             blocks,
         })
@@ -298,6 +305,15 @@ impl Fits {
         })
     }
 
+    /// Log-likelihood of all data at the best amplitudes of `set`, the nuisance
+    /// integrated out under its prior; scalars have unit variance. Up to a constant
+    /// of the prior, nats.
+    pub(crate) fn log_marginal(&self, set: &[usize]) -> Option<f64> {
+        let sse = self.error(set)?;
+        let constant = self.all.scalars * std::f64::consts::TAU.ln();
+        Some(-0.5 * (sse + self.all.log_det + constant))
+    }
+
     /// Amplitudes of `set` in fold `fold`'s training data.
     pub(crate) fn amplitudes_without(&self, fold: usize, set: &[usize]) -> Option<DVector<f64>> {
         self.folds[fold].amplitudes(set).map(|(beta, _)| beta)
@@ -378,13 +394,17 @@ impl Fits {
 
     /// Noise variance of a scalar on all data with `set` in the model.
     pub(crate) fn variance(&self, set: &[usize]) -> Option<f64> {
+        Some(self.error(set)? / (self.all.freedom - set.len() as f64).max(1.0))
+    }
+
+    /// Squared error of all data at the best amplitudes of `set`.
+    fn error(&self, set: &[usize]) -> Option<f64> {
         let (beta, _) = self.all.amplitudes(set)?;
         let last = self.all.train.ncols() - 1;
-        let sse = self.all.train[(last, last)]
-            - (0..set.len())
-                .map(|i| beta[i] * self.all.train[(set[i], last)])
-                .sum::<f64>();
-        Some(sse / (self.all.freedom - set.len() as f64).max(1.0))
+        let explained: f64 = (0..set.len())
+            .map(|i| beta[i] * self.all.train[(set[i], last)])
+            .sum();
+        Some(self.all.train[(last, last)] - explained)
     }
 }
 

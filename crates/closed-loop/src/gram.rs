@@ -10,6 +10,14 @@
 //! blocks are summed in parallel, each in its own order: the result does not
 //! depend on the number of threads.
 //!
+//! A design that filters its columns carries states from frame to frame. Each block
+//! is filtered from zero states and, as further columns, from unit ones; the filter
+//! is linear, so that what the block before left enters afterwards, exactly:
+//!
+//! ```text
+//! rows(M) = rows(0) + rows_s M      G(M) = [I; M]^T G [I; M]      M' = E + E_s M
+//! ```
+//!
 //! Not physics: linear least squares.
 
 use std::ops::Range;
@@ -31,6 +39,21 @@ pub(crate) trait Design: Sync {
     /// scalars x [`width`](Self::width), and returns how many of them count: a
     /// masked scalar is a row of zeros.
     fn fill(&self, frames: Range<usize>, out: &mut DMatrix<f64>) -> usize;
+    /// States carried from one frame to the next.
+    fn states(&self) -> usize {
+        0
+    }
+    /// As [`fill`](Self::fill) with [`states`](Self::states) further columns, which
+    /// start from one unit state each, going on from `state` (states x columns).
+    fn fill_from(
+        &self,
+        frames: Range<usize>,
+        state: &mut DMatrix<f64>,
+        out: &mut DMatrix<f64>,
+    ) -> usize {
+        debug_assert!(state.is_empty(), "a design with states fills from them");
+        self.fill(frames, out)
+    }
 }
 
 /// Gram matrices per block.
@@ -45,25 +68,37 @@ pub(crate) struct BlockGrams {
 impl BlockGrams {
     /// One pass over `design`.
     pub(crate) fn accumulate(design: &dyn Design, folds: &Folds) -> Self {
-        let width = design.width();
-        let (gram, scalars) = folds
+        let (width, states) = (design.width(), design.states());
+        let blocks: Vec<(DMatrix<f64>, DMatrix<f64>, f64)> = folds
             .blocks
             .par_iter()
             .map(|block| {
-                let mut gram = DMatrix::zeros(width, width);
-                let mut rows = DMatrix::zeros(0, width);
+                let mut gram = DMatrix::zeros(width + states, width + states);
+                let mut rows = DMatrix::zeros(0, width + states);
+                let mut state = DMatrix::zeros(states, width + states);
+                state.columns_mut(width, states).fill_with_identity();
                 let mut scalars = 0;
                 let mut at = block.start;
                 while at < block.end {
                     let end = (at + CHUNK_FRAMES).min(block.end);
-                    scalars += design.fill(at..end, &mut rows);
+                    scalars += design.fill_from(at..end, &mut state, &mut rows);
                     gram.gemm(1.0, &rows.transpose(), &rows, 1.0);
                     at = end;
                 }
-                (gram, scalars as f64)
+                (gram, state, scalars as f64)
             })
-            .unzip();
-        Self { gram, scalars }
+            .collect();
+        let mut carried = DMatrix::zeros(states, width);
+        let mut out = Self {
+            gram: Vec::new(),
+            scalars: Vec::new(),
+        };
+        for (gram, end, scalars) in blocks {
+            out.gram.push(continued(&gram, &carried));
+            out.scalars.push(scalars);
+            carried = end.columns(0, width) + end.columns(width, states) * &carried;
+        }
+        out
     }
 
     /// The sum over the blocks for which `wanted` is true.
@@ -77,4 +112,16 @@ impl BlockGrams {
         }
         (gram, scalars)
     }
+}
+
+/// The Gram of a block that was filtered from zero states, had it been `carried`.
+fn continued(gram: &DMatrix<f64>, carried: &DMatrix<f64>) -> DMatrix<f64> {
+    let (states, width) = carried.shape();
+    let own = gram.view((0, 0), (width, width)).into_owned();
+    if states == 0 {
+        return own;
+    }
+    let cross = gram.view((0, width), (width, states)) * carried;
+    let whole = gram.view((width, width), (states, states)) * carried;
+    own + &cross + cross.transpose() + carried.transpose() * whole
 }

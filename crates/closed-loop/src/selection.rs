@@ -93,24 +93,55 @@ pub(crate) fn select(fits: &Fits, groups: &[Group], may: &[bool], scalars: f64) 
     // not return, so the search ends.
     let mut banned = vec![false; groups.len()];
     loop {
-        let base = out_of_fold(fits, groups, &chosen);
-        let best = (0..groups.len())
-            .filter(|&g| may[g] && !banned[g] && !chosen.contains(&g))
-            .filter(|&g| chosen.iter().all(|&c| groups[c].family != groups[g].family))
-            .filter_map(|g| {
-                let judgement = judge(fits, groups, &chosen, g, base.as_ref()?, tried);
-                let rank = judgement.delta_loglik
-                    - 0.5
-                        * (groups[g].columns.len() + groups[g].choices) as f64
-                        * scalars.max(2.0).ln();
-                judgement.stands().then_some((g, rank))
-            })
-            .max_by(|a, b| a.1.total_cmp(&b.1));
-        let Some((added, _)) = best else { break };
+        let may: Vec<bool> = (0..groups.len()).map(|g| may[g] && !banned[g]).collect();
+        let ranked = ranked(fits, groups, &may, &chosen, scalars, tried);
+        let Some(&added) = ranked.first() else { break };
         chosen.push(added);
         prune(fits, groups, &mut chosen, &mut banned, tried);
     }
-    let judged = (0..groups.len())
+    let judged = judged(fits, groups, &chosen, tried);
+    Selection { chosen, judged }
+}
+
+/// Groups that may be added to `chosen`, best first: by the gain out of fold after
+/// the price of their parameters and choices.
+pub(crate) fn ranked(
+    fits: &Fits,
+    groups: &[Group],
+    may: &[bool],
+    chosen: &[usize],
+    scalars: f64,
+    tried: usize,
+) -> Vec<usize> {
+    let Some(base) = out_of_fold(fits, groups, chosen) else {
+        return Vec::new();
+    };
+    let mut standing: Vec<(usize, f64)> = (0..groups.len())
+        .filter(|&g| may[g] && !chosen.contains(&g))
+        .filter(|&g| chosen.iter().all(|&c| groups[c].family != groups[g].family))
+        .filter_map(|g| {
+            let judgement = judge(fits, groups, chosen, g, &base, tried);
+            let rank = judgement.delta_loglik - price(&groups[g], scalars);
+            judgement.stands().then_some((g, rank))
+        })
+        .collect();
+    standing.sort_by(|a, b| b.1.total_cmp(&a.1));
+    standing.into_iter().map(|(g, _)| g).collect()
+}
+
+/// What a group pays for its parameters and choices, nats.
+pub(crate) fn price(group: &Group, scalars: f64) -> f64 {
+    0.5 * (group.columns.len() + group.choices) as f64 * scalars.max(2.0).ln()
+}
+
+/// Standing of every group beside (for a chosen one: within) `chosen`.
+pub(crate) fn judged(
+    fits: &Fits,
+    groups: &[Group],
+    chosen: &[usize],
+    tried: usize,
+) -> Vec<Judgement> {
+    (0..groups.len())
         .map(|g| {
             let others: Vec<usize> = chosen.iter().copied().filter(|&c| c != g).collect();
             match out_of_fold(fits, groups, &others) {
@@ -118,8 +149,7 @@ pub(crate) fn select(fits: &Fits, groups: &[Group], may: &[bool], scalars: f64) 
                 None => Judgement::UNSEEN,
             }
         })
-        .collect();
-    Selection { chosen, judged }
+        .collect()
 }
 
 /// Drops chosen groups that no longer stand beside the others.

@@ -17,6 +17,7 @@ use effects::{Candidate, StarRows};
 use focal_plane::{ARCSEC_PER_RAD, AttitudeSource, Pixel, PointsMut};
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
+use crate::common_noise::{CommonNoise, STATES, Whitener};
 use crate::evidence::{Amplitudes, Evidence, Residuals};
 use crate::folds::Folds;
 use crate::gram::Design;
@@ -32,6 +33,8 @@ pub(crate) struct StarDesign<'a> {
     pub(crate) residuals: &'a [[Vec<f64>; 2]],
     /// The motion that candidates may evaluate.
     pub(crate) motion: Option<&'a dyn AttitudeSource>,
+    /// The filter of what all stars of a frame share.
+    pub(crate) whitener: Option<&'a Whitener>,
 }
 
 impl StarDesign<'_> {
@@ -122,12 +125,7 @@ impl StarDesign<'_> {
         let data = self.data;
         let first = data.frames.first_row[frames.start];
         let n = out.nrows() / 2;
-        for i in 0..n {
-            if data.outlier[first + i] {
-                out.row_mut(i).fill(0.0);
-                out.row_mut(n + i).fill(0.0);
-            }
-        }
+        self.mask(first, out);
         if !data.free_attitude {
             return 2 * (0..n).filter(|i| !data.outlier[first + i]).count();
         }
@@ -137,9 +135,39 @@ impl StarDesign<'_> {
     }
 }
 
+impl StarDesign<'_> {
+    /// Zeroes the rows of outliers.
+    fn mask(&self, first: usize, out: &mut DMatrix<f64>) {
+        let n = out.nrows() / 2;
+        for i in (0..n).filter(|i| self.data.outlier[first + i]) {
+            out.row_mut(i).fill(0.0);
+            out.row_mut(n + i).fill(0.0);
+        }
+    }
+}
+
 impl Design for StarDesign<'_> {
     fn width(&self) -> usize {
         self.nuisance.columns() + Self::candidate_columns(self.candidates) + self.residuals.len()
+    }
+
+    fn states(&self) -> usize {
+        self.whitener.map_or(0, |_| STATES)
+    }
+
+    fn fill_from(
+        &self,
+        frames: Range<usize>,
+        state: &mut DMatrix<f64>,
+        out: &mut DMatrix<f64>,
+    ) -> usize {
+        let Some(whitener) = self.whitener else {
+            return self.fill(frames, out);
+        };
+        let mut raw = DMatrix::zeros(0, 0);
+        self.fill_raw(frames.clone(), &mut raw);
+        self.mask(self.data.frames.first_row[frames.start], &mut raw);
+        whitener.apply(self.data, frames, &raw, state, out)
     }
 
     fn fill(&self, frames: Range<usize>, out: &mut DMatrix<f64>) -> usize {
@@ -219,9 +247,23 @@ pub(crate) struct StarEvidence<'a> {
     pub(crate) motion: Option<&'a dyn AttitudeSource>,
     /// First guess of the noise of a centroid, per axis, arcsec.
     pub(crate) sigma_guess_arcsec: f64,
+    /// The filter of what all stars of a frame share.
+    pub(crate) whitener: Option<Whitener>,
 }
 
 impl StarEvidence<'_> {
+    /// The same evidence under a noise that frames share.
+    pub(crate) fn with_noise(&self, noise: &CommonNoise) -> Self {
+        Self {
+            data: self.data,
+            nuisance: self.nuisance.clone(),
+            residuals: self.residuals.clone(),
+            motion: self.motion,
+            sigma_guess_arcsec: 1.0,
+            whitener: Some(Whitener::new(self.data, noise)),
+        }
+    }
+
     /// The residual variant of a fold.
     fn residual(&self, fold: usize) -> &[Vec<f64>; 2] {
         &self.residuals[if self.residuals.len() == 1 { 0 } else { fold }]
@@ -248,7 +290,12 @@ impl Evidence for StarEvidence<'_> {
             candidates,
             residuals: &self.residuals,
             motion: self.motion,
+            whitener: self.whitener.as_ref(),
         })
+    }
+
+    fn log_scale(&self) -> f64 {
+        self.whitener.as_ref().map_or(0.0, |w| w.log_scale)
     }
 
     fn residuals(
@@ -264,6 +311,7 @@ impl Evidence for StarEvidence<'_> {
             candidates,
             residuals: &[],
             motion: self.motion,
+            whitener: None,
         };
         let rows = data.t_s.len();
         let mut out = Residuals {

@@ -26,12 +26,14 @@ use crate::image_level::{self, ImageLevel, Side};
 use crate::images::{self, Formed};
 use crate::motion;
 use crate::nuisance::StarNuisance;
+use crate::reference_wander::{self, REFERENCE_ERROR};
 use crate::robust;
-use crate::search::{Found, amplitudes, borrowed, fit, search};
+use crate::search::{Found, amplitudes, borrowed, fit};
 use crate::selection::columns_of;
 use crate::situation::Situation;
 use crate::star_data::{Inputs, Star, StarData, median_step};
 use crate::star_design::{StarEvidence, rotation_of};
+use crate::star_search::{self, Wander};
 
 /// Fewest frames: every fold needs data to be predicted from.
 const MIN_FRAMES: usize = 4;
@@ -144,15 +146,16 @@ pub(crate) fn run(
         list.extend(leftover_terms(situation, &data));
         list
     };
-    let found = search(level, &folds, candidates(), &|c| c.id() != EMPIRICAL)?;
+    let searched = star_search::run(level, &folds, candidates(), &|c| c.id() != EMPIRICAL)?;
     progress("figures");
     finish(&Finish {
         situation,
         data: &data,
         folds: &folds,
         measured: &measured,
-        level,
-        found: &found,
+        level: searched.evidence.as_ref().unwrap_or(level),
+        found: &searched.found,
+        wander: searched.wander.as_ref(),
         before: &before,
         image: image.as_ref().zip(formed.as_ref()),
     })
@@ -201,6 +204,7 @@ fn evidence<'a>(
         motion,
         // circular to per axis
         sigma_guess_arcsec: temporal.map_or(1.0, |s| s / std::f64::consts::SQRT_2),
+        whitener: None,
     }
 }
 
@@ -294,6 +298,7 @@ struct Finish<'a> {
     measured: &'a StarEvidence<'a>,
     level: &'a StarEvidence<'a>,
     found: &'a Found,
+    wander: Option<&'a Wander>,
     before: &'a Residuals,
     image: Option<(&'a ImageLevel, &'a Formed)>,
 }
@@ -368,11 +373,21 @@ fn finish(f: &Finish<'_>) -> Result<Closed, CloseError> {
         }
     }
     let mut model = f.situation.model.clone();
+    let known = model.effects.iter().any(|e| e.id == REFERENCE_ERROR);
+    let wander = f
+        .wander
+        .filter(|_| !known)
+        .and_then(reference_wander::effect);
+    if let Some((effect, entry)) = wander {
+        effects.push(effect);
+        entries.push(entry);
+    }
     model.effects.extend(entries);
 
     let unattributed = figures::unattributed(f.found, last / whole);
     let excess = excess(f, last);
     let mut considered = figures::considered(f.found, excess);
+    considered.retain(|c| !effects.iter().any(|e| e.id == c.id));
     if let Some((level, _)) = f.image {
         for (id, step) in [
             (images::DARK_MAP, &level.dark_map),
@@ -399,7 +414,7 @@ fn finish(f: &Finish<'_>) -> Result<Closed, CloseError> {
         .fitted
         .fits
         .out_of_fold(&set)
-        .map(|o| o.total_loglik());
+        .map(|o| o.total_loglik() + f.level.log_scale());
     let outliers = f.data.outlier.iter().filter(|o| **o).count();
     let report = Report {
         format: telemetry::report::REPORT_FORMAT.to_owned(),
@@ -466,12 +481,13 @@ fn finish(f: &Finish<'_>) -> Result<Closed, CloseError> {
     })
 }
 
-/// Squared residual over what the declared noise accounts for, arcsec^2 summed
-/// over scalars; 0 where no noise is declared.
+/// Squared residual over what the declared noise accounts for, in the unit of the
+/// fit's scalars (arcsec, or the centroids' noise where they are whitened); 0 where no noise is declared.
 fn excess(f: &Finish<'_>, power: f64) -> f64 {
     let rows = f.data.outlier.iter().filter(|o| !**o).count() as f64;
     f.situation.model.noise.temporal_arcsec.map_or(0.0, |s| {
-        (rows * power - 0.5 * s * s * f.found.fitted.scalars).max(0.0)
+        let unit = f.level.whitener.as_ref().map_or(1.0, |w| w.centroid);
+        (rows * power - 0.5 * s * s * f.found.fitted.scalars).max(0.0) / (unit * unit)
     })
 }
 
