@@ -36,6 +36,11 @@ pub(crate) enum Command {
         after_help = "Examples:\n  boresight simulate fixtures/scenarios/example.toml --out bundle/\n  boresight simulate --preset iht --out bundle/\n  boresight simulate --print-preset pitt > my.toml"
     )]
     Simulate(Simulate),
+    /// Fit white noise and a Gauss-Markov process to each axis: a hybrid empirical model
+    #[command(
+        after_help = "Examples:\n  boresight fit telemetry/\n  boresight fit telemetry/ --out hem.toml --exclude-hz 0.03,0.04"
+    )]
+    Fit(Fit),
 }
 
 #[derive(Debug, Args)]
@@ -70,6 +75,22 @@ pub(crate) struct Simulate {
     pub(crate) tables: Tables,
 }
 
+#[derive(Debug, Args)]
+pub(crate) struct Fit {
+    /// What was measured: a bundle folder with a reference
+    #[arg(value_name = "BUNDLE")]
+    pub(crate) bundle: PathBuf,
+    /// File for the model, which `simulate` and `compare` read
+    #[arg(long, value_name = "MODEL.toml")]
+    pub(crate) out: Option<PathBuf>,
+    /// Frequencies used, Hz [default: all]
+    #[arg(long, value_name = "LOW,HIGH", value_parser = range)]
+    pub(crate) band_hz: Option<[f64; 2]>,
+    /// Frequencies left out, Hz, such as those of a line; may be given several times
+    #[arg(long, value_name = "LOW,HIGH", value_parser = range)]
+    pub(crate) exclude_hz: Vec<[f64; 2]>,
+}
+
 #[derive(Clone, Copy, Debug, clap::ValueEnum)]
 pub(crate) enum Tables {
     /// Plain CSV
@@ -78,6 +99,18 @@ pub(crate) enum Tables {
     CsvGz,
     /// Parquet
     Parquet,
+}
+
+fn range(text: &str) -> Result<[f64; 2], String> {
+    let ends = text
+        .split_once(',')
+        .map(|(low, high)| (low.trim().parse(), high.trim().parse()));
+    match ends {
+        Some((Ok(low), Ok(high))) if 0.0 <= low && low < high && f64::is_finite(high) => {
+            Ok([low, high])
+        }
+        _ => Err("two numbers LOW,HIGH with 0 <= LOW < HIGH are needed".to_owned()),
+    }
 }
 
 fn threads(text: &str) -> Result<usize, String> {

@@ -26,7 +26,6 @@ mod image_level;
 mod images;
 mod motion;
 mod nuisance;
-mod robust;
 mod search;
 mod selection;
 mod situation;

@@ -26,12 +26,12 @@ use crate::image_level::{self, ImageLevel, Side};
 use crate::images::{self, Formed};
 use crate::motion;
 use crate::nuisance::StarNuisance;
-use crate::robust;
 use crate::search::{Found, amplitudes, borrowed, fit, search};
 use crate::selection::columns_of;
 use crate::situation::Situation;
 use crate::star_data::{Inputs, Star, StarData, median_step};
 use crate::star_design::{StarEvidence, rotation_of};
+use spectra::robust;
 
 /// Fewest frames: every fold needs data to be predicted from.
 const MIN_FRAMES: usize = 4;

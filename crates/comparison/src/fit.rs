@@ -1,0 +1,331 @@
+//! White noise and first-order Gauss-Markov process of each axis: the parameters of a HEM.
+//!
+//! ```text
+//! start          least squares on logarithms of the spectrum, [M23] Eq. 19-20 with erratum E9
+//! best           exact likelihood at the frames' times; of the spectrum where a band is chosen
+//! log_psd_cost   sum_k (ln model - ln measured + E_k)^2 / psi'(nu_k/2) / (bins - 3)
+//! ```
+//!
+//! over bins of a tenth of a decade, `E = psi(nu/2) - ln(nu/2)`: 1 on average for a residual that is
+//! FOGM plus white, however long the series; larger by as much as the shape differs. Sigmas are true
+//! standard deviations of one frame (erratum E6); `as_printed` is Eq. 17-20 to the letter on the raw
+//! periodogram.
+//!
+//! Source: \[M23\] Eq. 15-20; errata E6 to E9.
+
+use fogm_fit::{
+    Convention, Density, Estimate, Fit, FitOptions, Fogm, FogmWhite, HANN_BIN_CORRELATION,
+    Preferred, fit_log_psd, fit_psd, fit_times,
+};
+use spectra::{Psd, log_bias, log_variance};
+use telemetry::report::{
+    AxisFit, AxisPrinted, FIT_FORMAT, FitAxes, FitReport, PreferredModel, Rows, WithSigma,
+};
+use telemetry::{Bundle, HemAxes, HemAxis, Model, ModelKind, ModelTracker};
+
+use crate::residual::masked;
+use crate::{AXES, ComparisonError, Residual, Spectrum};
+
+/// A cost per degree of freedom above which the shape counts as something else than FOGM plus white.
+const POOR: f64 = 2.0;
+
+/// Which frequencies count.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct FitSettings {
+    /// Frequencies used, Hz; all of them if `None`.
+    pub band_hz: Option<[f64; 2]>,
+    /// Ranges left out, Hz: lines of something else.
+    pub lines_hz: Vec<[f64; 2]>,
+}
+
+/// A fit with what it rests on.
+#[derive(Clone, Debug)]
+pub struct Fitted {
+    /// What `fit --json` prints.
+    pub report: FitReport,
+    /// The HEM of these parameters.
+    pub model: Model,
+    /// The residual that was fitted.
+    pub residual: Residual,
+    /// Averaged density of the residual about each axis, arcsec^2/Hz.
+    pub measured: [Psd; 3],
+    /// Density of the fitted process at the same frequencies.
+    pub modelled: [Vec<f64>; 3],
+}
+
+/// Fits the attitude residual of a bundle.
+///
+/// # Errors
+///
+/// As [`Residual::of`]; an axis that is no series or has no noise.
+pub fn fit(bundle: &Bundle, settings: &FitSettings) -> Result<Fitted, ComparisonError> {
+    let residual = Residual::of(bundle)?;
+    let mut notes = first_notes(&residual);
+    let mut axes = Vec::with_capacity(3);
+    for axis in 0..3 {
+        axes.push(Axis::fit(&residual, axis, settings)?);
+    }
+    for (axis, name) in axes.iter().zip(AXES) {
+        notes.extend(axis.notes.iter().map(|note| format!("{name}: {note}")));
+    }
+    let Ok([x, y, z]) = <[Axis; 3]>::try_from(axes) else {
+        unreachable!("three axes were fitted")
+    };
+    let with_outlier = residual.rows_with_outlier();
+    let report = FitReport {
+        format: FIT_FORMAT.to_owned(),
+        axes: FitAxes {
+            x: x.report.clone(),
+            y: y.report.clone(),
+            z: z.report.clone(),
+        },
+        rows: Some(Rows {
+            used: residual.t_s.len() - with_outlier,
+            outliers: with_outlier,
+            outside_reference: residual.outside_reference,
+        }),
+        sample_rate_hz: Some(x.fs_hz),
+        span_s: Some(residual.t_s[residual.t_s.len() - 1] - residual.t_s[0]),
+        notes,
+    };
+    let model = hem(bundle, [x.process, y.process, z.process], x.fs_hz);
+    Ok(Fitted {
+        report,
+        model,
+        residual,
+        measured: [x.measured, y.measured, z.measured],
+        modelled: [x.modelled, y.modelled, z.modelled],
+    })
+}
+
+fn first_notes(residual: &Residual) -> Vec<String> {
+    let mut notes = vec![];
+    if residual.unsolved > 0 {
+        notes.push(format!(
+            "{} frames have too few stars for an attitude",
+            residual.unsolved
+        ));
+    }
+    if residual.outside_reference > 0 {
+        notes.push(format!(
+            "{} frames lie outside the reference or in its gaps",
+            residual.outside_reference
+        ));
+    }
+    notes
+}
+
+/// One axis.
+struct Axis {
+    report: AxisFit,
+    process: HemAxis,
+    fs_hz: f64,
+    measured: Psd,
+    modelled: Vec<f64>,
+    notes: Vec<String>,
+}
+
+impl Axis {
+    fn fit(
+        residual: &Residual,
+        axis: usize,
+        settings: &FitSettings,
+    ) -> Result<Self, ComparisonError> {
+        let name = AXES[axis];
+        let of_spectrum = |source| ComparisonError::Spectrum { axis: name, source };
+        let of_fit = |source| ComparisonError::Fit { axis: name, source };
+        let kept = residual.kept(axis);
+        let spectrum = Spectrum::new(&residual.t_s, &kept).map_err(of_spectrum)?;
+        let options = FitOptions {
+            band_hz: settings.band_hz,
+            lines_hz: settings.lines_hz.clone(),
+            ..FitOptions::default()
+        };
+        let fine = spectrum.fine(&kept).map_err(of_spectrum)?;
+        let fit = if settings.band_hz.is_none() && settings.lines_hz.is_empty() {
+            fit_times(&residual.t_s, &kept, &options).map_err(of_fit)?
+        } else {
+            let options = FitOptions {
+                bin_correlation: if spectrum.irregular() {
+                    1.0
+                } else {
+                    HANN_BIN_CORRELATION
+                },
+                ..options.clone()
+            };
+            fit_psd(&usable(&fine), &options).map_err(of_fit)?
+        };
+        let std_arcsec = residual.std_arcsec(axis);
+        let process = preferred_process(&fit, std_arcsec);
+        let measured = spectrum.of(&kept).map_err(of_spectrum)?;
+        let modelled = modelled(&spectrum, &fine, process);
+        let raw = spectrum.raw(&kept).map_err(of_spectrum)?;
+        // a spectrum that the printed form cannot be fitted to has no printed numbers
+        let printed = fit_log_psd(&usable(&raw), Convention::AsPrinted, &options).ok();
+        let in_band = |f: f64| {
+            settings
+                .band_hz
+                .is_none_or(|[low, high]| (low..=high).contains(&f))
+                && !settings
+                    .lines_hz
+                    .iter()
+                    .any(|[low, high]| (*low..=*high).contains(&f))
+        };
+        let cost = cost(&measured, &modelled, in_band);
+        Ok(Self {
+            notes: notes(&fit, cost),
+            report: AxisFit {
+                sigma_hsf_arcsec: with_sigma(&fit.sigma_hsf),
+                tau_hsf_s: with_sigma(&fit.tau_s),
+                sigma_tn_arcsec: with_sigma(&fit.sigma_tn),
+                as_printed: printed.map_or_else(AxisPrinted::default, |p| AxisPrinted {
+                    sigma_hsf_arcsec: p.sigma_hsf.value(),
+                    tau_hsf_s: p.tau_s.value(),
+                    sigma_tn_arcsec: p.sigma_tn.value(),
+                }),
+                log_psd_cost: cost,
+                preferred: match fit.choice.preferred {
+                    Preferred::White => PreferredModel::White,
+                    Preferred::Fogm => PreferredModel::Fogm,
+                    Preferred::FogmWhite => PreferredModel::FogmWhite,
+                },
+                outliers: Some(residual.outliers(axis)),
+                rms_arcsec: Some(std_arcsec),
+            },
+            process,
+            fs_hz: spectrum.fs_hz(),
+            measured,
+            modelled,
+        })
+    }
+}
+
+/// The bins that a fit of logarithms can use: a density of zero has none.
+fn usable(psd: &Psd) -> Psd {
+    let keep: Vec<bool> = (0..psd.len())
+        .map(|k| psd.psd[k] > 0.0 && psd.dof[k] > 0.0)
+        .collect();
+    let pick = |values: &[f64]| {
+        let out: Vec<bool> = keep.iter().map(|keep| !keep).collect();
+        let mut values = masked(values, &out);
+        values.retain(|v| v.is_finite());
+        values
+    };
+    Psd {
+        frequency_hz: pick(&psd.frequency_hz),
+        psd: pick(&psd.psd),
+        dof: pick(&psd.dof),
+        fs_hz: psd.fs_hz,
+    }
+}
+
+/// The process of the model that the data ask for, as numbers that a simulation can use: where an
+/// estimate is only a bound, the maximum of the likelihood itself.
+fn preferred_process(fit: &Fit, std_arcsec: f64) -> HemAxis {
+    let or_maximum = |estimate: &Estimate, i: usize| estimate.value().unwrap_or(fit.maximum[i]);
+    let tau_hsf_s = or_maximum(&fit.tau_s, 1);
+    match fit.choice.preferred {
+        Preferred::White => HemAxis {
+            sigma_hsf_arcsec: 0.0,
+            tau_hsf_s,
+            sigma_tn_arcsec: std_arcsec,
+        },
+        Preferred::Fogm => HemAxis {
+            sigma_hsf_arcsec: or_maximum(&fit.sigma_hsf, 0),
+            tau_hsf_s,
+            sigma_tn_arcsec: 0.0,
+        },
+        Preferred::FogmWhite => HemAxis {
+            sigma_hsf_arcsec: or_maximum(&fit.sigma_hsf, 0),
+            tau_hsf_s,
+            sigma_tn_arcsec: or_maximum(&fit.sigma_tn, 2),
+        },
+    }
+}
+
+/// Density of the process, averaged as the measured one.
+fn modelled(spectrum: &Spectrum, fine: &Psd, process: HemAxis) -> Vec<f64> {
+    let made = Fogm::new(process.sigma_hsf_arcsec, process.tau_hsf_s)
+        .and_then(|fogm| FogmWhite::new(fogm, process.sigma_tn_arcsec));
+    match made {
+        Ok(made) => spectrum.means(fine, |f| Density::Sampled.at(made, f, fine.fs_hz)),
+        Err(_) => vec![f64::NAN; spectrum.means(fine, |_| 0.0).len()],
+    }
+}
+
+/// \[M23\] Eq. 19 with the expectation and variance of each bin (erratum E9), per degree of freedom.
+fn cost(measured: &Psd, modelled: &[f64], in_band: impl Fn(f64) -> bool) -> f64 {
+    let (mut sum, mut bins) = (0.0, 0.0);
+    for (k, model) in modelled.iter().enumerate() {
+        let dof = measured.dof[k];
+        if measured.psd[k] > 0.0 && in_band(measured.frequency_hz[k]) {
+            let error = model.ln() - measured.psd[k].ln() + log_bias(dof);
+            sum += error * error / log_variance(dof);
+            bins += 1.0;
+        }
+    }
+    sum / f64::max(bins - 3.0, 1.0)
+}
+
+fn with_sigma(estimate: &Estimate) -> WithSigma {
+    let finite = |v: f64| v.is_finite().then_some(v);
+    WithSigma {
+        value: estimate.value(),
+        sigma: estimate.sigma(),
+        interval: estimate.interval().map(|ends| ends.map(finite)),
+        reason: estimate.reason().map(|reason| reason.to_string()),
+    }
+}
+
+/// What the data cannot tell of an axis, in words.
+fn notes(fit: &Fit, cost: f64) -> Vec<String> {
+    let mut notes = vec![];
+    for (name, unit, estimate) in [
+        ("sigma_HSF", "arcsec", &fit.sigma_hsf),
+        ("tau_HSF", "s", &fit.tau_s),
+        ("sigma_TN", "arcsec", &fit.sigma_tn),
+    ] {
+        let note = match estimate {
+            Estimate::Estimated { .. } => continue,
+            Estimate::UpperBound { limit, reason } => {
+                format!("{name} is at most {limit:.4} {unit} (95 %): {reason}")
+            }
+            Estimate::LowerBound { limit, reason } => {
+                format!("{name} is at least {limit:.4} {unit} (95 %): {reason}")
+            }
+            Estimate::Undetermined { reason } => {
+                format!("the data do not tell {name}: {reason}")
+            }
+        };
+        notes.push(note);
+    }
+    if cost > POOR {
+        notes.push(format!(
+            "log-PSD cost {cost:.1}, where FOGM plus white has 1: the process is something else, and the parameters describe this motion only"
+        ));
+    }
+    notes
+}
+
+/// The model that `simulate` and `compare` read.
+fn hem(bundle: &Bundle, [x, y, z]: [HemAxis; 3], fs_hz: f64) -> Model {
+    let meta = &bundle.meta;
+    Model {
+        kind: ModelKind::Hem,
+        title: Some(match &meta.title {
+            Some(title) => format!("HEM fitted to: {title}"),
+            None => "HEM fitted to a bundle".to_owned(),
+        }),
+        tracker: ModelTracker {
+            pixels: meta.tracker.pixels,
+            focal_length_px: meta.tracker.focal_length_px,
+            fov_deg: meta.tracker.fov_deg,
+            pixel_centre: meta.tracker.pixel_centre,
+            update_rate_hz: Some(meta.sample_rate_hz.unwrap_or(fs_hz)),
+            max_stars: None,
+            exposure_s: meta.tracker.exposure_s,
+        },
+        hem: Some(HemAxes { x, y, z }),
+        ..Model::default()
+    }
+}

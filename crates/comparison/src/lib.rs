@@ -1,0 +1,16 @@
+//! A model beside what was measured.
+//!
+//! - [`Residual`]: the attitude against the reference, per axis, outliers marked;
+//! - [`Spectrum`]: its density, whatever gaps and irregular steps it has;
+//! - [`fit`]: white noise and first-order Gauss-Markov process per axis, the parameters of a HEM.
+#![forbid(unsafe_code)]
+
+mod error;
+mod fit;
+mod residual;
+mod spectrum;
+
+pub use error::ComparisonError;
+pub use fit::{FitSettings, Fitted, fit};
+pub use residual::{AXES, MeasuredBy, Residual};
+pub use spectrum::Spectrum;

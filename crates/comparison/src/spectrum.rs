@@ -1,0 +1,250 @@
+//! One spectrum for every series of the same times: regular, with gaps, or irregular.
+//!
+//! ```text
+//! regular, with gaps   Welch, Hann, the longest segments that still use half of the samples
+//! irregular            Lomb-Scargle at frequencies that widen with frequency
+//! then                 averages over a tenth of a decade, with their degrees of freedom
+//! ```
+//!
+//! A plan is made once from times and mask, so that a measured series and a thousand simulated ones go
+//! through the same estimate: what a window or a gap does to one, it does to the other.
+//!
+//! Source: crate `spectra`; the choices are this crate's.
+
+use std::ops::Range;
+
+use spectra::{
+    Detrend, LogAverage, LombScargle, LombScargleSettings, Psd, SpectraError, Welch, WelchSettings,
+    Window, continuous_runs, mean_rate_hz,
+};
+
+/// Part of a step by which an interval may differ and still go on.
+const STEP_TOLERANCE: f64 = 0.05;
+/// Groups to a factor of ten in frequency.
+const PER_DECADE: f64 = 10.0;
+/// Segments shorter than this show too little: such series count as irregular.
+const SHORTEST: usize = 64;
+/// Frequencies to a factor of ten of an irregular series.
+const LADDER: usize = 200;
+
+/// A plan for the spectrum of series at one set of times.
+#[derive(Clone, Debug)]
+pub struct Spectrum {
+    kind: Kind,
+    fs_hz: f64,
+    average: LogAverage,
+    correlation: Vec<f64>,
+    /// Where a series has a value.
+    kept: Vec<bool>,
+}
+
+#[derive(Clone, Debug)]
+enum Kind {
+    Welch {
+        plan: Box<Welch>,
+        runs: Vec<Range<usize>>,
+    },
+    Ladder {
+        rungs: Vec<LombScargle>,
+    },
+}
+
+impl Spectrum {
+    /// A plan for series at `t_s`, of which those values count that are not NaN in `mask`.
+    ///
+    /// # Errors
+    ///
+    /// Times that do not ascend, or too few values.
+    pub fn new(t_s: &[f64], mask: &[f64]) -> Result<Self, SpectraError> {
+        let kept: Vec<bool> = mask.iter().map(|v| v.is_finite()).collect();
+        let times: Vec<f64> = picked(t_s, &kept);
+        let step_s = typical_step(t_s)?;
+        let runs = continuous_runs(t_s, mask, step_s, STEP_TOLERANCE)?;
+        let (kind, fs_hz) = match segment(&runs, times.len()) {
+            Some(length) => {
+                let settings = WelchSettings::half_overlap(length, 1.0 / step_s);
+                let plan = Box::new(Welch::new(settings)?);
+                (Kind::Welch { plan, runs }, 1.0 / step_s)
+            }
+            None => {
+                let fs_hz = mean_rate_hz(&times)?;
+                let rungs = ladder(&times, fs_hz)?;
+                (Kind::Ladder { rungs }, fs_hz)
+            }
+        };
+        let correlation = match &kind {
+            Kind::Welch { plan, runs } => plan.bin_correlation(segments(plan.settings(), runs)),
+            Kind::Ladder { .. } => vec![1.0],
+        };
+        Ok(Self {
+            average: LogAverage::new(&kind.density(mask, &kept, fs_hz)?, PER_DECADE)?,
+            kind,
+            fs_hz,
+            correlation,
+            kept,
+        })
+    }
+
+    /// Rate of the samples, Hz; the mean one of an irregular series.
+    #[must_use]
+    pub fn fs_hz(&self) -> f64 {
+        self.fs_hz
+    }
+
+    /// Whether the series is taken as irregular.
+    #[must_use]
+    pub fn irregular(&self) -> bool {
+        matches!(self.kind, Kind::Ladder { .. })
+    }
+
+    /// The averaged one-sided density of a series, unit^2/Hz.
+    ///
+    /// # Errors
+    ///
+    /// A value that is missing where the plan counts it.
+    pub fn of(&self, x: &[f64]) -> Result<Psd, SpectraError> {
+        let fine = self.fine(x)?;
+        Ok(self.average.apply(&fine, &self.correlation))
+    }
+
+    /// Means of a model's density over the same groups of frequencies.
+    #[must_use]
+    pub fn means(&self, fine: &Psd, density: impl Fn(f64) -> f64) -> Vec<f64> {
+        let values: Vec<f64> = fine.frequency_hz.iter().map(|f| density(*f)).collect();
+        let mut out = vec![0.0; self.average.groups().len()];
+        self.average.means_into(&values, &mut out);
+        out
+    }
+
+    /// The density before it is averaged.
+    ///
+    /// # Errors
+    ///
+    /// As [`of`](Self::of).
+    pub fn fine(&self, x: &[f64]) -> Result<Psd, SpectraError> {
+        self.kind.density(x, &self.kept, self.fs_hz)
+    }
+
+    /// The periodogram of a series without window and average: what \[M23\] Eq. 19 as printed is fitted to.
+    ///
+    /// # Errors
+    ///
+    /// As [`of`](Self::of).
+    pub fn raw(&self, x: &[f64]) -> Result<Psd, SpectraError> {
+        match &self.kind {
+            Kind::Welch { plan, runs } => {
+                let settings = WelchSettings {
+                    window: Window::Boxcar,
+                    detrend: Detrend::Constant,
+                    overlap: 0,
+                    ..plan.settings().clone()
+                };
+                Welch::new(settings)?.process_runs(x, runs)
+            }
+            Kind::Ladder { .. } => self.fine(x),
+        }
+    }
+}
+
+impl Kind {
+    fn density(&self, x: &[f64], kept: &[bool], fs_hz: f64) -> Result<Psd, SpectraError> {
+        match self {
+            Self::Welch { plan, runs } => plan.process_runs(x, runs),
+            Self::Ladder { rungs } => {
+                let x = picked(x, kept);
+                let mut all = Psd {
+                    fs_hz,
+                    ..Psd::default()
+                };
+                for rung in rungs {
+                    let part = rung.process(&x)?;
+                    all.frequency_hz.extend(part.frequency_hz);
+                    all.psd.extend(part.psd);
+                    all.dof.extend(part.dof);
+                }
+                Ok(all)
+            }
+        }
+    }
+}
+
+fn picked(values: &[f64], kept: &[bool]) -> Vec<f64> {
+    let pairs = values.iter().zip(kept);
+    pairs.filter(|(_, kept)| **kept).map(|(v, _)| *v).collect()
+}
+
+/// Mean of the steps near the median one, s.
+fn typical_step(t_s: &[f64]) -> Result<f64, SpectraError> {
+    mean_rate_hz(t_s)?;
+    let mut steps: Vec<f64> = t_s.windows(2).map(|w| w[1] - w[0]).collect();
+    let median = spectra::robust::median(&mut steps).unwrap_or(f64::NAN);
+    let near: Vec<f64> = steps
+        .into_iter()
+        .filter(|s| (s / median - 1.0).abs() <= STEP_TOLERANCE)
+        .collect();
+    if near.is_empty() {
+        return Ok(median);
+    }
+    Ok(near.iter().sum::<f64>() / near.len() as f64)
+}
+
+/// The longest segment that uses half of the samples; `None` if none of a useful length does.
+fn segment(runs: &[Range<usize>], samples: usize) -> Option<usize> {
+    let mut lengths: Vec<usize> = runs.iter().map(Range::len).collect();
+    lengths.sort_unstable_by(|a, b| b.cmp(a));
+    let shortest = SHORTEST.min(samples);
+    // runs as long as a segment are used but for a tail shorter than half of one
+    let used = |length: usize| -> usize {
+        lengths
+            .iter()
+            .take_while(|l| **l >= length)
+            .map(|l| {
+                let step = (length - length / 2).max(1);
+                length + (l - length) / step * step
+            })
+            .sum()
+    };
+    let mut candidates = lengths.clone();
+    candidates.dedup();
+    candidates
+        .into_iter()
+        .take_while(|length| *length >= shortest)
+        .find(|length| 2 * used(*length) >= samples)
+}
+
+fn segments(settings: &WelchSettings, runs: &[Range<usize>]) -> usize {
+    let step = settings.segment - settings.overlap;
+    let fits = runs.iter().filter(|run| run.len() >= settings.segment);
+    fits.map(|run| (run.len() - settings.segment) / step + 1)
+        .max()
+        .unwrap_or(1)
+}
+
+/// Plans that go up a decade each, from one period in the span to half the mean rate.
+fn ladder(t_s: &[f64], fs_hz: f64) -> Result<Vec<LombScargle>, SpectraError> {
+    let first_hz = fs_hz / t_s.len() as f64;
+    let top_hz = 0.5 * fs_hz;
+    let mut rungs = vec![];
+    let mut from = 1.0;
+    while from * first_hz < top_hz {
+        // never closer than what the span tells apart
+        let step_hz = first_hz * (9.0 * from / LADDER as f64).max(1.0);
+        let to_hz = (10.0 * from * first_hz).min(top_hz);
+        let mut bins = 0;
+        while from * first_hz + bins as f64 * step_hz < to_hz * (1.0 - 1e-9) {
+            bins += 1;
+        }
+        rungs.push(LombScargle::new(
+            t_s,
+            LombScargleSettings {
+                first_hz: from * first_hz,
+                step_hz,
+                bins,
+                floating_mean: true,
+                fs_hz,
+            },
+        )?);
+        from *= 10.0;
+    }
+    Ok(rungs)
+}
