@@ -115,7 +115,7 @@ fn write(dir: &Path, frames: Frames, seed: u64) -> Result<PathBuf, Box<dyn std::
         let mut theta = [0.0; 3];
         for axis in 0..3 {
             let [sigma, tau, white] = TRUTH[axis];
-            let a = (-(t - last) / tau).exp();
+            let a = (-(t - last).max(0.0) / tau).exp();
             slow[axis] = a * slow[axis] + sigma * (1.0 - a * a).sqrt() * random.normal();
             theta[axis] = slow[axis] + white * random.normal() + 150.0;
         }

@@ -42,6 +42,9 @@ pub enum ComparisonError {
         /// Why.
         source: SpectraError,
     },
+    /// No spectrum of a draw.
+    #[error("spectrum of a draw: {0}")]
+    Draw(#[from] SpectraError),
     /// No fit of an axis.
     #[error("fit of the residual about {axis}: {source}")]
     Fit {

@@ -3,10 +3,10 @@
 //! ```text
 //! start          least squares on logarithms of the spectrum, [M23] Eq. 19-20 with erratum E9
 //! best           exact likelihood at the frames' times; of the spectrum where a band is chosen
-//! log_psd_cost   sum_k (ln model - ln measured + E_k)^2 / psi'(nu_k/2) / (bins - 3)
+//! log_psd_cost   [M23] Eq. 19 against draws of the fitted process, per degree of freedom
 //! ```
 //!
-//! over bins of a tenth of a decade, `E = psi(nu/2) - ln(nu/2)`: 1 on average for a residual that is
+//! over bins of a tenth of a decade ([`crate::Ensemble`]): 1 on average for a residual that is
 //! FOGM plus white, however long the series; larger by as much as the shape differs. Sigmas are true
 //! standard deviations of one frame (erratum E6); `as_printed` is Eq. 17-20 to the letter on the raw
 //! periodogram.
@@ -14,17 +14,23 @@
 //! Source: \[M23\] Eq. 15-20; errata E6 to E9.
 
 use fogm_fit::{
-    Convention, Density, Estimate, Fit, FitOptions, Fogm, FogmWhite, HANN_BIN_CORRELATION,
-    Preferred, fit_log_psd, fit_psd, fit_times,
+    Convention, Estimate, Fit, FitOptions, HANN_BIN_CORRELATION, LogPsdFit, Preferred, fit_log_psd,
+    fit_psd, fit_times,
 };
-use spectra::{Psd, log_bias, log_variance};
+use spectra::Psd;
+use star_tracker::{Purpose, stream};
 use telemetry::report::{
     AxisFit, AxisPrinted, FIT_FORMAT, FitAxes, FitReport, PreferredModel, Rows, WithSigma,
 };
 use telemetry::{Bundle, HemAxes, HemAxis, Model, ModelKind, ModelTracker};
 
+use crate::ensemble::ensemble;
 use crate::residual::masked;
-use crate::{AXES, ComparisonError, Residual, Spectrum};
+use crate::{AXES, ComparisonError, Ensemble, Residual, Spectrum, hybrid};
+
+/// Draws of the fitted process, and their seed: the same fit says the same twice.
+const DRAWS: u64 = 64;
+const SEED: u64 = 1;
 
 /// A cost per degree of freedom above which the shape counts as something else than FOGM plus white.
 const POOR: f64 = 2.0;
@@ -49,7 +55,7 @@ pub struct Fitted {
     pub residual: Residual,
     /// Averaged density of the residual about each axis, arcsec^2/Hz.
     pub measured: [Psd; 3],
-    /// Density of the fitted process at the same frequencies.
+    /// Mean density of draws of the fitted process at the same frequencies.
     pub modelled: [Vec<f64>; 3],
 }
 
@@ -61,16 +67,19 @@ pub struct Fitted {
 pub fn fit(bundle: &Bundle, settings: &FitSettings) -> Result<Fitted, ComparisonError> {
     let residual = Residual::of(bundle)?;
     let mut notes = first_notes(&residual);
-    let mut axes = Vec::with_capacity(3);
+    let mut started = Vec::with_capacity(3);
     for axis in 0..3 {
-        axes.push(Axis::fit(&residual, axis, settings)?);
+        started.push(Started::new(&residual, axis, settings)?);
     }
+    let Ok(started) = <[Started; 3]>::try_from(started) else {
+        unreachable!("three axes were fitted")
+    };
+    let drawn = drawn(&residual.t_s, &started)?;
+    let axes = [0, 1, 2].map(|i| Axis::new(&started[i], &drawn[i], settings));
     for (axis, name) in axes.iter().zip(AXES) {
         notes.extend(axis.notes.iter().map(|note| format!("{name}: {note}")));
     }
-    let Ok([x, y, z]) = <[Axis; 3]>::try_from(axes) else {
-        unreachable!("three axes were fitted")
-    };
+    let [x, y, z] = axes;
     let with_outlier = residual.rows_with_outlier();
     let report = FitReport {
         format: FIT_FORMAT.to_owned(),
@@ -115,7 +124,79 @@ fn first_notes(residual: &Residual) -> Vec<String> {
     notes
 }
 
-/// One axis.
+/// An axis that was fitted.
+struct Started {
+    fit: Fit,
+    printed: Option<LogPsdFit>,
+    plan: Spectrum,
+    measured: Psd,
+    process: HemAxis,
+    std_arcsec: f64,
+    outliers: usize,
+}
+
+impl Started {
+    fn new(
+        residual: &Residual,
+        axis: usize,
+        settings: &FitSettings,
+    ) -> Result<Self, ComparisonError> {
+        let name = AXES[axis];
+        let of_spectrum = |source| ComparisonError::Spectrum { axis: name, source };
+        let of_fit = |source| ComparisonError::Fit { axis: name, source };
+        let kept = residual.kept(axis);
+        let plan = Spectrum::new(&residual.t_s, &kept).map_err(of_spectrum)?;
+        let options = FitOptions {
+            band_hz: settings.band_hz,
+            lines_hz: settings.lines_hz.clone(),
+            ..FitOptions::default()
+        };
+        let fit = if settings.band_hz.is_none() && settings.lines_hz.is_empty() {
+            fit_times(&residual.t_s, &kept, &options).map_err(of_fit)?
+        } else {
+            let options = FitOptions {
+                bin_correlation: if plan.irregular() {
+                    1.0
+                } else {
+                    HANN_BIN_CORRELATION
+                },
+                ..options.clone()
+            };
+            let fine = plan.fine(&kept).map_err(of_spectrum)?;
+            fit_psd(&usable(&fine), &options).map_err(of_fit)?
+        };
+        let std_arcsec = residual.std_arcsec(axis);
+        let raw = plan.raw(&kept).map_err(of_spectrum)?;
+        Ok(Self {
+            process: preferred_process(&fit, std_arcsec),
+            // a spectrum that the printed form cannot be fitted to has no printed numbers
+            printed: fit_log_psd(&usable(&raw), Convention::AsPrinted, &options).ok(),
+            measured: plan.of(&kept).map_err(of_spectrum)?,
+            fit,
+            plan,
+            std_arcsec,
+            outliers: residual.outliers(axis),
+        })
+    }
+}
+
+/// Spectra of draws of the fitted processes.
+fn drawn(t_s: &[f64], started: &[Started; 3]) -> Result<[Ensemble; 3], ComparisonError> {
+    let plans = [0, 1, 2].map(|i| started[i].plan.clone());
+    let mut processes = [None; 3];
+    for ((process, axis), name) in processes.iter_mut().zip(started).zip(AXES) {
+        let of_fit = |source| ComparisonError::Fit { axis: name, source };
+        *process = Some(hybrid::process(axis.process).map_err(of_fit)?);
+    }
+    ensemble(&plans, DRAWS, |draw| {
+        let mut rng = stream(SEED, draw, Purpose::Estimation);
+        Ok(processes.map(|process| {
+            process.map_or_else(Vec::new, |process| hybrid::series(process, t_s, &mut rng))
+        }))
+    })
+}
+
+/// One axis as it is reported.
 struct Axis {
     report: AxisFit,
     process: HemAxis,
@@ -126,42 +207,8 @@ struct Axis {
 }
 
 impl Axis {
-    fn fit(
-        residual: &Residual,
-        axis: usize,
-        settings: &FitSettings,
-    ) -> Result<Self, ComparisonError> {
-        let name = AXES[axis];
-        let of_spectrum = |source| ComparisonError::Spectrum { axis: name, source };
-        let of_fit = |source| ComparisonError::Fit { axis: name, source };
-        let kept = residual.kept(axis);
-        let spectrum = Spectrum::new(&residual.t_s, &kept).map_err(of_spectrum)?;
-        let options = FitOptions {
-            band_hz: settings.band_hz,
-            lines_hz: settings.lines_hz.clone(),
-            ..FitOptions::default()
-        };
-        let fine = spectrum.fine(&kept).map_err(of_spectrum)?;
-        let fit = if settings.band_hz.is_none() && settings.lines_hz.is_empty() {
-            fit_times(&residual.t_s, &kept, &options).map_err(of_fit)?
-        } else {
-            let options = FitOptions {
-                bin_correlation: if spectrum.irregular() {
-                    1.0
-                } else {
-                    HANN_BIN_CORRELATION
-                },
-                ..options.clone()
-            };
-            fit_psd(&usable(&fine), &options).map_err(of_fit)?
-        };
-        let std_arcsec = residual.std_arcsec(axis);
-        let process = preferred_process(&fit, std_arcsec);
-        let measured = spectrum.of(&kept).map_err(of_spectrum)?;
-        let modelled = modelled(&spectrum, &fine, process);
-        let raw = spectrum.raw(&kept).map_err(of_spectrum)?;
-        // a spectrum that the printed form cannot be fitted to has no printed numbers
-        let printed = fit_log_psd(&usable(&raw), Convention::AsPrinted, &options).ok();
+    fn new(started: &Started, drawn: &Ensemble, settings: &FitSettings) -> Self {
+        let Started { fit, printed, .. } = started;
         let in_band = |f: f64| {
             settings
                 .band_hz
@@ -171,32 +218,35 @@ impl Axis {
                     .iter()
                     .any(|[low, high]| (*low..=*high).contains(&f))
         };
-        let cost = cost(&measured, &modelled, in_band);
-        Ok(Self {
-            notes: notes(&fit, cost),
+        let standing = drawn.standing(&started.measured, 3, in_band);
+        let cost = standing.map_or(f64::NAN, |standing| standing.cost);
+        Self {
+            notes: notes(fit, cost),
             report: AxisFit {
                 sigma_hsf_arcsec: with_sigma(&fit.sigma_hsf),
                 tau_hsf_s: with_sigma(&fit.tau_s),
                 sigma_tn_arcsec: with_sigma(&fit.sigma_tn),
-                as_printed: printed.map_or_else(AxisPrinted::default, |p| AxisPrinted {
-                    sigma_hsf_arcsec: p.sigma_hsf.value(),
-                    tau_hsf_s: p.tau_s.value(),
-                    sigma_tn_arcsec: p.sigma_tn.value(),
-                }),
+                as_printed: printed
+                    .as_ref()
+                    .map_or_else(AxisPrinted::default, |p| AxisPrinted {
+                        sigma_hsf_arcsec: p.sigma_hsf.value(),
+                        tau_hsf_s: p.tau_s.value(),
+                        sigma_tn_arcsec: p.sigma_tn.value(),
+                    }),
                 log_psd_cost: cost,
                 preferred: match fit.choice.preferred {
                     Preferred::White => PreferredModel::White,
                     Preferred::Fogm => PreferredModel::Fogm,
                     Preferred::FogmWhite => PreferredModel::FogmWhite,
                 },
-                outliers: Some(residual.outliers(axis)),
-                rms_arcsec: Some(std_arcsec),
+                outliers: Some(started.outliers),
+                rms_arcsec: Some(started.std_arcsec),
             },
-            process,
-            fs_hz: spectrum.fs_hz(),
-            measured,
-            modelled,
-        })
+            process: started.process,
+            fs_hz: started.plan.fs_hz(),
+            measured: started.measured.clone(),
+            modelled: drawn.mean(),
+        }
     }
 }
 
@@ -241,30 +291,6 @@ fn preferred_process(fit: &Fit, std_arcsec: f64) -> HemAxis {
             sigma_tn_arcsec: or_maximum(&fit.sigma_tn, 2),
         },
     }
-}
-
-/// Density of the process, averaged as the measured one.
-fn modelled(spectrum: &Spectrum, fine: &Psd, process: HemAxis) -> Vec<f64> {
-    let made = Fogm::new(process.sigma_hsf_arcsec, process.tau_hsf_s)
-        .and_then(|fogm| FogmWhite::new(fogm, process.sigma_tn_arcsec));
-    match made {
-        Ok(made) => spectrum.means(fine, |f| Density::Sampled.at(made, f, fine.fs_hz)),
-        Err(_) => vec![f64::NAN; spectrum.means(fine, |_| 0.0).len()],
-    }
-}
-
-/// \[M23\] Eq. 19 with the expectation and variance of each bin (erratum E9), per degree of freedom.
-fn cost(measured: &Psd, modelled: &[f64], in_band: impl Fn(f64) -> bool) -> f64 {
-    let (mut sum, mut bins) = (0.0, 0.0);
-    for (k, model) in modelled.iter().enumerate() {
-        let dof = measured.dof[k];
-        if measured.psd[k] > 0.0 && in_band(measured.frequency_hz[k]) {
-            let error = model.ln() - measured.psd[k].ln() + log_bias(dof);
-            sum += error * error / log_variance(dof);
-            bins += 1.0;
-        }
-    }
-    sum / f64::max(bins - 3.0, 1.0)
 }
 
 fn with_sigma(estimate: &Estimate) -> WithSigma {

@@ -3,6 +3,7 @@
 //! ```text
 //! regular, with gaps   Welch, Hann, the longest segments that still use half of the samples
 //! irregular            Lomb-Scargle at frequencies that widen with frequency
+//! short holes          of at most 3 samples, 2 % of all at most: a straight line across
 //! then                 averages over a tenth of a decade, with their degrees of freedom
 //! ```
 //!
@@ -15,13 +16,16 @@ use std::ops::Range;
 
 use spectra::{
     Detrend, LogAverage, LombScargle, LombScargleSettings, Psd, SpectraError, Welch, WelchSettings,
-    Window, continuous_runs, mean_rate_hz,
+    Window, mean_rate_hz,
 };
 
 /// Part of a step by which an interval may differ and still go on.
 const STEP_TOLERANCE: f64 = 0.05;
 /// Groups to a factor of ten in frequency.
 const PER_DECADE: f64 = 10.0;
+/// Most samples of a hole that is bridged, and of all holes together for each sample that is there.
+const LONGEST_HOLE: usize = 3;
+const HOLES: f64 = 0.02;
 /// Segments shorter than this show too little: such series count as irregular.
 const SHORTEST: usize = 64;
 /// Frequencies to a factor of ten of an irregular series.
@@ -34,8 +38,26 @@ pub struct Spectrum {
     fs_hz: f64,
     average: LogAverage,
     correlation: Vec<f64>,
-    /// Where a series has a value.
-    kept: Vec<bool>,
+    /// Where the values that are analysed come from.
+    grid: Vec<Take>,
+}
+
+/// A value of the series: of one sample, or on the straight line between two.
+#[derive(Clone, Copy, Debug)]
+struct Take {
+    left: usize,
+    right: usize,
+    part: f64,
+}
+
+impl Take {
+    fn of(self, x: &[f64]) -> f64 {
+        if self.left == self.right {
+            x[self.left]
+        } else {
+            x[self.left] + self.part * (x[self.right] - x[self.left])
+        }
+    }
 }
 
 #[derive(Clone, Debug)]
@@ -56,33 +78,39 @@ impl Spectrum {
     ///
     /// Times that do not ascend, or too few values.
     pub fn new(t_s: &[f64], mask: &[f64]) -> Result<Self, SpectraError> {
-        let kept: Vec<bool> = mask.iter().map(|v| v.is_finite()).collect();
-        let times: Vec<f64> = picked(t_s, &kept);
+        let kept: Vec<usize> = (0..mask.len()).filter(|k| mask[*k].is_finite()).collect();
+        let times: Vec<f64> = kept.iter().map(|k| t_s[*k]).collect();
         let step_s = typical_step(t_s)?;
-        let runs = continuous_runs(t_s, mask, step_s, STEP_TOLERANCE)?;
-        let (kind, fs_hz) = match segment(&runs, times.len()) {
+        let (grid, runs) = laid_out(&times, &kept, step_s);
+        let (kind, fs_hz, grid) = match segment(&runs, times.len()) {
             Some(length) => {
                 let settings = WelchSettings::half_overlap(length, 1.0 / step_s);
                 let plan = Box::new(Welch::new(settings)?);
-                (Kind::Welch { plan, runs }, 1.0 / step_s)
+                (Kind::Welch { plan, runs }, 1.0 / step_s, grid)
             }
             None => {
                 let fs_hz = mean_rate_hz(&times)?;
                 let rungs = ladder(&times, fs_hz)?;
-                (Kind::Ladder { rungs }, fs_hz)
+                let grid = kept.iter().map(|k| sample(*k)).collect();
+                (Kind::Ladder { rungs }, fs_hz, grid)
             }
         };
         let correlation = match &kind {
             Kind::Welch { plan, runs } => plan.bin_correlation(segments(plan.settings(), runs)),
             Kind::Ladder { .. } => vec![1.0],
         };
+        let laid: Vec<f64> = grid.iter().map(|take| take.of(mask)).collect();
         Ok(Self {
-            average: LogAverage::new(&kind.density(mask, &kept, fs_hz)?, PER_DECADE)?,
+            average: LogAverage::new(&kind.density(&laid, fs_hz)?, PER_DECADE)?,
             kind,
             fs_hz,
             correlation,
-            kept,
+            grid,
         })
+    }
+
+    fn laid(&self, x: &[f64]) -> Vec<f64> {
+        self.grid.iter().map(|take| take.of(x)).collect()
     }
 
     /// Rate of the samples, Hz; the mean one of an irregular series.
@@ -122,7 +150,7 @@ impl Spectrum {
     ///
     /// As [`of`](Self::of).
     pub fn fine(&self, x: &[f64]) -> Result<Psd, SpectraError> {
-        self.kind.density(x, &self.kept, self.fs_hz)
+        self.kind.density(&self.laid(x), self.fs_hz)
     }
 
     /// The periodogram of a series without window and average: what \[M23\] Eq. 19 as printed is fitted to.
@@ -139,7 +167,7 @@ impl Spectrum {
                     overlap: 0,
                     ..plan.settings().clone()
                 };
-                Welch::new(settings)?.process_runs(x, runs)
+                Welch::new(settings)?.process_runs(&self.laid(x), runs)
             }
             Kind::Ladder { .. } => self.fine(x),
         }
@@ -147,17 +175,16 @@ impl Spectrum {
 }
 
 impl Kind {
-    fn density(&self, x: &[f64], kept: &[bool], fs_hz: f64) -> Result<Psd, SpectraError> {
+    fn density(&self, x: &[f64], fs_hz: f64) -> Result<Psd, SpectraError> {
         match self {
             Self::Welch { plan, runs } => plan.process_runs(x, runs),
             Self::Ladder { rungs } => {
-                let x = picked(x, kept);
                 let mut all = Psd {
                     fs_hz,
                     ..Psd::default()
                 };
                 for rung in rungs {
-                    let part = rung.process(&x)?;
+                    let part = rung.process(x)?;
                     all.frequency_hz.extend(part.frequency_hz);
                     all.psd.extend(part.psd);
                     all.dof.extend(part.dof);
@@ -168,9 +195,50 @@ impl Kind {
     }
 }
 
-fn picked(values: &[f64], kept: &[bool]) -> Vec<f64> {
-    let pairs = values.iter().zip(kept);
-    pairs.filter(|(_, kept)| **kept).map(|(v, _)| *v).collect()
+fn sample(k: usize) -> Take {
+    Take {
+        left: k,
+        right: k,
+        part: 0.0,
+    }
+}
+
+/// The samples of a regular grid, short holes bridged, and the runs without a hole.
+fn laid_out(times: &[f64], kept: &[usize], step_s: f64) -> (Vec<Take>, Vec<Range<usize>>) {
+    // whole steps from one sample to the next, 0 where they are none
+    let steps: Vec<usize> = times
+        .windows(2)
+        .map(|w| {
+            let steps = (w[1] - w[0]) / step_s;
+            let whole =
+                (1..=LONGEST_HOLE + 1).find(|n| (steps - *n as f64).abs() <= STEP_TOLERANCE);
+            whole.unwrap_or(0)
+        })
+        .collect();
+    let missing: usize = steps.iter().map(|n| n.saturating_sub(1)).sum();
+    let bridge = missing as f64 <= HOLES * kept.len() as f64;
+    let mut grid = vec![];
+    let mut runs: Vec<Range<usize>> = vec![];
+    for (k, &row) in kept.iter().enumerate() {
+        let from = if k == 0 { 0 } else { steps[k - 1] };
+        let joins = from == 1 || (from > 1 && bridge);
+        if joins {
+            for m in 1..from {
+                grid.push(Take {
+                    left: kept[k - 1],
+                    right: row,
+                    part: m as f64 / from as f64,
+                });
+            }
+        }
+        let start = grid.len();
+        grid.push(sample(row));
+        match runs.last_mut() {
+            Some(run) if joins => run.end = grid.len(),
+            _ => runs.push(start..grid.len()),
+        }
+    }
+    (grid, runs)
 }
 
 /// Mean of the steps near the median one, s.
