@@ -17,7 +17,8 @@
 //! | [`scenarios`] | motions and skies: bundles simulated from a scenario |
 //! | [`closed_loop`] | residual, cause, better model |
 //! | [`comparison`] | residual, spectrum, fitted process and ensemble of a model beside a bundle |
-//! | [`report`] | text from finished results |
+//! | [`figures`] | plots as SVG text from plain numbers |
+//! | [`report`] | text and pictures from finished results |
 //!
 //! # One frame of a star tracker
 //!
@@ -65,8 +66,8 @@
 
 #[doc(inline)]
 pub use {
-    centroid, closed_loop, comparison, distortion, effects, focal_plane, fogm_fit, quest, report,
-    scenarios, spectra, star_tracker, telemetry,
+    centroid, closed_loop, comparison, distortion, effects, figures, focal_plane, fogm_fit, quest,
+    report, scenarios, spectra, star_tracker, telemetry,
 };
 
 /// The names that almost every program needs.

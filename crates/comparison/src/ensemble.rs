@@ -59,6 +59,14 @@ impl Ensemble {
         })
     }
 
+    /// Mean and standard deviation over the draws of the density in dB, at each frequency.
+    #[must_use]
+    pub fn decibels(&self) -> (Vec<f64>, Vec<f64>) {
+        const DB: f64 = 10.0 * std::f64::consts::LOG10_E;
+        let logs = self.logs();
+        logs.into_iter().map(|(m, s)| (DB * m, DB * s)).unzip()
+    }
+
     /// Mean and standard deviation of the logarithm at each frequency.
     fn logs(&self) -> Vec<(f64, f64)> {
         (0..self.frequency_hz.len())

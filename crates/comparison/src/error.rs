@@ -1,8 +1,11 @@
 //! Why a bundle cannot be compared.
 
-use focal_plane::AttitudeError;
+use distortion::DistortionError;
+use effects::EffectError;
+use focal_plane::{AttitudeError, CameraError};
 use fogm_fit::FogmError;
 use spectra::SpectraError;
+use star_tracker::TrackerError;
 
 /// Why no comparison came out.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -42,6 +45,27 @@ pub enum ComparisonError {
         /// Why.
         source: SpectraError,
     },
+    /// Too few draws for a standard deviation.
+    #[error("{got} draws asked for, at least 8 needed")]
+    TooFewDraws {
+        /// Draws asked for.
+        got: u64,
+    },
+    /// Numbers of the model that make no camera.
+    #[error("model: {0}")]
+    Camera(#[from] CameraError),
+    /// Numbers of the model outside their range.
+    #[error("model: {0}")]
+    Tracker(#[from] TrackerError),
+    /// A distortion that cannot be drawn.
+    #[error("model: {0}")]
+    Distortion(#[from] DistortionError),
+    /// An effect that cannot be built.
+    #[error("model: {0}")]
+    Effect(#[from] EffectError),
+    /// Numbers of a hybrid model outside their range.
+    #[error("model: {0}")]
+    Hybrid(#[from] FogmError),
     /// No spectrum of a draw.
     #[error("spectrum of a draw: {0}")]
     Draw(#[from] SpectraError),

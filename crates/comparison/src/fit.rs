@@ -107,7 +107,7 @@ pub fn fit(bundle: &Bundle, settings: &FitSettings) -> Result<Fitted, Comparison
     })
 }
 
-fn first_notes(residual: &Residual) -> Vec<String> {
+pub(crate) fn first_notes(residual: &Residual) -> Vec<String> {
     let mut notes = vec![];
     if residual.unsolved > 0 {
         notes.push(format!(

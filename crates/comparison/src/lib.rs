@@ -2,16 +2,22 @@
 //!
 //! - [`Residual`]: the attitude against the reference, per axis, outliers marked;
 //! - [`Spectrum`]: its density, whatever gaps and irregular steps it has;
+//! - [`Ensemble`]: the densities of many draws of a model, and where a series stands among them;
+//! - [`compare`]: models flown along the measured motion, beside what was measured;
 //! - [`fit`]: white noise and first-order Gauss-Markov process per axis, the parameters of a HEM.
 #![forbid(unsafe_code)]
 
+mod compare;
 mod ensemble;
 mod error;
 mod fit;
+mod flight;
 mod hybrid;
 mod residual;
 mod spectrum;
+mod stars;
 
+pub use compare::{BANDS_HZ, CompareSettings, Compared, Flown, compare};
 pub use ensemble::{Ensemble, Standing};
 pub use error::ComparisonError;
 pub use fit::{FitSettings, Fitted, fit};

@@ -64,10 +64,7 @@ impl Residual {
     /// No reference, neither attitude nor stars with a camera, a star without direction, or fewer
     /// than 16 frames.
     pub fn of(bundle: &Bundle) -> Result<Self, ComparisonError> {
-        let table = bundle.reference.as_ref().ok_or(ComparisonError::NothingToCompare(
-            "the bundle has no table `reference`: a residual needs a better estimate to be held against",
-        ))?;
-        let reference = table.series_with_gaps()?;
+        let reference = Self::reference(bundle)?;
         let (t_s, q, unsolved, measured_by) = match (&bundle.attitude, &bundle.stars) {
             (Some(table), _) => (table.t_s.clone(), table.q.clone(), 0, MeasuredBy::Attitude),
             (None, Some(stars)) => {
@@ -102,6 +99,14 @@ impl Residual {
         }
         out.mark_outliers();
         Ok(out)
+    }
+
+    /// The better estimate, its gaps left open.
+    pub(crate) fn reference(bundle: &Bundle) -> Result<AttitudeSeries, ComparisonError> {
+        let table = bundle.reference.as_ref().ok_or(ComparisonError::NothingToCompare(
+            "the bundle has no table `reference`: a residual needs a better estimate to be held against",
+        ))?;
+        Ok(table.series_with_gaps()?)
     }
 
     /// Marks until nothing new turns up: a mask changes the scale that it is judged by.
