@@ -27,6 +27,9 @@ use crate::{AXES, ComparisonError, Ensemble, Residual, Spectrum};
 /// begins to matter) and at some 10 mHz; above 100 mHz there is white noise.
 pub const BANDS_HZ: [f64; 3] = [3e-3, 10e-3, 100e-3];
 
+/// Share of the measured standard deviation from which the reference's own error is worth a word.
+const REFERENCE_SHARE: f64 = 0.1;
+
 /// Decibels of a natural logarithm.
 const DB: f64 = 10.0 * std::f64::consts::LOG10_E;
 
@@ -167,6 +170,7 @@ pub fn compare(
             first,
         });
     }
+    notes.extend(reference_note(bundle, &models, &kept));
     let with_outlier = residual.rows_with_outlier();
     let mut compared = compared.into_iter();
     let Some(model) = compared.next() else {
@@ -194,6 +198,24 @@ pub fn compare(
         measured,
         models: flown,
     })
+}
+
+/// The reference's own error is in the measured residual; a model has it only where it declares it.
+fn reference_note(bundle: &Bundle, models: &[&Model], kept: &[Vec<f64>; 3]) -> Option<String> {
+    let sigmas = bundle.reference.as_ref()?.sigma_arcsec.as_ref()?;
+    let typical = [0, 1, 2].map(|axis| {
+        let mut of: Vec<f64> = sigmas.iter().map(|sigma| sigma[axis]).collect();
+        spectra::robust::median(&mut of).unwrap_or(0.0)
+    });
+    let seen = (0..3).any(|axis| typical[axis] > REFERENCE_SHARE * std_of(&kept[axis]));
+    let declared = |model: &&Model| model.effects.iter().any(|e| e.id == "reference_error");
+    if !seen || models.iter().all(declared) {
+        return None;
+    }
+    let [x, y, z] = typical;
+    Some(format!(
+        "the reference gives its own error as {x:.3}, {y:.3}, {z:.3} arcsec (1 sigma): it is part of the measured residual, and of a model only if that declares the effect reference_error"
+    ))
 }
 
 fn name_of(model: &Model) -> String {

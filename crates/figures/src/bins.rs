@@ -114,6 +114,61 @@ impl FieldBins {
     }
 }
 
+/// Where most of a long series lies: its 5th, 50th and 95th percentile over stretches of one length.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Envelope {
+    /// Middle of each stretch.
+    pub x: Vec<f64>,
+    /// 5th percentile.
+    pub low: Vec<f64>,
+    /// Median.
+    pub median: Vec<f64>,
+    /// 95th percentile.
+    pub high: Vec<f64>,
+}
+
+impl Envelope {
+    /// The series `x, y`, `x` in any order, over so many stretches. A stretch without a value is NaN,
+    /// so that a gap stays a gap.
+    ///
+    /// ```
+    /// let t: Vec<f64> = (0..200).map(f64::from).collect();
+    /// let envelope = figures::Envelope::new(&t, &t, 2);
+    /// assert!((envelope.median[0] - 50.0).abs() < 1.0 && envelope.high[0] < 100.0);
+    /// ```
+    ///
+    /// # Panics
+    ///
+    /// If the slices differ in length.
+    #[must_use]
+    pub fn new(x: &[f64], y: &[f64], stretches: usize) -> Self {
+        assert_eq!(x.len(), y.len(), "one y for each x");
+        let mut out = Self::default();
+        let first = x.iter().copied().fold(f64::INFINITY, f64::min);
+        let last = x.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let width = last - first;
+        if !(width > 0.0 && width.is_finite()) {
+            return out;
+        }
+        let mut values = vec![vec![]; stretches];
+        for (x, y) in x.iter().zip(y) {
+            if x.is_finite() && y.is_finite() {
+                values[cell((x - first) / width, stretches)].push(*y);
+            }
+        }
+        for (k, values) in values.iter_mut().enumerate() {
+            values.sort_by(f64::total_cmp);
+            let at = |part: f64| values.get(cell(part, values.len().max(1))).copied();
+            out.x
+                .push(first + width * (k as f64 + 0.5) / stretches as f64);
+            out.low.push(at(0.05).unwrap_or(f64::NAN));
+            out.median.push(at(0.5).unwrap_or(f64::NAN));
+            out.high.push(at(0.95).unwrap_or(f64::NAN));
+        }
+        out
+    }
+}
+
 #[derive(Clone, Copy, Debug, Default)]
 struct Sums {
     n: f64,
@@ -165,6 +220,14 @@ mod tests {
         assert_eq!((bins.x, bins.y), (vec![-5.0, 5.0], vec![-5.0, 5.0]));
         assert_eq!((bins.dx, bins.dy), (vec![2.0, 5.0], vec![0.0, -2.0]));
         assert_eq!(bins.count, [2, 1]);
+    }
+
+    #[test]
+    fn a_gap_stays_a_gap() {
+        let x = [0.0, 1.0, 2.0, 8.0, 9.0, 10.0];
+        let envelope = Envelope::new(&x, &[1.0; 6], 5);
+        assert!(envelope.median[2].is_nan() && envelope.low[0] > 0.0 && envelope.high[4] > 0.0);
+        assert!(Envelope::new(&[1.0], &[1.0], 5).x.is_empty());
     }
 
     /// Standard error of 0, 1, ..., 9: sqrt(55/6 / 10).

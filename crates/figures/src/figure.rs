@@ -222,7 +222,7 @@ fn axes(out: &mut String, panel: &Panel, frame: &Frame) {
             );
         }
     }
-    for tick in frame.y.ticks(fh / 38.0) {
+    for tick in frame.y.ticks(fh / 28.0) {
         let px = tick.px;
         let _ = write!(
             out,

@@ -5,7 +5,7 @@
 //!   points, arrows, coloured cells;
 //! - [`Panel::psd`], [`Panel::time`], [`Panel::focal_plane`], [`Panel::phase`], [`Panel::map`] have the axes of
 //!   the pictures that star trackers need;
-//! - [`FieldBins`] and [`PhaseBins`] average what would be too many points.
+//! - [`FieldBins`], [`PhaseBins`] and [`Envelope`] average what would be too many points.
 //!
 //! Text is real text, lines end at the frame, nothing is loaded from elsewhere, and no two figures share a
 //! name: any number of them goes into one HTML page. The writer is this crate's own, because the plotting
@@ -34,7 +34,7 @@ mod panel;
 mod thin;
 
 pub use axis::Axis;
-pub use bins::{FieldBins, PhaseBins};
+pub use bins::{Envelope, FieldBins, PhaseBins};
 pub use colour::{Colour, Scale};
 pub use figure::Figure;
 pub use mark::{Mark, Shape};

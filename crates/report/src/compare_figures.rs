@@ -1,7 +1,7 @@
 //! The figures of the paper for any model and bundle.
 
 use comparison::{AXES, BANDS_HZ, Compared, Ensemble};
-use figures::{Axis, Colour, Figure, Mark, Panel};
+use figures::{Axis, Colour, Envelope, Figure, Mark, Panel};
 use telemetry::report::ComparedAxis;
 
 const UNIT: &str = "arcsec²/Hz";
@@ -67,7 +67,11 @@ fn psd(compared: &Compared, axis: usize) -> Panel {
     let model = &compared.models[0].axes[axis];
     let f = &model.frequency_hz;
     let mut panel = panel_of(axis)
-        .with(Mark::draws(f, &model.draws, Colour::DRAWS).named("draws of the model"))
+        .with(
+            Mark::draws(f, &model.draws, Colour::DRAWS)
+                .beyond_the_frame()
+                .named("draws of the model"),
+        )
         .with(
             Mark::line(f, &model.upper(), Colour::BOUND)
                 .dashed()
@@ -120,9 +124,8 @@ fn errors(compared: &Compared) -> Figure {
                 .named("against the model"),
         )
     });
-    Figure::new("Log-PSD error: measured over modelled", panels.into()).noted(
-        "0 dB is a model that is right; outside the grey area the model would not have been.",
-    )
+    Figure::new("Log-PSD error: measured over modelled", panels.into())
+        .noted("0 dB: the model is right. A draw of the model stays inside the grey area.")
 }
 
 fn residuals(compared: &Compared) -> Figure {
@@ -137,25 +140,39 @@ fn residuals(compared: &Compared) -> Figure {
             let mean = mean(values);
             values.iter().map(|v| v - mean).collect()
         };
-        Panel::time(&format!("about {}", AXES[i]), "residual, arcsec")
-            .with(
-                Mark::points(&residual.t_s, &about(&kept), 0.7, Colour::MEASURED)
-                    .named("measured, outliers left out"),
-            )
-            .with(
-                Mark::points(
-                    &residual.t_s,
-                    &about(&compared.models[0].first[i]),
-                    0.7,
-                    Colour::MODEL,
-                )
-                .at_opacity(0.6)
-                .named("first draw of the model"),
-            )
+        let panel = Panel::time(&format!("about {}", AXES[i]), "residual, arcsec");
+        [
+            (about(&kept), Colour::MEASURED, "measured"),
+            (
+                about(&compared.models[0].first[i]),
+                Colour::MODEL,
+                "first draw of the model",
+            ),
+        ]
+        .iter()
+        .fold(panel, |panel, (y, colour, name)| {
+            series(panel, &residual.t_s, y, *colour, name)
+        })
     });
     Figure::new("Residual of the attitude, its mean removed", panels.into())
         .in_columns(1)
         .sized([1000.0, 250.0])
+        .noted("Outliers are left out. Of a long series: its median and the middle 90 % over some pixels of time.")
+}
+
+/// Points; of a long series what they would cover.
+fn series(panel: Panel, t_s: &[f64], y: &[f64], colour: Colour, name: &str) -> Panel {
+    if t_s.len() <= 3000 {
+        return panel.with(
+            Mark::points(t_s, y, 1.0, colour)
+                .at_opacity(0.7)
+                .named(name),
+        );
+    }
+    let e = Envelope::new(t_s, y, 300);
+    panel
+        .with(Mark::band(&e.x, &e.low, &e.high, colour).named(name))
+        .with(Mark::line(&e.x, &e.median, colour).wide(1.0))
 }
 
 /// \[M23\] Fig. 13.
