@@ -433,3 +433,102 @@ fn bad_input_leaves_nothing_behind() -> Done {
     assert_eq!(usage.status.code(), Some(2));
     Ok(())
 }
+
+/// The fitted model against the bundle that it was fitted to: every number of the page's table of files is
+/// there, the pictures are whole, and the model agrees in every band.
+#[test]
+fn a_fitted_model_is_compared_with_its_bundle() -> Done {
+    let dir = tempfile::tempdir()?;
+    let bundle = write(dir.path(), PLAIN, 7)?;
+    let (model, out) = (dir.path().join("hem.toml"), dir.path().join("figures"));
+    let fitted = boresight()
+        .arg("fit")
+        .arg(&bundle)
+        .arg("--out")
+        .arg(&model)
+        .output()?;
+    assert!(fitted.status.success());
+    let done = boresight()
+        .args(["compare", "--json", "--draws", "40"])
+        .args([&model, &bundle])
+        .arg("--out")
+        .arg(&out)
+        .output()?;
+    assert!(done.status.success() && done.stderr.is_empty());
+    let report: Value = serde_json::from_slice(&done.stdout)?;
+    assert_eq!(report["format"], "boresight-compare/1");
+    let file = fs::read_to_string(out.join("compare.json"))?;
+    assert_eq!(serde_json::from_str::<Value>(&file)?, report);
+    for axis in ["x", "y", "z"] {
+        let axis = &report["model"]["axes"][axis];
+        // the mean of some 35 squares of unit variance: 1 +- 0.3
+        let cost = axis["log_psd_cost"].as_f64().ok_or("cost")?;
+        assert!((0.2..2.5).contains(&cost), "{cost}");
+        for band in axis["bands"].as_array().ok_or("bands")? {
+            let (Some(error), Some(sigma)) = (band["error_db"].as_f64(), band["sigma_db"].as_f64())
+            else {
+                return Err(format!("a band without bins: {band}").into());
+            };
+            assert!(error.abs() < 5.0 * sigma, "{band}");
+        }
+    }
+    let psd = fs::read_to_string(out.join("psd.csv"))?;
+    assert!(psd.starts_with("axis,frequency_hz,dof,measured,mean,upper_3sigma\n"));
+    let draws = fs::read_to_string(out.join("draws.csv"))?;
+    assert_eq!(draws.lines().count(), psd.lines().count());
+    assert_eq!(draws.lines().next().map(|l| l.split(',').count()), Some(42));
+    let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/compare.md");
+    let page = fs::read_to_string(page)?;
+    for entry in fs::read_dir(&out)? {
+        let name = entry?.file_name().into_string().map_err(|_| "a name")?;
+        assert!(
+            page.contains(&format!("`{name}`")),
+            "{name} is not on the page"
+        );
+        if name.ends_with(".svg") {
+            let svg = fs::read_to_string(out.join(&name))?;
+            assert!(svg.starts_with("<svg") && svg.ends_with("</svg>\n") && !svg.contains("NaN"));
+            assert!(
+                svg.contains("arcsec") || svg.contains("dB"),
+                "{name} has no unit"
+            );
+        }
+    }
+    Ok(())
+}
+
+/// A model that does not fit, a bundle without reference, too few draws: exit 2, and no folder.
+#[test]
+fn a_comparison_that_cannot_be_leaves_nothing() -> Done {
+    let dir = tempfile::tempdir()?;
+    let frames = Frames {
+        count: 100,
+        ..PLAIN
+    };
+    let bundle = write(dir.path(), frames, 8)?;
+    let (model, out) = (dir.path().join("m.toml"), dir.path().join("figures"));
+    fs::write(
+        &model,
+        "format = \"boresight-model/1\"\nkind = \"pbm\"\n[noise]\ntemporal_arcsec = 5.0\n[[effect]]\nid = \"roling_shutter\"\n",
+    )?;
+    let run = |draws: &str| {
+        boresight()
+            .args(["compare", "--draws", draws])
+            .args([&model, &bundle])
+            .arg("--out")
+            .arg(&out)
+            .output()
+    };
+    for (draws, word) in [("8", "rolling_shutter"), ("3", "8..")] {
+        let done = run(draws)?;
+        let message = String::from_utf8(done.stderr)?;
+        assert_eq!(done.status.code(), Some(2), "{message}");
+        assert!(message.contains(word), "{message}");
+        assert!(done.stdout.is_empty() && !out.exists());
+    }
+    fs::remove_file(bundle.join("reference.csv"))?;
+    let done = run("8")?;
+    assert_eq!(done.status.code(), Some(2));
+    assert!(String::from_utf8(done.stderr)?.contains("reference") && !out.exists());
+    Ok(())
+}
