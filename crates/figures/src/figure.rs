@@ -18,6 +18,8 @@ const BELOW: f64 = 44.0;
 const BAR: f64 = 74.0;
 /// Height of a row of the legend, px.
 const LEGEND: f64 = 18.0;
+/// Height of a line of the title, px.
+const TITLE: f64 = 18.0;
 /// Height of a line of the note, px.
 const NOTE: f64 = 16.0;
 /// Edge of the whole figure, px.
@@ -80,7 +82,10 @@ impl Figure {
         } else {
             vec![]
         };
-        let head = EDGE + 24.0 + legend_rows.len() as f64 * LEGEND + 4.0;
+        // bold 14 px is wider than the 11 px of the estimate
+        let title = wrapped(&self.title, (width - 2.0 * EDGE) / 1.36);
+        let below_title = EDGE + 6.0 + TITLE * title.len().max(1) as f64;
+        let head = below_title + legend_rows.len() as f64 * LEGEND + 4.0;
         let rows = self.panels.len().div_ceil(self.columns);
         let note = self
             .note
@@ -91,12 +96,19 @@ impl Figure {
         // writing to a string cannot fail
         let _ = write!(
             out,
-            r##"<svg xmlns="http://www.w3.org/2000/svg" width="{width:.0}" height="{height:.0}" viewBox="0 0 {width:.0} {height:.0}" font-family="DejaVu Sans, Verdana, Arial, sans-serif" font-size="11" fill="{ink}" role="img"><title>{title}</title><rect width="100%" height="100%" fill="#ffffff"/><text x="{EDGE}" y="{y}" font-size="14" font-weight="bold">{title}</text>"##,
-            ink = Colour::INK.hex(),
-            title = escaped(&self.title),
-            y = EDGE + 14.0,
+            r##"<svg xmlns="http://www.w3.org/2000/svg" width="{width:.0}" height="{height:.0}" viewBox="0 0 {width:.0} {height:.0}" font-family="DejaVu Sans, Verdana, Arial, sans-serif" font-size="11" fill="{}" role="img"><title>{}</title><rect width="100%" height="100%" fill="#ffffff"/>"##,
+            Colour::INK.hex(),
+            escaped(&self.title),
         );
-        legend(&mut out, &legend_rows, [EDGE, EDGE + 24.0], None);
+        for (k, line) in title.iter().enumerate() {
+            let y = EDGE + 14.0 + TITLE * k as f64;
+            let _ = write!(
+                out,
+                r#"<text x="{EDGE}" y="{y}" font-size="14" font-weight="bold">{}</text>"#,
+                escaped(line)
+            );
+        }
+        legend(&mut out, &legend_rows, [EDGE, below_title], None);
         for (k, panel) in self.panels.iter().enumerate() {
             let (column, row) = (k % self.columns, k / self.columns);
             let corner = [

@@ -1,7 +1,8 @@
 //! Fewer points where more than a screen can show: the picture stays the same.
 //!
 //! ```text
-//! line      of the points in one column of 0.5 px: the first, the lowest, the highest, the last
+//! line      of the points in one column of 0.5 px: the first, the lowest, the highest, the last;
+//!           of a line that goes to and fro: those 0.5 px or more from the one before
 //! points    one for each cell of 1 px by 1 px
 //! ```
 //!
@@ -16,8 +17,11 @@ const COLUMN_PX: f64 = 0.5;
 pub(crate) fn line(points: &[[f64; 2]]) -> Vec<[f64; 2]> {
     let descends = |w: &[[f64; 2]]| w[1][0] < w[0][0];
     let ascending = !points.windows(2).any(descends);
-    if points.len() < 4000 || !ascending {
+    if points.len() < 1000 {
         return points.to_vec();
+    }
+    if !ascending {
+        return steps(points);
     }
     let column = |p: &[f64; 2]| (p[0] / COLUMN_PX).floor();
     let mut out = vec![];
@@ -46,6 +50,20 @@ pub(crate) fn line(points: &[[f64; 2]]) -> Vec<[f64; 2]> {
             }
         }
         from = to;
+    }
+    out
+}
+
+fn steps(points: &[[f64; 2]]) -> Vec<[f64; 2]> {
+    let mut out: Vec<[f64; 2]> = vec![];
+    for (k, p) in points.iter().enumerate() {
+        let step = out
+            .last()
+            .map_or(f64::NAN, |last| (p[0] - last[0]).hypot(p[1] - last[1]));
+        // NaN on either side is kept: it begins or breaks a line
+        if step.is_nan() || step >= COLUMN_PX || k + 1 == points.len() {
+            out.push(*p);
+        }
     }
     out
 }
@@ -80,6 +98,21 @@ mod tests {
         assert!(thin.iter().any(|p| (p[1] - 500.0).abs() < 1e-12));
         assert_eq!(thin.iter().filter(|p| p[1].is_nan()).count(), 1);
         assert_eq!(thin[0].map(f64::to_bits), all[0].map(f64::to_bits));
+    }
+
+    /// A circle that is run through a hundred times is its circumference in half pixels each time.
+    #[test]
+    fn a_line_to_and_fro_loses_its_short_steps() {
+        let all: Vec<[f64; 2]> = (0..100_000)
+            .map(|k| f64::from(k) * 2e-2 * std::f64::consts::PI)
+            .map(|a| [10.0 * a.cos(), 10.0 * a.sin()])
+            .collect();
+        let thin = line(&all);
+        assert!(thin.len() <= all.len() && thin.len() > 1000);
+        let still = vec![[3.0, 4.0]; 5000];
+        let mut back = still.clone();
+        back[2500] = [2.9, 4.0];
+        assert_eq!(line(&back).len(), 2);
     }
 
     #[test]
