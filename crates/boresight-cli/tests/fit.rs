@@ -11,7 +11,7 @@ use serde_json::Value;
 
 type Done = Result<(), Box<dyn std::error::Error>>;
 
-/// sigma_HSF (arcsec), tau (s), sigma_TN (arcsec) about x, y, z.
+/// `sigma_HSF` (arcsec), `tau` (s), `sigma_TN` (arcsec) about x, y, z.
 const TRUTH: [[f64; 3]; 3] = [[3.0, 25.0, 4.0], [2.0, 60.0, 2.5], [20.0, 12.0, 40.0]];
 
 fn boresight() -> Command {

@@ -30,6 +30,9 @@ pub const BANDS_HZ: [f64; 3] = [3e-3, 10e-3, 100e-3];
 /// Share of the measured standard deviation from which the reference's own error is worth a word.
 const REFERENCE_SHARE: f64 = 0.1;
 
+/// Share of the measured standard deviation below which a model has no error but rounding.
+const SILENT: f64 = 1e-6;
+
 /// Decibels of a natural logarithm.
 const DB: f64 = 10.0 * std::f64::consts::LOG10_E;
 
@@ -143,6 +146,15 @@ pub fn compare(
     let mut compared = vec![];
     for ((flight, model), first) in flights.iter().zip(&models).zip(first) {
         let name = name_of(model);
+        let silent = [0, 1, 2].map(|axis| std_of(&first[axis]) <= SILENT * std_of(&kept[axis]));
+        if silent == [true; 3] {
+            return Err(ComparisonError::NoNoise { model: name });
+        }
+        for (axis, _) in AXES.iter().zip(silent).filter(|(_, silent)| *silent) {
+            notes.push(format!(
+                "{name} has no error about {axis}: nothing to hold against"
+            ));
+        }
         progress(&format!("{} draws of {name}", settings.draws));
         let draws = |distortion: bool| {
             ensemble(&plans, settings.draws, |draw| {
@@ -160,7 +172,7 @@ pub fn compare(
                 ModelKind::Hem => ComparedKind::Hem,
             },
             stars: flight.stars(),
-            axes: standings(&axes, &measured, &first),
+            axes: standings(&axes, &measured, &first, silent),
         });
         flown.push(Flown {
             name,
@@ -226,8 +238,13 @@ fn name_of(model: &Model) -> String {
     }
 }
 
-fn standings(drawn: &[Ensemble; 3], measured: &[Psd; 3], first: &[Vec<f64>; 3]) -> ComparedAxes {
-    let axis = |i: usize| axis(&drawn[i], &measured[i], &first[i]);
+fn standings(
+    drawn: &[Ensemble; 3],
+    measured: &[Psd; 3],
+    first: &[Vec<f64>; 3],
+    silent: [bool; 3],
+) -> ComparedAxes {
+    let axis = |i: usize| axis(&drawn[i], &measured[i], &first[i], silent[i]);
     ComparedAxes {
         x: axis(0),
         y: axis(1),
@@ -235,12 +252,12 @@ fn standings(drawn: &[Ensemble; 3], measured: &[Psd; 3], first: &[Vec<f64>; 3]) 
     }
 }
 
-fn axis(drawn: &Ensemble, measured: &Psd, first: &[f64]) -> ComparedAxis {
-    let whole = drawn.standing(measured, 0, |_| true);
+fn axis(drawn: &Ensemble, measured: &Psd, first: &[f64], silent: bool) -> ComparedAxis {
+    let whole = drawn.standing(measured, 0, |_| !silent);
     let mut from_hz = 0.0;
     let mut bands = vec![];
     for to_hz in BANDS_HZ.map(Some).into_iter().chain([None]) {
-        let inside = |f: f64| f >= from_hz && to_hz.is_none_or(|to| f < to);
+        let inside = |f: f64| !silent && f >= from_hz && to_hz.is_none_or(|to| f < to);
         let standing = drawn.standing(measured, 0, inside);
         bands.push(ComparedBand {
             from_hz,

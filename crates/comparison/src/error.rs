@@ -51,6 +51,14 @@ pub enum ComparisonError {
         /// Draws asked for.
         got: u64,
     },
+    /// A model without any error.
+    #[error(
+        "{model} declares no noise, distortion or effect that shows in an attitude: its draws are all alike"
+    )]
+    NoNoise {
+        /// Its name.
+        model: String,
+    },
     /// Numbers of the model that make no camera.
     #[error("model: {0}")]
     Camera(#[from] CameraError),

@@ -314,10 +314,16 @@ fn notes(fit: &Fit, cost: f64) -> Vec<String> {
         let note = match estimate {
             Estimate::Estimated { .. } => continue,
             Estimate::UpperBound { limit, reason } => {
-                format!("{name} is at most {limit:.4} {unit} (95 %): {reason}")
+                format!(
+                    "{name} is at most {} {unit} (95 %): {reason}",
+                    short(*limit)
+                )
             }
             Estimate::LowerBound { limit, reason } => {
-                format!("{name} is at least {limit:.4} {unit} (95 %): {reason}")
+                format!(
+                    "{name} is at least {} {unit} (95 %): {reason}",
+                    short(*limit)
+                )
             }
             Estimate::Undetermined { reason } => {
                 format!("the data do not tell {name}: {reason}")
@@ -331,6 +337,15 @@ fn notes(fit: &Fit, cost: f64) -> Vec<String> {
         ));
     }
     notes
+}
+
+/// Four figures, and no decimals beyond them.
+fn short(value: f64) -> String {
+    match value {
+        v if v >= 1000.0 => format!("{v:.0}"),
+        v if v >= 1.0 => format!("{v:.2}"),
+        v => format!("{v:.4}"),
+    }
 }
 
 /// The model that `simulate` and `compare` read.

@@ -316,3 +316,81 @@ fn ladder(t_s: &[f64], fs_hz: f64) -> Result<Vec<LombScargle>, SpectraError> {
     }
     Ok(rungs)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// 4000 samples, of which 1 % are missing one by one and three in a row: bridged, so that the lowest bins
+    /// are those of the whole span, and what is laid out of a straight line is the line.
+    #[test]
+    fn short_holes_are_bridged_by_straight_lines() {
+        let t: Vec<f64> = (0..4000).map(|k| 0.5 * f64::from(k)).collect();
+        let line: Vec<f64> = t.iter().map(|t| 3.0 - 0.2 * t).collect();
+        let mut mask = line.clone();
+        for k in (50..4000).step_by(100) {
+            mask[k] = f64::NAN;
+        }
+        mask[2001..2004].fill(f64::NAN);
+        let plan = Spectrum::new(&t, &mask).unwrap();
+        assert!(!plan.irregular());
+        let laid = plan.laid(&mask);
+        assert_eq!(laid.len(), line.len());
+        let worst = laid
+            .iter()
+            .zip(&line)
+            .map(|(a, b)| (a - b).abs())
+            .fold(0.0, f64::max);
+        assert!(worst < 1e-10, "{worst}");
+        assert!((plan.of(&mask).unwrap().frequency_hz[0] - 1.0 / 2000.0).abs() < 1e-9);
+    }
+
+    /// A tenth missing is too much to be made up: runs stay apart.
+    #[test]
+    fn many_holes_stay_holes() {
+        let t: Vec<f64> = (0..4000).map(f64::from).collect();
+        let mask: Vec<f64> = (0..4000)
+            .map(|k| {
+                if k % 400 < 40 {
+                    f64::NAN
+                } else {
+                    f64::from(k % 7)
+                }
+            })
+            .collect();
+        let plan = Spectrum::new(&t, &mask).unwrap();
+        assert!(!plan.irregular());
+        assert!((plan.of(&mask).unwrap().frequency_hz[0] - 1.0 / 360.0).abs() < 1e-9);
+    }
+
+    /// White noise of variance 4 at irregular times has 2 sigma^2 / fs = 8 / fs at any frequency: the mean of
+    /// some 20 averages of 2 to 60 degrees of freedom is within a tenth of it.
+    #[test]
+    fn irregular_white_noise_is_level() {
+        let mut state = 1_u64;
+        let mut uniform = || {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            ((state >> 11) as f64 + 0.5) / (1_u64 << 53) as f64
+        };
+        let t: Vec<f64> = (0..3000).map(|k| f64::from(k) + 0.6 * uniform()).collect();
+        // the sum of twelve uniforms has variance 1
+        let x: Vec<f64> = (0..3000)
+            .map(|_| 2.0 * ((0..12).map(|_| uniform()).sum::<f64>() - 6.0))
+            .collect();
+        let plan = Spectrum::new(&t, &x).unwrap();
+        assert!(plan.irregular());
+        let psd = plan.of(&x).unwrap();
+        let weight: f64 = psd.dof.iter().sum();
+        let mean: f64 = psd
+            .psd
+            .iter()
+            .zip(&psd.dof)
+            .map(|(p, dof)| p * dof)
+            .sum::<f64>()
+            / weight;
+        // 2 degrees of freedom for each of some 600 bins: 1 +- 0.04
+        assert!((mean * plan.fs_hz() / 8.0 - 1.0).abs() < 0.2, "{mean}");
+    }
+}

@@ -56,13 +56,25 @@ fn of_model(out: &mut String, model: &ComparedModel, draws: u64) {
             axis.bands.get(k).map_or_else(String::new, error)
         });
     }
-    row("cost", &|axis| format!("{:.3}", axis.log_psd_cost));
+    row("cost", &|axis| number(axis.log_psd_cost));
     row("bins above 3 sigma", &|axis| {
-        format!("{:.1} %", 100.0 * axis.above_3_sigma)
+        if axis.above_3_sigma.is_finite() {
+            format!("{:.1} %", 100.0 * axis.above_3_sigma)
+        } else {
+            "-".to_owned()
+        }
     });
     row("standard deviation, arcsec", &|axis| {
         format!("{:.3}", axis.model_std_arcsec)
     });
+}
+
+fn number(value: f64) -> String {
+    match value {
+        v if !v.is_finite() => "-".to_owned(),
+        v if v >= 1e5 => format!("{v:.2e}"),
+        v => format!("{v:.3}"),
+    }
 }
 
 fn ends(band: &ComparedBand) -> String {
