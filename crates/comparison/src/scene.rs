@@ -203,6 +203,21 @@ mod tests {
         assert!(scene.rate_deg_s.iter().flatten().all(|w| w.abs() < 1e-12));
     }
 
+    /// A turn at a constant rate about one axis is a straight line: no motion is left but rounding, 1e-9 arcsec.
+    #[test]
+    fn a_steady_turn_leaves_no_motion() {
+        let camera = Camera::from_fov_deg([1024, 1024], [20.0, 20.0]).unwrap();
+        let t_s: Vec<f64> = (0..500).map(f64::from).collect();
+        let turn = UniformRotation {
+            rate_rad_s: nalgebra::Vector3::new(1e-4, 0.0, 0.0),
+            ..UniformRotation::default()
+        };
+        let scene = Scene::new(&Pbm::new(camera), &turn, &t_s, None);
+        let [x, ..] = scene.motion.unwrap();
+        assert!(x.psd.iter().all(|p| *p < 1e-12), "{:?}", x.psd);
+        assert!((scene.rate_deg_s[0][3] - 1e-4_f64.to_degrees()).abs() < 1e-12);
+    }
+
     #[test]
     fn a_line_is_taken_away_whole() {
         let t: Vec<f64> = (0..50).map(|k| 100.0 + f64::from(k)).collect();
