@@ -36,6 +36,16 @@ pub(crate) enum Command {
         after_help = "Examples:\n  boresight simulate fixtures/scenarios/example.toml --out bundle/\n  boresight simulate --preset iht --out bundle/\n  boresight simulate --print-preset pitt > my.toml"
     )]
     Simulate(Simulate),
+    /// Fly models along the measured motion, and hold their spectra against the measured ones
+    #[command(
+        after_help = "Examples:\n  boresight compare model.toml telemetry/ --out figures/\n  boresight compare pbm.toml telemetry/ --with hem.toml --out figures/ --draws 200"
+    )]
+    Compare(Compare),
+    /// Fit white noise and a Gauss-Markov process to each axis: a hybrid empirical model
+    #[command(
+        after_help = "Examples:\n  boresight fit telemetry/\n  boresight fit telemetry/ --out hem.toml --exclude-hz 0.03,0.04"
+    )]
+    Fit(Fit),
 }
 
 #[derive(Debug, Args)]
@@ -68,6 +78,47 @@ pub(crate) struct Simulate {
     /// How tables are written
     #[arg(long, value_enum, default_value_t = Tables::CsvGz)]
     pub(crate) tables: Tables,
+    /// Folder for pictures of the run: field, centroid error, motion, tracks
+    #[arg(long, value_name = "DIR")]
+    pub(crate) figures: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Compare {
+    /// What is believed of the tracker: a model file
+    #[arg(value_name = "MODEL.toml")]
+    pub(crate) model: PathBuf,
+    /// What was measured: a bundle folder with a reference
+    #[arg(value_name = "BUNDLE")]
+    pub(crate) bundle: PathBuf,
+    /// Folder for compare.json, psd.csv, draws.csv and the figures; nothing is written without it
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
+    /// Draws of each model
+    #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u64).range(8..))]
+    pub(crate) draws: u64,
+    /// Seed of all random numbers
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub(crate) seed: u64,
+    /// Another model beside the first; may be given several times
+    #[arg(long = "with", value_name = "MODEL.toml")]
+    pub(crate) others: Vec<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Fit {
+    /// What was measured: a bundle folder with a reference
+    #[arg(value_name = "BUNDLE")]
+    pub(crate) bundle: PathBuf,
+    /// File for the model, which `simulate` and `compare` read
+    #[arg(long, value_name = "MODEL.toml")]
+    pub(crate) out: Option<PathBuf>,
+    /// Frequencies used, Hz [default: all]
+    #[arg(long, value_name = "LOW,HIGH", value_parser = range)]
+    pub(crate) band_hz: Option<[f64; 2]>,
+    /// Frequencies left out, Hz, such as those of a line; may be given several times
+    #[arg(long, value_name = "LOW,HIGH", value_parser = range)]
+    pub(crate) exclude_hz: Vec<[f64; 2]>,
 }
 
 #[derive(Clone, Copy, Debug, clap::ValueEnum)]
@@ -78,6 +129,18 @@ pub(crate) enum Tables {
     CsvGz,
     /// Parquet
     Parquet,
+}
+
+fn range(text: &str) -> Result<[f64; 2], String> {
+    let ends = text
+        .split_once(',')
+        .map(|(low, high)| (low.trim().parse(), high.trim().parse()));
+    match ends {
+        Some((Ok(low), Ok(high))) if 0.0 <= low && low < high && f64::is_finite(high) => {
+            Ok([low, high])
+        }
+        _ => Err("two numbers LOW,HIGH with 0 <= LOW < HIGH are needed".to_owned()),
+    }
 }
 
 fn threads(text: &str) -> Result<usize, String> {

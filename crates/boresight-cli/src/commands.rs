@@ -1,4 +1,6 @@
 //! One module a command.
 
 pub(crate) mod close;
+pub(crate) mod compare;
+pub(crate) mod fit;
 pub(crate) mod simulate;

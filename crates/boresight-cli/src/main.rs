@@ -31,6 +31,8 @@ fn main() -> ExitCode {
     }
     let done = match &arguments.command {
         Command::Close(options) => commands::close::run(options, &console),
+        Command::Compare(options) => commands::compare::run(options, &console),
+        Command::Fit(options) => commands::fit::run(options, &console),
         Command::Simulate(options) => commands::simulate::run(options, &console),
     };
     match done {

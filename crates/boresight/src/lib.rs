@@ -9,12 +9,16 @@
 //! | [`distortion`] | low spatial frequency error: distortion residual polynomials |
 //! | [`centroid`] | high spatial frequency error, and centroids of pixel windows |
 //! | [`quest`] | attitude from star vectors, one frame or a batch |
+//! | [`spectra`] | one-sided densities, coherence, lines, Allan deviations of error series |
+//! | [`fogm_fit`] | first-order Gauss-Markov processes: simulation, densities, fits |
 //! | [`star_tracker`] | the physics-based model: truth attitude in, centroids and attitude out |
 //! | [`effects`] | the catalogue of effects: how each acts, and what it leaves in a residual |
 //! | [`telemetry`] | bundles, models and results on disk |
 //! | [`scenarios`] | motions and skies: bundles simulated from a scenario |
 //! | [`closed_loop`] | residual, cause, better model |
-//! | [`report`] | text from finished results |
+//! | [`comparison`] | residual, spectrum, fitted process and ensemble of a model beside a bundle |
+//! | [`figures`] | plots as SVG text from plain numbers |
+//! | [`report`] | text and pictures from finished results |
 //!
 //! # One frame of a star tracker
 //!
@@ -62,8 +66,8 @@
 
 #[doc(inline)]
 pub use {
-    centroid, closed_loop, distortion, effects, focal_plane, quest, report, scenarios,
-    star_tracker, telemetry,
+    centroid, closed_loop, comparison, distortion, effects, figures, focal_plane, fogm_fit, quest,
+    report, scenarios, spectra, star_tracker, telemetry,
 };
 
 /// The names that almost every program needs.

@@ -12,7 +12,7 @@
 use std::ops::Range;
 
 use effects::{AttitudeRows, Candidate};
-use focal_plane::{ARCSEC_PER_RAD, AttitudeSeries, AttitudeSource, VectorsMut, rotation_vector};
+use focal_plane::{ARCSEC_PER_RAD, AttitudeResidual, AttitudeSeries, AttitudeSource, VectorsMut};
 use nalgebra::{DMatrix, UnitQuaternion};
 use star_tracker::Disturbance;
 
@@ -56,20 +56,19 @@ impl AttitudeData {
             count: Default::default(),
             outside_reference: 0,
         };
-        for (&t, q) in t_s.iter().zip(q) {
-            let Some(true_attitude) = reference.attitude(t) else {
-                data.outside_reference += 1;
-                continue;
-            };
-            let theta = rotation_vector(q, &true_attitude) * ARCSEC_PER_RAD;
+        let residual = AttitudeResidual::against(t_s, q, reference);
+        for &t in &residual.t_s {
             let rate = reference.rate_rad_s(t).unwrap_or_default();
-            data.t_s.push(t);
             for axis in 0..3 {
-                data.theta[axis].push(theta[axis]);
                 data.rate[axis].push(rate[axis]);
                 data.outlier[axis].push(false);
             }
         }
+        data.theta = residual
+            .theta_rad
+            .map(|axis| axis.iter().map(|theta| theta * ARCSEC_PER_RAD).collect());
+        data.t_s = residual.t_s;
+        data.outside_reference = residual.outside_reference;
         data
     }
 

@@ -15,8 +15,9 @@
 //! Source: [M23] Eq. 12 for the attitude; the mean direction is the
 //! least-squares one for small errors.
 
-use focal_plane::{Camera, Pixel, StarFrames};
+use focal_plane::{Camera, Pixel, StarFrames, Vectors};
 use nalgebra::{UnitQuaternion, Vector3};
+use star_tracker::solve_frames;
 
 /// Alternations; each shrinks the error of a star that joins late by about the
 /// share of its frames among all.
@@ -38,25 +39,22 @@ pub(crate) fn attitudes(
     star: &[usize],
     direction: &[Option<Vector3<f64>>],
 ) -> Vec<Option<UnitQuaternion<f64>>> {
-    let (mut w, mut v, mut weights) = (Vec::new(), Vec::new(), Vec::new());
-    (0..frames.frames())
-        .map(|k| {
-            w.clear();
-            v.clear();
-            for row in frames.rows_of(k) {
-                if let Some(u) = direction[star[row]] {
-                    w.push(camera.direction(Pixel {
-                        x: frames.x_px[row],
-                        y: frames.y_px[row],
-                    }));
-                    v.push(u);
-                }
-            }
-            weights.clear();
-            weights.resize(w.len(), 1.0);
-            quest::quest(&w, &v, &weights).ok().map(|s| s.q)
-        })
-        .collect()
+    // A star whose direction is not known yet is NaN: left out.
+    let component = |axis: usize| -> Vec<f64> {
+        star.iter()
+            .map(|&s| direction[s].map_or(f64::NAN, |u| u[axis]))
+            .collect()
+    };
+    let (x, y, z) = (component(0), component(1), component(2));
+    solve_frames(
+        camera,
+        frames,
+        Vectors {
+            x: &x,
+            y: &y,
+            z: &z,
+        },
+    )
 }
 
 /// Directions and attitudes when neither is given. `star[row] < stars`.

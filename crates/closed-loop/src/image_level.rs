@@ -293,7 +293,7 @@ pub(crate) fn effects(level: &ImageLevel, formed: &Formed) -> Vec<(FoundEffect, 
     }
     if level.effective_psf.stands {
         let mut widths: Vec<f64> = formed.fwhm_px.clone();
-        let fwhm = crate::robust::median(&mut widths).unwrap_or(f64::NAN);
+        let fwhm = spectra::robust::median(&mut widths).unwrap_or(f64::NAN);
         let n = widths.len().max(1) as f64;
         let scatter = (widths.iter().map(|w| (w - fwhm).powi(2)).sum::<f64>() / n).sqrt();
         out.push(entry(

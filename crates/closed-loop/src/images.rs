@@ -116,7 +116,7 @@ pub(crate) const MAD_SCALE: f64 = 1.482_602_218_505_602;
 
 /// Median of the finite values.
 pub(crate) fn robust_median(mut values: Vec<f64>) -> Option<f64> {
-    crate::robust::median(&mut values)
+    spectra::robust::median(&mut values)
 }
 
 /// Learns dark map and spots from the windows, outside each fold and on all

@@ -28,7 +28,6 @@ mod images;
 mod motion;
 mod nuisance;
 mod reference_wander;
-mod robust;
 mod search;
 mod selection;
 mod situation;

@@ -9,11 +9,8 @@ use focal_plane::{AttitudeSeries, Camera, Series};
 use telemetry::{Bundle, Model};
 
 use crate::error::CloseError;
-use crate::star_data::{Star, median_step};
+use crate::star_data::Star;
 
-/// A step longer than this many median steps is a gap: at least one sample is
-/// missing, and nothing is interpolated across.
-const GAP_STEPS: f64 = 1.9;
 /// Focal lengths that differ by more than this share are different trackers;
 /// rounded numbers in files differ by less.
 const FOCAL_TOLERANCE: f64 = 2e-3;
@@ -113,15 +110,7 @@ impl<'a> Situation<'a> {
 /// The better estimate as a series; rates given with it, or the gyro's where its
 /// samples fall on the same instants, shape the path between samples.
 fn reference(bundle: &Bundle) -> Option<AttitudeSeries> {
-    let table = bundle.reference.as_ref()?;
-    let gap = GAP_STEPS * median_step(&table.t_s)?;
-    AttitudeSeries::new(
-        table.t_s.clone(),
-        table.q.clone(),
-        table.rates_rad_s.clone(),
-    )
-    .ok()
-    .map(|series| series.with_max_gap_s(gap))
+    bundle.reference.as_ref()?.series_with_gaps().ok()
 }
 
 fn camera(model: &Model, bundle: &Bundle) -> Result<Camera, CloseError> {

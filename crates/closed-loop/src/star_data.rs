@@ -350,5 +350,5 @@ impl StarData {
 /// Median of the steps of a time grid, s.
 pub(crate) fn median_step(t_s: &[f64]) -> Option<f64> {
     let mut steps: Vec<f64> = t_s.windows(2).map(|w| w[1] - w[0]).collect();
-    crate::robust::median(&mut steps)
+    spectra::robust::median(&mut steps)
 }

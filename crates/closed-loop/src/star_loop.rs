@@ -27,13 +27,13 @@ use crate::images::{self, Formed};
 use crate::motion;
 use crate::nuisance::StarNuisance;
 use crate::reference_wander::{self, REFERENCE_ERROR};
-use crate::robust;
 use crate::search::{Found, amplitudes, borrowed, fit};
 use crate::selection::columns_of;
 use crate::situation::Situation;
 use crate::star_data::{Inputs, Star, StarData, median_step};
 use crate::star_design::{StarEvidence, rotation_of};
 use crate::star_search::{self, Wander};
+use spectra::robust;
 
 /// Fewest frames: every fold needs data to be predicted from.
 const MIN_FRAMES: usize = 4;

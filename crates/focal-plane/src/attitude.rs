@@ -13,6 +13,7 @@
 //! and 143 to 146 (exponential, left Jacobian and inverse).
 
 mod jacobian;
+mod residual;
 mod rotate;
 mod series;
 mod uniform;
@@ -22,6 +23,7 @@ use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use crate::QuaternionsMut;
 
 pub use jacobian::{so3_left_jacobian, so3_left_jacobian_inverse};
+pub use residual::AttitudeResidual;
 pub use rotate::{rotate_each_into, rotate_into};
 pub(crate) use series::locate;
 pub use series::{AttitudeCursor, AttitudeError, AttitudeSeries};

@@ -59,9 +59,9 @@ mod star;
 mod units;
 
 pub use attitude::{
-    AttitudeCursor, AttitudeError, AttitudeSeries, AttitudeSource, UniformRotation,
-    rotate_each_into, rotate_into, rotation_from_vector, rotation_vector, so3_left_jacobian,
-    so3_left_jacobian_inverse,
+    AttitudeCursor, AttitudeError, AttitudeResidual, AttitudeSeries, AttitudeSource,
+    UniformRotation, rotate_each_into, rotate_into, rotation_from_vector, rotation_vector,
+    so3_left_jacobian, so3_left_jacobian_inverse,
 };
 pub use camera::{Camera, CameraError};
 pub use catalogue::{Catalogue, CatalogueError, CatalogueStar};

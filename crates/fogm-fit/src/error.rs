@@ -78,6 +78,22 @@ pub enum FogmError {
         /// Number of missing samples.
         missing: usize,
     },
+    /// Times and samples that differ in number.
+    #[error("{times} times and {samples} samples given")]
+    Unequal {
+        /// Number of times.
+        times: usize,
+        /// Number of samples.
+        samples: usize,
+    },
+    /// Time stands still or goes back.
+    #[error("time {time_s} s of sample {index} is not after the one before")]
+    NotIncreasing {
+        /// Its place among the samples present, from 0.
+        index: usize,
+        /// The time there, s.
+        time_s: f64,
+    },
     /// The optimiser did not return a finite minimum.
     #[error("no finite minimum of the cost found")]
     NotConverged,

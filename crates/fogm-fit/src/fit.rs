@@ -30,6 +30,7 @@ use crate::process::positive;
 use crate::{Convention, FogmError};
 use bins::{Bins, Chosen};
 use exact::Exact;
+use information::Spread;
 use likelihood::{Likelihood, Logs, place_of};
 use surface::{Best, Plane, Region};
 use whittle::Whittle;
@@ -191,8 +192,8 @@ pub fn fit_series(y: &[f64], fs_hz: f64, options: &FitOptions) -> Result<Fit, Fo
             whittle.white(),
             &plane,
             &region,
-            &bins,
-            1.0,
+            information::spread(&bins, surface::logs_at(region.best, &plane), 1.0),
+            surface::logs_at(region.best, &plane),
             Method::Spectrum,
             log_psd,
         ));
@@ -214,11 +215,132 @@ pub fn fit_series(y: &[f64], fs_hz: f64, options: &FitOptions) -> Result<Fit, Fo
         exact.white(),
         &plane,
         &region,
-        &bins,
-        1.0,
+        information::spread(&bins, surface::logs_at(region.best, &plane), 1.0),
+        surface::logs_at(region.best, &plane),
         Method::TimeDomain,
         log_psd,
     ))
+}
+
+/// Part of a step by which an interval may differ and still count as one step.
+const STEP_TOLERANCE: f64 = 0.05;
+/// Longest hole that the starting values of irregular samples see, steps.
+const LONGEST_HOLE: f64 = 64.0;
+
+/// Fits samples at any times: irregular, or with holes of any length. `sigma_tn` is the white noise of
+/// one sample.
+///
+/// The likelihood is exact at every time (intervals within 5 % of the median one count as that).
+/// Errors are those of the profile likelihood, since no spectrum of such samples has a closed
+/// expectation; where every interval is one step this is [`fit_series`].
+///
+/// ```
+/// use fogm_fit::{Fogm, FogmWhite, FitOptions, fit_times};
+/// use rand_xoshiro::{Xoshiro256PlusPlus, rand_core::SeedableRng};
+///
+/// // a sample every second or two, and an hour without any
+/// let truth = FogmWhite::new(Fogm::new(3.58, 20.0)?, 2.0)?;
+/// let mut rng = Xoshiro256PlusPlus::seed_from_u64(4);
+/// let (mut t, mut state) = (0.0, truth.fogm().start(&mut rng));
+/// let (mut t_s, mut y) = (vec![], vec![]);
+/// for k in 0..4000_u32 {
+///     let dt = if k == 2000 { 3600.0 } else { 1.0 + f64::from(k % 7) / 7.0 };
+///     t += dt;
+///     truth.fogm().step(&mut state, dt, &mut rng);
+///     t_s.push(t);
+///     y.push(truth.measure(state, &mut rng));
+/// }
+/// let fit = fit_times(&t_s, &y, &FitOptions::default())?;
+/// let [low, high] = fit.tau_s.interval().expect("6000 s tell a correlation time of 20 s");
+/// assert!(low < 20.0 && 20.0 < high);
+/// # Ok::<(), fogm_fit::FogmError>(())
+/// ```
+///
+/// # Errors
+///
+/// As [`fit_series`]; [`FogmError::NotIncreasing`] times, [`FogmError::LengthMismatch`],
+/// [`FogmError::Gaps`] with a choice of frequencies.
+pub fn fit_times(t_s: &[f64], y: &[f64], options: &FitOptions) -> Result<Fit, FogmError> {
+    if t_s.len() != y.len() {
+        return Err(FogmError::Unequal {
+            times: t_s.len(),
+            samples: y.len(),
+        });
+    }
+    present(y)?;
+    let (t_s, y): (Vec<f64>, Vec<f64>) = t_s
+        .iter()
+        .zip(y)
+        .filter(|(_, y)| !y.is_nan())
+        .map(|(t, y)| (*t, *y))
+        .unzip();
+    let dt_s = typical_step(&t_s)?;
+    let one_step = |w: &[f64]| ((w[1] - w[0]) / dt_s - 1.0).abs() <= STEP_TOLERANCE;
+    if t_s.windows(2).all(one_step) {
+        return fit_series(&y, 1.0 / dt_s, options);
+    }
+    if !options.all_frequencies() {
+        return Err(FogmError::Gaps {
+            missing: t_s.windows(2).filter(|w| !one_step(w)).count(),
+        });
+    }
+    // starting values from whole steps, holes cut short and filled
+    let mut rough = vec![y[0]];
+    for (w, v) in t_s.windows(2).zip(&y[1..]) {
+        let steps = ((w[1] - w[0]) / dt_s).round().clamp(1.0, LONGEST_HOLE);
+        let mut k = 1.0;
+        while k < steps {
+            rough.push(f64::NAN);
+            k += 1.0;
+        }
+        rough.push(*v);
+    }
+    let bins = Bins::of_series(&filled(&rough), 1.0 / dt_s, &options.chosen())?;
+    let log_psd = log_psd::fit_bins(&bins, Convention::Consistent, 1.0)?;
+    let plane = Plane::new(dt_s, t_s[t_s.len() - 1] - t_s[0] + dt_s);
+    let offset = match options.mean {
+        Mean::Free => y.iter().sum::<f64>() / y.len() as f64,
+        Mean::Zero => 0.0,
+    };
+    let y = y.iter().map(|v| v - offset).collect();
+    let exact = Exact::at_times(&t_s, y, dt_s, STEP_TOLERANCE, options.mean == Mean::Free);
+    let (start, _) = place_of(log_psd.minimum.map(f64::ln), dt_s);
+    let mut best = surface::climb(&exact, &plane, start);
+    for place in surface::survey(&exact, &plane, 2) {
+        let other = surface::climb(&exact, &plane, place);
+        if other.ln_l > best.ln_l {
+            best = other;
+        }
+    }
+    let region = surface::region(&exact, &plane, best);
+    let logs = surface::logs_at(region.best, &plane);
+    Ok(report(
+        &exact,
+        exact.white(),
+        &plane,
+        &region,
+        None,
+        logs,
+        Method::TimeDomain,
+        log_psd,
+    ))
+}
+
+/// Mean of the intervals near the median one.
+fn typical_step(t_s: &[f64]) -> Result<f64, FogmError> {
+    let increasing = |w: &[f64]| w[1] > w[0] && w[0].is_finite() && w[1].is_finite();
+    if let Some(index) = t_s.windows(2).position(|w| !increasing(w)) {
+        return Err(FogmError::NotIncreasing {
+            index: index + 1,
+            time_s: t_s[index + 1],
+        });
+    }
+    let mut steps: Vec<f64> = t_s.windows(2).map(|w| w[1] - w[0]).collect();
+    let half = steps.len() / 2;
+    let median = *steps.select_nth_unstable_by(half, f64::total_cmp).1;
+    let near = |s: &&f64| (**s / median - 1.0).abs() <= STEP_TOLERANCE;
+    let count = steps.iter().filter(near).count();
+    Ok(steps.iter().filter(near).sum::<f64>() / count as f64)
 }
 
 /// Fits a one-sided spectrum with its degrees of freedom.
@@ -242,8 +364,8 @@ pub fn fit_psd(psd: &Psd, options: &FitOptions) -> Result<Fit, FogmError> {
         whittle.white(),
         &plane,
         &region,
-        &bins,
-        correlation,
+        information::spread(&bins, surface::logs_at(region.best, &plane), correlation),
+        surface::logs_at(region.best, &plane),
         Method::Spectrum,
         log_psd,
     ))
@@ -267,17 +389,16 @@ fn report<L: Likelihood>(
     white: f64,
     plane: &Plane,
     region: &Region,
-    bins: &Bins,
-    correlation: f64,
+    spread: Option<Spread>,
+    logs: Logs,
     method: Method,
     log_psd: LogPsdFit,
 ) -> Fit {
-    let logs = surface::logs_at(region.best, plane);
     let fogm = surface::fogm_alone(likelihood, plane).ln_l;
     // as many independent numbers as the weight says
     let ln_n = (2.0 * likelihood.weight()).ln();
     let choice = choose([white, fogm, region.best.ln_l], ln_n);
-    let [sigma_hsf, tau_s, sigma_tn] = estimates(logs, plane, region, bins, correlation);
+    let [sigma_hsf, tau_s, sigma_tn] = estimates(logs, plane, region, spread);
     Fit {
         sigma_hsf,
         tau_s,
@@ -311,14 +432,8 @@ fn choose(ln_l: [f64; 3], ln_n: f64) -> Choice {
     }
 }
 
-fn estimates(
-    logs: Logs,
-    plane: &Plane,
-    region: &Region,
-    bins: &Bins,
-    correlation: f64,
-) -> [Estimate; 3] {
-    let spread = information::spread(bins, logs, correlation);
+/// `spread` is what the spectrum tells at best; without it errors follow from the intervals.
+fn estimates(logs: Logs, plane: &Plane, region: &Region, spread: Option<Spread>) -> [Estimate; 3] {
     std::array::from_fn(|i| {
         let range = region.ranges[i];
         let (low, high) = (range.low.exp(), range.high.exp());

@@ -1,7 +1,7 @@
 //! First-order Gauss-Markov processes: exact simulation, spectra, and fits to them.
 //!
 //! [`FogmWhite`] is the process of \[M23\] section 3, a FOGM and white noise; [`sampled`] its density;
-//! `fit_series` and `fit_psd` find its parameters. Sigmas are true standard deviations of one sample;
+//! `fit_series`, `fit_times` and `fit_psd` find its parameters. Sigmas are true standard deviations of one sample;
 //! [`printed_sigma_hsf`] leads to the numbers of the paper. Simulation and densities need none of
 //! the default feature `fit`.
 //!
@@ -23,6 +23,6 @@ pub use error::FogmError;
 #[cfg(feature = "fit")]
 pub use fit::{
     Choice, Estimate, Fit, FitOptions, HANN_BIN_CORRELATION, LogPsdFit, Mean, Method, Preferred,
-    Reason, fit_log_psd, fit_psd, fit_series,
+    Reason, fit_log_psd, fit_psd, fit_series, fit_times,
 };
 pub use process::{Fogm, FogmWhite};

@@ -1,8 +1,18 @@
-//! Text from finished results.
+//! Text and pictures from finished results.
 //!
 //! Nothing is computed here: the crate can be deleted without changing a number.
 #![forbid(unsafe_code)]
 
+mod compare_figures;
+mod compare_tables;
+mod compare_text;
+mod fit_text;
+mod scene_figures;
 mod text;
 
+pub use compare_figures::compare_figures;
+pub use compare_tables::compare_tables;
+pub use compare_text::compare_summary;
+pub use fit_text::fit_summary;
+pub use scene_figures::scene_figures;
 pub use text::summary;

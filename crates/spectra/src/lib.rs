@@ -13,6 +13,7 @@
 //! | irregular samples | [`LombScargle`] |
 //! | equal steps in the logarithm of frequency | [`LogAverage`] |
 //! | drift against averaging time | [`Allan`] |
+//! | samples that do not belong | [`robust`] |
 //!
 //! Plans are made once and hold the transforms; `make_scratch` hands out memory, and the functions
 //! ending in `_into` allocate nothing. A plan can be shared between threads, each with its own scratch.
@@ -44,6 +45,7 @@ mod log_chi;
 mod lomb_scargle;
 mod multitaper;
 mod psd;
+pub mod robust;
 mod slepian;
 mod welch;
 mod window;

@@ -7,6 +7,7 @@
 //!   with white noise per attitude axis;
 //! - [`Disturbance`], [`Stages`]: the places where an effect may act, in the order of the light;
 //! - [`StarField`], [`CatalogueTracking`]: which stars are tracked;
+//! - [`solve_frames`]: attitudes of frames that were measured;
 //! - [`sigma`]: which sigma is meant; [`stream`]: which random numbers.
 //!
 //! ```
@@ -56,6 +57,7 @@ mod pbm;
 mod quadrature;
 mod rows;
 pub mod sigma;
+mod solve;
 mod star_field;
 mod streams;
 
@@ -65,5 +67,6 @@ pub use hem::{Hem, HemState, k0, k0_as_printed};
 pub use noise::TemporalNoise;
 pub use pbm::{Pbm, Scratch};
 pub use rows::{Measured, Rows};
+pub use solve::solve_frames;
 pub use star_field::{CatalogueTracking, FieldStar, StarField, replacement_box};
 pub use streams::{NoiseStreams, Purpose, stream};

@@ -5,6 +5,7 @@
 //! Source: report format (docs/formats/report.md).
 
 mod axes;
+mod compare;
 
 use std::collections::BTreeMap;
 use std::io::Write as _;
@@ -16,6 +17,11 @@ use crate::{Output, TelemetryError};
 pub use axes::{
     ASSESS_FORMAT, AssessMethod, AssessReport, AxisFit, AxisPrinted, FIT_FORMAT, FitAxes,
     FitReport, PreferredModel, WithSigma,
+};
+
+pub use compare::{
+    COMPARE_FORMAT, CompareReport, ComparedAxes, ComparedAxis, ComparedBand, ComparedKind,
+    ComparedModel, StarSource,
 };
 
 /// The value of `format` in `report.json`.

@@ -12,6 +12,20 @@ use std::collections::BTreeMap;
 use focal_plane::{AttitudeError, AttitudeSeries, Series};
 use nalgebra::{UnitQuaternion, Vector3};
 
+/// A step longer than this many median steps is a gap.
+const GAP_STEPS: f64 = 1.9;
+
+/// Median of the steps of a time grid, s.
+pub(crate) fn median_step(t_s: &[f64]) -> Option<f64> {
+    let mut steps: Vec<f64> = t_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    if steps.is_empty() {
+        return None;
+    }
+    let middle = steps.len() / 2;
+    let (_, &mut median, _) = steps.select_nth_unstable_by(middle, f64::total_cmp);
+    Some(median)
+}
+
 /// Table `attitude`: what the tracker itself reports.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct AttitudeTable {
@@ -53,6 +67,20 @@ impl ReferenceTable {
     /// Times or quaternions that were changed after reading and no longer fit.
     pub fn series(&self) -> Result<AttitudeSeries, AttitudeError> {
         AttitudeSeries::new(self.t_s.clone(), self.q.clone(), self.rates_rad_s.clone())
+    }
+
+    /// The same with its gaps left open: where a step is longer than 1.9 median ones, at least one
+    /// sample is missing, and nothing is interpolated across.
+    ///
+    /// # Errors
+    ///
+    /// As [`series`](Self::series).
+    pub fn series_with_gaps(&self) -> Result<AttitudeSeries, AttitudeError> {
+        let series = self.series()?;
+        Ok(match median_step(&self.t_s) {
+            Some(step_s) => series.with_max_gap_s(GAP_STEPS * step_s),
+            None => series,
+        })
     }
 }
 

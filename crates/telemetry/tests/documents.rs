@@ -5,7 +5,8 @@ mod common;
 use common::repository;
 use serde::{Serialize, de::DeserializeOwned};
 use telemetry::report::{
-    ASSESS_FORMAT, AssessReport, FIT_FORMAT, FitReport, REPORT_FORMAT, Report, Selector,
+    ASSESS_FORMAT, AssessReport, COMPARE_FORMAT, CompareReport, FIT_FORMAT, FitReport,
+    REPORT_FORMAT, Report, Selector, WithSigma,
 };
 use telemetry::{Bundle, EffectValue, MemoryFiles, Model};
 
@@ -86,6 +87,14 @@ fn the_reports_of_the_page() {
     assert!(report.before.attitude_rms_arcsec.is_none());
     let fit: FitReport = round(&examples[1]);
     assert_eq!(fit.format, FIT_FORMAT);
-    let assess: AssessReport = round(&examples[2]);
+    let unknown: WithSigma = round(&examples[2]);
+    assert_eq!(
+        (unknown.value, unknown.interval),
+        (None, Some([Some(541.6), None]))
+    );
+    let compare: CompareReport = round(&examples[3]);
+    assert_eq!(compare.format, COMPARE_FORMAT);
+    assert_eq!(compare.model.axes.x.bands[3].error_db, None);
+    let assess: AssessReport = round(&examples[4]);
     assert_eq!(assess.format, ASSESS_FORMAT);
 }

@@ -1,8 +1,13 @@
 //! `boresight simulate`: a bundle from a scenario.
 
+use std::io::Write as _;
+use std::path::Path;
+
 use anyhow::Context as _;
-use boresight::scenarios::{Scenario, preset, simulate};
-use boresight::telemetry::TableFormat;
+use boresight::comparison::Scene;
+use boresight::report::scene_figures;
+use boresight::scenarios::{Scenario, Simulated, preset, simulate_with_truth};
+use boresight::telemetry::{Output, TableFormat};
 
 use crate::arguments::{Simulate, Tables};
 use crate::console::Console;
@@ -25,7 +30,8 @@ pub(crate) fn run(options: &Simulate, console: &Console) -> anyhow::Result<()> {
         (None, None) => anyhow::bail!("a scenario file or --preset is needed"),
     };
     console.progress("simulating");
-    let bundle = simulate(&scenario)?;
+    let simulated = simulate_with_truth(&scenario, scenario.run.draw)?;
+    let bundle = &simulated.bundle;
     console.progress("writing the bundle");
     let format = match options.tables {
         Tables::Csv => TableFormat::Csv,
@@ -33,6 +39,10 @@ pub(crate) fn run(options: &Simulate, console: &Console) -> anyhow::Result<()> {
         Tables::Parquet => TableFormat::Parquet,
     };
     bundle.write(out, format)?;
+    if let Some(dir) = &options.figures {
+        console.progress("drawing");
+        draw(&simulated, dir)?;
+    }
     let solved = bundle.attitude.as_ref().map_or(0, |a| a.t_s.len());
     let frames = bundle.stars.as_ref().map_or(solved, |s| s.frames());
     let rows = bundle.stars.as_ref().map_or(0, |s| s.rows());
@@ -44,5 +54,27 @@ pub(crate) fn run(options: &Simulate, console: &Console) -> anyhow::Result<()> {
         &serde_json::json!({ "bundle": out.to_string(), "frames": frames, "star_rows": rows })
             .to_string(),
     );
+    Ok(())
+}
+
+/// Pictures of the run; the motion is the reference's where there is one, else the true one.
+fn draw(simulated: &Simulated, dir: &Path) -> anyhow::Result<()> {
+    let bundle = &simulated.bundle;
+    let estimate = match &bundle.reference {
+        Some(reference) => Some(reference.series_with_gaps()?),
+        None => None,
+    };
+    let scene = Scene::new(
+        &simulated.pbm,
+        estimate.as_ref().unwrap_or(&simulated.truth),
+        &simulated.rows.t_s,
+        bundle.stars.as_ref(),
+    );
+    let title = bundle.meta.title.as_deref().unwrap_or("simulated run");
+    let output = Output::new(dir)?;
+    for (name, svg) in scene_figures(&scene, title) {
+        output.write(&name, |to| to.write_all(svg.as_bytes()))?;
+    }
+    output.commit()?;
     Ok(())
 }

@@ -442,8 +442,8 @@ mod measured {
 
     use super::super::geometry::Geometry;
     use super::*;
-    use crate::robust;
     use crate::star_data::Inputs;
+    use spectra::robust;
 
     fn chandra() -> Option<(StarData, WindowTable)> {
         let root = std::env::var_os("BORESIGHT_DATA").map_or_else(

@@ -11,6 +11,7 @@ use crate::config::{Config, nearest};
 use crate::layout::{self, Layout};
 use crate::metadata::read as metadata;
 use crate::table::{RawTable, Setting, csv, parquet};
+use crate::tables::median_step;
 use crate::{ExtraColumns, Files, Metadata, Source, TelemetryError};
 
 /// Name of the metadata's file.
@@ -192,14 +193,4 @@ fn text(files: &dyn Files, name: &str) -> Result<String, TelemetryError> {
         Source::Memory(bytes) => bytes.as_ref().read_to_string(&mut text).map_err(refuse)?,
     };
     Ok(text)
-}
-
-fn median_step(t_s: &[f64]) -> Option<f64> {
-    let mut steps: Vec<f64> = t_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    if steps.is_empty() {
-        return None;
-    }
-    let middle = steps.len() / 2;
-    let (_, &mut median, _) = steps.select_nth_unstable_by(middle, f64::total_cmp);
-    Some(median)
 }

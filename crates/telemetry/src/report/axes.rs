@@ -4,7 +4,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{nan, nan_triple};
+use super::{Rows, nan, nan_triple};
 
 /// The value of `format` of a fit.
 pub const FIT_FORMAT: &str = "boresight-fit/1";
@@ -18,6 +18,18 @@ pub struct FitReport {
     pub format: String,
     /// The tracker's axes.
     pub axes: FitAxes,
+    /// Frames used and left out; an outlier on any axis counts once.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rows: Option<Rows>,
+    /// Rate of the frames, Hz; the mean one if they are irregular.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sample_rate_hz: Option<f64>,
+    /// From the first frame used to the last, s.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub span_s: Option<f64>,
+    /// What a reader should know, in words: what the data cannot tell and why.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub notes: Vec<String>,
 }
 
 /// The tracker's axes.
@@ -32,12 +44,18 @@ pub struct FitAxes {
 }
 
 /// A value with its 1-sigma uncertainty; `None` where the data cannot give it.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct WithSigma {
     /// Value.
     pub value: Option<f64>,
     /// 1 sigma.
     pub sigma: Option<f64>,
+    /// What remains possible with 95 %; an open end is `null`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub interval: Option<[Option<f64>; 2]>,
+    /// Why there is no value.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reason: Option<String>,
 }
 
 /// One axis: true standard deviations of the sampled process (erratum E6).
@@ -56,6 +74,12 @@ pub struct AxisFit {
     pub log_psd_cost: f64,
     /// The model that the data ask for.
     pub preferred: PreferredModel,
+    /// Frames beyond 8 robust sigma on this axis, left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub outliers: Option<usize>,
+    /// Standard deviation of the residual, arcsec.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rms_arcsec: Option<f64>,
 }
 
 /// Parameters in the convention of the paper.

@@ -9,11 +9,12 @@
 //!
 //! Source: Rousseeuw & Croux 1993, Alternatives to the median absolute deviation.
 
-/// Rows beyond this many robust sigmas are left out of every figure.
-pub(crate) const OUTLIER_SIGMAS: f64 = 8.0;
+/// Rows beyond this many robust sigmas are outliers.
+pub const OUTLIER_SIGMAS: f64 = 8.0;
 
 /// The median of the finite values, `None` if there is none. Reorders `values`.
-pub(crate) fn median(values: &mut Vec<f64>) -> Option<f64> {
+#[must_use]
+pub fn median(values: &mut Vec<f64>) -> Option<f64> {
     values.retain(|v| v.is_finite());
     if values.is_empty() {
         return None;
@@ -29,7 +30,13 @@ pub(crate) fn median(values: &mut Vec<f64>) -> Option<f64> {
 }
 
 /// Median and scaled median absolute deviation of the finite values.
-pub(crate) fn centre_and_scale(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
+///
+/// ```
+/// let (centre, scale) = spectra::robust::centre_and_scale([1.0, 2.0, 3.0, 4.0, 1e6].into_iter()).expect("finite");
+/// assert_eq!((centre, scale), (3.0, 1.482_602_218_505_602));
+/// ```
+#[must_use]
+pub fn centre_and_scale(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
     let mut kept: Vec<f64> = values.collect();
     let centre = median(&mut kept)?;
     for v in &mut kept {
@@ -40,8 +47,12 @@ pub(crate) fn centre_and_scale(values: impl Iterator<Item = f64>) -> Option<(f64
 }
 
 /// Marks the outliers of each group in `outlier` (already marked rows are not
-/// asked and stay marked); returns how many were added. `group[i] < groups`.
-pub(crate) fn mark_outliers(
+/// asked and stay marked); returns how many were added.
+///
+/// # Panics
+///
+/// Unless every `group[i] < groups`, and the three slices have one length.
+pub fn mark_outliers(
     values: &[f64],
     group: &[usize],
     groups: usize,

@@ -1,0 +1,57 @@
+//! `boresight compare`: models beside what was measured.
+
+use std::io::Write as _;
+
+use anyhow::Context as _;
+use boresight::comparison::{CompareSettings, compare};
+use boresight::report::{compare_figures, compare_summary, compare_tables};
+use boresight::telemetry::{Bundle, Model, Output};
+
+use crate::arguments::Compare;
+use crate::commands::close::interrupted;
+use crate::console::Console;
+
+pub(crate) fn run(options: &Compare, console: &Console) -> anyhow::Result<()> {
+    console.progress("reading");
+    let model = Model::read(&options.model)?;
+    let mut others = vec![];
+    for path in &options.others {
+        others.push(Model::read(path)?);
+    }
+    let bundle = Bundle::read(&options.bundle)?;
+    let settings = CompareSettings {
+        draws: options.draws,
+        seed: options.seed,
+    };
+    let compared = compare(&model, &others, &bundle, &settings, &|what| {
+        console.progress(what);
+    })
+    .with_context(|| options.bundle.display().to_string())?;
+    let json = serde_json::to_string_pretty(&compared.report).context("the comparison as JSON")?;
+    let text = compare_summary(&compared.report);
+    if let Some(dir) = &options.out {
+        console.progress("writing results");
+        let output = Output::new(dir)?;
+        let partial = output.partial().to_owned();
+        let _ = ctrlc::set_handler(move || {
+            let _ = std::fs::remove_dir_all(&partial);
+            interrupted();
+        });
+        output.write("compare.json", |to| writeln!(to, "{json}"))?;
+        output.write("summary.txt", |to| to.write_all(text.as_bytes()))?;
+        for (name, content) in compare_tables(&compared)
+            .into_iter()
+            .chain(compare_figures(&compared))
+        {
+            output.write(&name, |to| to.write_all(content.as_bytes()))?;
+        }
+        output.commit()?;
+    }
+    console.say(&format!(
+        "Input     {} against {}\n{text}",
+        options.bundle.display(),
+        options.model.display()
+    ));
+    console.machine(&json);
+    Ok(())
+}

@@ -1,0 +1,35 @@
+//! `boresight fit`: the hybrid empirical model of a bundle.
+
+use std::io::Write as _;
+
+use anyhow::Context as _;
+use boresight::comparison::{FitSettings, fit};
+use boresight::report::fit_summary;
+use boresight::telemetry::{Bundle, write_file};
+
+use crate::arguments::Fit;
+use crate::console::Console;
+
+pub(crate) fn run(options: &Fit, console: &Console) -> anyhow::Result<()> {
+    console.progress("reading");
+    let bundle = Bundle::read(&options.bundle)?;
+    console.progress("fitting");
+    let settings = FitSettings {
+        band_hz: options.band_hz,
+        lines_hz: options.exclude_hz.clone(),
+    };
+    let fitted = fit(&bundle, &settings).with_context(|| options.bundle.display().to_string())?;
+    if let Some(out) = &options.out {
+        let text = fitted.model.to_toml();
+        write_file(out, |to| to.write_all(text.as_bytes()))?;
+    }
+    console.say(&format!(
+        "Input     {}\n{}",
+        options.bundle.display(),
+        fit_summary(&fitted.report)
+    ));
+    if console.json() {
+        console.machine(&serde_json::to_string_pretty(&fitted.report).context("the fit as JSON")?);
+    }
+    Ok(())
+}

@@ -1,0 +1,88 @@
+//! Why a bundle cannot be compared.
+
+use distortion::DistortionError;
+use effects::EffectError;
+use focal_plane::{AttitudeError, CameraError};
+use fogm_fit::FogmError;
+use spectra::SpectraError;
+use star_tracker::TrackerError;
+
+/// Why no comparison came out.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ComparisonError {
+    /// The bundle lacks what a residual needs.
+    #[error("{0}")]
+    NothingToCompare(&'static str),
+    /// Too few frames of a residual are left.
+    #[error(
+        "{frames} frames with a residual, at least {need} needed ({outside_reference} lie outside the reference, {unsolved} have too few stars)"
+    )]
+    TooFewFrames {
+        /// Frames left.
+        frames: usize,
+        /// Frames needed.
+        need: usize,
+        /// Frames that the reference does not cover.
+        outside_reference: usize,
+        /// Frames whose stars do not fix an attitude.
+        unsolved: usize,
+    },
+    /// A star without a direction.
+    #[error("star {id} of table `stars` is not in table `catalog`")]
+    UnknownStar {
+        /// Its id.
+        id: i64,
+    },
+    /// The reference is no series of attitudes.
+    #[error("table `reference`: {0}")]
+    Reference(#[from] AttitudeError),
+    /// No spectrum of an axis.
+    #[error("spectrum of the residual about {axis}: {source}")]
+    Spectrum {
+        /// The axis.
+        axis: &'static str,
+        /// Why.
+        source: SpectraError,
+    },
+    /// Too few draws for a standard deviation.
+    #[error("{got} draws asked for, at least 8 needed")]
+    TooFewDraws {
+        /// Draws asked for.
+        got: u64,
+    },
+    /// A model without any error.
+    #[error(
+        "{model} declares no noise, distortion or effect that shows in an attitude: its draws are all alike"
+    )]
+    NoNoise {
+        /// Its name.
+        model: String,
+    },
+    /// Numbers of the model that make no camera.
+    #[error("model: {0}")]
+    Camera(#[from] CameraError),
+    /// Numbers of the model outside their range.
+    #[error("model: {0}")]
+    Tracker(#[from] TrackerError),
+    /// A distortion that cannot be drawn.
+    #[error("model: {0}")]
+    Distortion(#[from] DistortionError),
+    /// An effect that cannot be built.
+    #[error("model: {0}")]
+    Effect(#[from] EffectError),
+    /// Numbers of a hybrid model outside their range.
+    #[error("model: {0}")]
+    Hybrid(#[from] FogmError),
+    /// No spectrum of a draw.
+    #[error("spectrum of a draw: {0}")]
+    Draw(#[from] SpectraError),
+    /// No fit of an axis.
+    #[error("fit of the residual about {axis}: {source}")]
+    Fit {
+        /// The axis.
+        axis: &'static str,
+        /// Why.
+        source: FogmError,
+    },
+}

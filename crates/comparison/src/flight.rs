@@ -1,0 +1,313 @@
+//! A model flown along the measured motion: the residual that it would have shown.
+//!
+//! ```text
+//! PBM   theta = log(q_model q_ref^-1),    q_model from the stars of each frame, [M23] Fig. 4
+//! HEM   theta = log(q_lsf q_ref^-1) + FOGM + white,   q_lsf with the drawn distortion alone, Fig. 5
+//! ```
+//!
+//! The reference is the truth of the simulation. Each draw has its own distortion, temporal noise and
+//! error of the reference; a constant misalignment is no part of a spectrum, and is not drawn. Values
+//! that the rule for outliers would mask in a measured series are set to the median of the draw.
+//!
+//! Source: \[M23\] Fig. 4, Fig. 5 and Section 4.2.1 (100 randomly drawn model variants).
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use centroid::{CentroidError, Triangle};
+use distortion::{DistortionField, LsfSigma};
+use effects::{
+    Effect, FrameGeometry, ParameterValue, Parameters, ReferenceWander, Surroundings, VectorFrame,
+};
+use focal_plane::{
+    ARCSEC_PER_RAD, Angle, AttitudeSeries, AttitudeSource, Camera, Series, rotation_vector,
+};
+use fogm_fit::{Fogm, FogmWhite};
+use spectra::robust;
+use star_tracker::{
+    Disturbance, Measured, NoiseStreams, Pbm, Purpose, Scratch, TemporalNoise, stream,
+};
+use telemetry::report::StarSource;
+use telemetry::{Bundle, EffectEntry, EffectValue, Model, ModelKind};
+
+use crate::ComparisonError;
+use crate::hybrid;
+use crate::stars::Stars;
+
+/// Order of the distortion polynomials where the model does not say: \[M23\] Section 4.2.
+const DISTORTION_ORDER: u32 = 7;
+/// Frames that are simulated at once: bounds the memory of a draw.
+const BATCH: usize = 2048;
+
+/// A model, ready to be flown.
+#[derive(Debug)]
+pub(crate) struct Flight<'a> {
+    t_s: &'a [f64],
+    truth: &'a AttitudeSeries,
+    model: &'a Model,
+    seed: u64,
+    /// Camera and stars, unless the model needs none.
+    sky: Option<(Camera, Stars)>,
+    effects: Vec<Arc<dyn Effect>>,
+    /// About x, y, z.
+    processes: Option<[FogmWhite; 3]>,
+}
+
+impl<'a> Flight<'a> {
+    /// Prepares a model for the frames at `t_s`.
+    ///
+    /// # Errors
+    ///
+    /// A model that does not fit the bundle, an effect that cannot be built, no camera, no stars.
+    pub(crate) fn new(
+        model: &'a Model,
+        bundle: &Bundle,
+        truth: &'a AttitudeSeries,
+        t_s: &'a [f64],
+        seed: u64,
+        notes: &mut Vec<String>,
+    ) -> Result<Self, ComparisonError> {
+        let processes = match (model.kind, &model.hem) {
+            (ModelKind::Pbm, _) => None,
+            (ModelKind::Hem, Some(hem)) => Some(hybrid::processes(hem)?),
+            (ModelKind::Hem, None) => {
+                return Err(ComparisonError::NothingToCompare(
+                    "the model is of kind \"hem\" and has no [hem.x], [hem.y], [hem.z]",
+                ));
+            }
+        };
+        let distorted = model.noise.distortion_arcsec.is_some_and(|s| s > 0.0);
+        let needs_stars = processes.is_none() || distorted || !model.effects.is_empty();
+        let (sky, effects) = if needs_stars {
+            let camera = camera(model, bundle)?;
+            let effects = built(&model.effects, bundle, &camera, t_s, notes)?;
+            let max_stars = model.tracker.max_stars;
+            let stars = Stars::of(bundle, &camera, truth, t_s, max_stars, seed)?;
+            (Some((camera, stars)), effects)
+        } else {
+            (None, vec![])
+        };
+        Ok(Self {
+            t_s,
+            truth,
+            model,
+            seed,
+            sky,
+            effects,
+            processes,
+        })
+    }
+
+    /// Where its stars come from.
+    pub(crate) fn stars(&self) -> StarSource {
+        self.sky
+            .as_ref()
+            .map_or(StarSource::None, |(_, stars)| stars.source)
+    }
+
+    /// The residual of a draw about x, y, z, arcsec; NaN where the stars fix no attitude.
+    /// `distortion` of a hybrid model may be left out.
+    ///
+    /// # Errors
+    ///
+    /// Numbers of the model outside their range.
+    pub(crate) fn draw(
+        &self,
+        draw: u64,
+        distortion: bool,
+    ) -> Result<[Vec<f64>; 3], ComparisonError> {
+        let mut theta = match &self.sky {
+            Some((camera, stars)) if distortion || self.processes.is_none() => {
+                self.fly(&self.tracker(camera, draw)?, stars, draw)
+            }
+            _ => [(); 3].map(|()| vec![0.0; self.t_s.len()]),
+        };
+        let mut rng = stream(self.seed, draw, Purpose::Estimation);
+        if let Some(processes) = self.processes {
+            for (theta, process) in theta.iter_mut().zip(processes) {
+                let error = hybrid::series(process, self.t_s, &mut rng);
+                theta.iter_mut().zip(error).for_each(|(t, e)| *t += e);
+            }
+        }
+        let mut rng = stream(self.seed, draw, Purpose::Reference);
+        for wander in self.effects.iter().filter_map(|e| e.reference_wander()) {
+            let ReferenceWander {
+                sigma_arcsec,
+                tau_s,
+            } = wander;
+            for axis in 0..3 {
+                let process = FogmWhite::new(Fogm::new(sigma_arcsec[axis], tau_s[axis])?, 0.0)?;
+                // the reference's error has the other sign, which no spectrum sees
+                let error = hybrid::series(process, self.t_s, &mut rng);
+                theta[axis].iter_mut().zip(error).for_each(|(t, e)| *t -= e);
+            }
+        }
+        Ok(theta)
+    }
+
+    fn tracker(&self, camera: &Camera, draw: u64) -> Result<Pbm, ComparisonError> {
+        let noise = &self.model.noise;
+        let mut pbm = Pbm::new(camera.clone());
+        // the processes of a hybrid model stand for both
+        if self.processes.is_none() {
+            if let Some(sigma) = noise.temporal_arcsec {
+                pbm = pbm.with_noise(TemporalNoise::circular_arcsec(sigma)?);
+            }
+            if let Some(peak) = noise.centroid_arcsec {
+                pbm = pbm.with_centroid_error(CentroidError::Triangle(Triangle::from_peak(peak)));
+            }
+        }
+        if let Some(sigma) = noise.distortion_arcsec {
+            let order = noise.distortion_order.unwrap_or(DISTORTION_ORDER) as usize;
+            let sigma = LsfSigma::Circular(Angle::from_arcsec(sigma));
+            let mut rng = stream(self.seed, draw, Purpose::Distortion);
+            pbm = pbm.with_distortion(DistortionField::draw(order, sigma, &mut rng)?);
+        }
+        for effect in &self.effects {
+            let disturbance: Arc<dyn Disturbance> = effect.clone();
+            pbm = pbm.with_disturbance(disturbance);
+        }
+        Ok(pbm)
+    }
+
+    fn fly(&self, pbm: &Pbm, stars: &Stars, draw: u64) -> [Vec<f64>; 3] {
+        let mut theta = [(); 3].map(|()| vec![f64::NAN; self.t_s.len()]);
+        let mut streams = NoiseStreams::new(self.seed, draw);
+        let (mut scratch, mut out, mut first_row) =
+            (Scratch::default(), Measured::default(), vec![]);
+        let mut from = 0;
+        while from < self.t_s.len() {
+            let to = (from + BATCH).min(self.t_s.len());
+            let rows = stars.rows(self.t_s, from..to, &mut first_row);
+            pbm.measure_into(self.truth, rows, &mut streams, &mut scratch, &mut out);
+            for k in from..to {
+                let truth = self.truth.attitude(self.t_s[k]);
+                if let (Some(q), Some(truth)) = (out.attitude(k - from), truth) {
+                    let error = rotation_vector(&q, &truth) * ARCSEC_PER_RAD;
+                    for axis in 0..3 {
+                        theta[axis][k] = error[axis];
+                    }
+                }
+            }
+            from = to;
+        }
+        theta
+    }
+}
+
+/// Sets what a measured series would have masked to the median: values beyond 8 robust sigma, and
+/// frames without an attitude.
+pub(crate) fn without_outliers(theta: &mut [f64]) {
+    let group = vec![0; theta.len()];
+    let mut out = vec![false; theta.len()];
+    while robust::mark_outliers(theta, &group, 1, &mut out) > 0 {}
+    let median = robust::median(&mut theta.to_vec()).unwrap_or(0.0);
+    for (value, out) in theta.iter_mut().zip(out) {
+        if out || !value.is_finite() {
+            *value = median;
+        }
+    }
+}
+
+/// The camera of the model; what it leaves out is the bundle's.
+pub(crate) fn camera(model: &Model, bundle: &Bundle) -> Result<Camera, ComparisonError> {
+    let (declared, meta) = (&model.tracker, &bundle.meta.tracker);
+    let pixels = declared.pixels.or(meta.pixels);
+    let own = declared.focal_length_px.is_some() || declared.fov_deg.is_some();
+    let (focal, fov) = if own {
+        (declared.focal_length_px, declared.fov_deg)
+    } else {
+        (meta.focal_length_px, meta.fov_deg)
+    };
+    let camera = match (pixels, focal, fov) {
+        (Some(pixels), Some(focal), _) => Camera::from_focal_length_px(pixels, focal)?,
+        (Some(pixels), None, Some(fov)) => Camera::from_fov_deg(pixels, fov)?,
+        _ => {
+            return Err(ComparisonError::NothingToCompare(
+                "neither the model nor the bundle gives pixels and focal length under [tracker]",
+            ));
+        }
+    };
+    Ok(match declared.pixel_centre.or(meta.pixel_centre) {
+        Some(centre) => camera.with_pixel_centre(centre)?,
+        None => camera,
+    })
+}
+
+fn built(
+    entries: &[EffectEntry],
+    bundle: &Bundle,
+    camera: &Camera,
+    t_s: &[f64],
+    notes: &mut Vec<String>,
+) -> Result<Vec<Arc<dyn Effect>>, ComparisonError> {
+    let channels: BTreeMap<String, Series> = bundle
+        .housekeeping
+        .as_ref()
+        .map(telemetry::Housekeeping::all_series)
+        .unwrap_or_default();
+    let frames = bundle.meta.frames.as_ref().map(|f| FrameGeometry {
+        tracker_boresight: f.tracker_boresight,
+        reference_boresight: f.reference_boresight,
+        vectors_in: match f.vectors_in {
+            Some(telemetry::VectorFrame::Inertial) => VectorFrame::Inertial,
+            Some(telemetry::VectorFrame::Tracker) => VectorFrame::Tracker,
+            Some(telemetry::VectorFrame::Body) | None => VectorFrame::Body,
+        },
+        quaternion_signs: f.quaternion_signs.known(),
+    });
+    let surroundings = Surroundings {
+        camera,
+        span_s: [t_s[0], t_s[t_s.len() - 1]],
+        channels: &channels,
+        frames,
+    };
+    let mut out: Vec<Arc<dyn Effect>> = vec![];
+    for entry in entries {
+        if effects::kind(&entry.id)?.acts_on().images {
+            notes.push(format!(
+                "effect {} acts on raw images, and is left out of the ensemble",
+                entry.id
+            ));
+            continue;
+        }
+        let parameters: Parameters = entry
+            .parameters
+            .iter()
+            .map(|(name, value)| (name.clone(), parameter(value)))
+            .collect();
+        out.push(effects::build(&entry.id, &parameters, &surroundings)?.into());
+    }
+    Ok(out)
+}
+
+fn parameter(value: &EffectValue) -> ParameterValue {
+    match value {
+        EffectValue::Number(number) => ParameterValue::Number(*number),
+        EffectValue::Text(text) => ParameterValue::Text(text.clone()),
+        EffectValue::Numbers(numbers) => {
+            let numbers: Vec<String> = numbers.iter().map(f64::to_string).collect();
+            ParameterValue::Text(numbers.join(","))
+        }
+    }
+}
+
+/// A frame that a draw has no value for.
+pub(crate) fn missing(theta: &[Vec<f64>; 3], k: usize) -> bool {
+    theta.iter().any(|axis| !axis[k].is_finite())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn spikes_and_missing_frames_become_the_median() {
+        let mut theta: Vec<f64> = (0..101).map(|k| f64::from(k % 5)).collect();
+        theta[7] = 1e4;
+        theta[8] = f64::NAN;
+        without_outliers(&mut theta);
+        assert!((theta[7] - 2.0).abs() < 1e-12 && (theta[8] - 2.0).abs() < 1e-12);
+        assert!((theta[9] - 4.0).abs() < 1e-12, "the others stay");
+    }
+}

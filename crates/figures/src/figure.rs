@@ -1,0 +1,476 @@
+//! Panels side by side, with title, legend and a note below.
+//!
+//! Not physics: drawing.
+
+use std::fmt::Write as _;
+
+use crate::axis::{Laid, Tick};
+use crate::mark::{Mark, Shape};
+use crate::paint::{self, Arrows, Frame, escaped, text_px};
+use crate::{Colour, Panel};
+
+/// Room left of a frame, above, right and below it, px.
+const LEFT: f64 = 68.0;
+const ABOVE: f64 = 26.0;
+const RIGHT: f64 = 16.0;
+const BELOW: f64 = 44.0;
+/// Room for a bar of colours, px.
+const BAR: f64 = 74.0;
+/// Height of a row of the legend, px.
+const LEGEND: f64 = 18.0;
+/// Height of a line of the title, px.
+const TITLE: f64 = 18.0;
+/// Height of a line of the note, px.
+const NOTE: f64 = 16.0;
+/// Edge of the whole figure, px.
+const EDGE: f64 = 10.0;
+
+/// A figure: panels in rows.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Figure {
+    title: String,
+    note: Option<String>,
+    panels: Vec<Panel>,
+    columns: usize,
+    panel_px: [f64; 2],
+}
+
+impl Figure {
+    /// Panels in one row, 460 by 340 px each; more than three take several rows.
+    #[must_use]
+    pub fn new(title: &str, panels: Vec<Panel>) -> Self {
+        Self {
+            title: title.to_owned(),
+            note: None,
+            columns: panels.len().clamp(1, 3),
+            panels,
+            panel_px: [460.0, 340.0],
+        }
+    }
+
+    /// The same with so many panels in a row.
+    #[must_use]
+    pub fn in_columns(self, columns: usize) -> Self {
+        Self {
+            columns: columns.max(1),
+            ..self
+        }
+    }
+
+    /// The same with panels of this size, px, axes and labels in it.
+    #[must_use]
+    pub fn sized(self, panel_px: [f64; 2]) -> Self {
+        Self { panel_px, ..self }
+    }
+
+    /// The same with a sentence below.
+    #[must_use]
+    pub fn noted(self, note: &str) -> Self {
+        Self {
+            note: Some(note.to_owned()),
+            ..self
+        }
+    }
+
+    /// The figure as an SVG document, which may stand inside HTML as it is.
+    #[must_use]
+    pub fn svg(&self) -> String {
+        let shared = self.shared_legend();
+        let width = 2.0 * EDGE + self.columns as f64 * self.panel_px[0];
+        let legend_rows = if shared {
+            rows_of(&self.panels[0].marks, width - 2.0 * EDGE)
+        } else {
+            vec![]
+        };
+        // bold 14 px is wider than the 11 px of the estimate
+        let title = wrapped(&self.title, (width - 2.0 * EDGE) / 1.36);
+        let below_title = EDGE + 6.0 + TITLE * title.len().max(1) as f64;
+        let head = below_title + legend_rows.len() as f64 * LEGEND + 4.0;
+        let rows = self.panels.len().div_ceil(self.columns);
+        let note = self
+            .note
+            .as_deref()
+            .map_or_else(Vec::new, |note| wrapped(note, width - 2.0 * EDGE));
+        let height = head + rows as f64 * self.panel_px[1] + note.len() as f64 * NOTE + EDGE;
+        let mut out = String::new();
+        // writing to a string cannot fail
+        let _ = write!(
+            out,
+            r##"<svg xmlns="http://www.w3.org/2000/svg" width="{width:.0}" height="{height:.0}" viewBox="0 0 {width:.0} {height:.0}" font-family="DejaVu Sans, Verdana, Arial, sans-serif" font-size="11" fill="{}" role="img"><title>{}</title><rect width="100%" height="100%" fill="#ffffff"/>"##,
+            Colour::INK.hex(),
+            escaped(&self.title),
+        );
+        for (k, line) in title.iter().enumerate() {
+            let y = EDGE + 14.0 + TITLE * k as f64;
+            let _ = write!(
+                out,
+                r#"<text x="{EDGE}" y="{y}" font-size="14" font-weight="bold">{}</text>"#,
+                escaped(line)
+            );
+        }
+        legend(&mut out, &legend_rows, [EDGE, below_title], None);
+        for (k, panel) in self.panels.iter().enumerate() {
+            let (column, row) = (k % self.columns, k / self.columns);
+            let corner = [
+                EDGE + column as f64 * self.panel_px[0],
+                head + row as f64 * self.panel_px[1],
+            ];
+            draw(&mut out, panel, corner, self.panel_px, !shared);
+        }
+        for (k, line) in note.iter().enumerate() {
+            let y = height - EDGE - (note.len() - 1 - k) as f64 * NOTE - 2.0;
+            let _ = write!(
+                out,
+                r#"<text x="{EDGE}" y="{y:.1}">{}</text>"#,
+                escaped(line)
+            );
+        }
+        out.push_str("</svg>\n");
+        out
+    }
+
+    /// Whether one legend says it for all panels.
+    fn shared_legend(&self) -> bool {
+        let looks = |panel: &Panel| -> Vec<(Option<String>, Colour)> {
+            panel
+                .marks
+                .iter()
+                .filter(|mark| mark.name.is_some())
+                .map(|mark| (mark.name.clone(), mark.colour))
+                .collect()
+        };
+        let arrows = |mark: &Mark| matches!(mark.shape, Shape::Arrows { .. });
+        let Some(first) = self.panels.first() else {
+            return false;
+        };
+        self.panels.len() > 1
+            && self
+                .panels
+                .iter()
+                .all(|panel| looks(panel) == looks(first) && !panel.marks.iter().any(arrows))
+    }
+}
+
+fn draw(out: &mut String, panel: &Panel, corner: [f64; 2], size: [f64; 2], own_legend: bool) {
+    let bar = panel.marks.iter().find_map(|mark| match &mark.shape {
+        Shape::Cells { scale, label, .. } => Some((*scale, label.as_str())),
+        _ => None,
+    });
+    let legend_rows = if own_legend {
+        rows_of(&panel.marks, size[0] - LEFT - RIGHT)
+    } else {
+        vec![]
+    };
+    let room_right = RIGHT + if bar.is_some() { BAR } else { 0.0 };
+    let above = ABOVE + legend_rows.len() as f64 * LEGEND;
+    let mut at = [corner[0] + LEFT, corner[1] + above];
+    let mut px = [size[0] - LEFT - room_right, size[1] - above - BELOW];
+    let mut x = Laid::new(&panel.x, panel.data(0), [0.0, px[0]]);
+    let mut y = Laid::new(&panel.y, panel.data(1), [px[1], 0.0]);
+    if panel.equal {
+        let scale = x.px_per_unit().min(y.px_per_unit());
+        let wanted = [&x, &y].map(|laid| scale * (laid.ends()[1] - laid.ends()[0]));
+        at[0] += 0.5 * (px[0] - wanted[0]);
+        px = wanted;
+    }
+    let _ = write!(
+        out,
+        r#"<text x="{:.1}" y="{:.1}" font-size="12" font-weight="bold">{}</text>"#,
+        corner[0] + LEFT,
+        corner[1] + 17.0,
+        escaped(&panel.title)
+    );
+    x = Laid::new(&panel.x, panel.data(0), [at[0], at[0] + px[0]]).with_ends(x.ends());
+    y = Laid::new(&panel.y, panel.data(1), [at[1] + px[1], at[1]]).with_ends(y.ends());
+    let frame = Frame { at, px, x, y };
+    let arrows = panel.marks.iter().find_map(|mark| Arrows::of(mark, &frame));
+    legend(
+        out,
+        &legend_rows,
+        [corner[0] + LEFT, corner[1] + ABOVE - 2.0],
+        arrows.as_ref(),
+    );
+    axes(out, panel, &frame);
+    let [fx, fy] = frame.at;
+    let [fw, fh] = frame.px;
+    let _ = write!(
+        out,
+        r#"<svg x="{fx:.1}" y="{fy:.1}" width="{fw:.1}" height="{fh:.1}" viewBox="{fx:.1} {fy:.1} {fw:.1} {fh:.1}" overflow="hidden">"#
+    );
+    for mark in &panel.marks {
+        paint::mark(out, mark, &frame);
+    }
+    let _ = write!(
+        out,
+        r##"</svg><rect x="{fx:.1}" y="{fy:.1}" width="{fw:.1}" height="{fh:.1}" fill="none" stroke="#60666e"/>"##
+    );
+    if let Some((scale, label)) = bar {
+        colour_bar(out, &frame, scale, label);
+    }
+}
+
+fn axes(out: &mut String, panel: &Panel, frame: &Frame) {
+    let [fx, fy] = frame.at;
+    let [fw, fh] = frame.px;
+    let grid = |tick: &Tick| {
+        if tick.text.is_some() {
+            "#dfe3e8"
+        } else {
+            "#f0f2f4"
+        }
+    };
+    for tick in frame.x.ticks(fw / 62.0) {
+        let px = tick.px;
+        let _ = write!(
+            out,
+            r#"<path d="M{px:.1} {fy:.1}v{fh:.1}" stroke="{}"/>"#,
+            grid(&tick)
+        );
+        if let Some(text) = &tick.text {
+            let _ = write!(
+                out,
+                r#"<text x="{px:.1}" y="{:.1}" text-anchor="middle">{text}</text>"#,
+                fy + fh + 15.0
+            );
+        }
+    }
+    for tick in frame.y.ticks(fh / 28.0) {
+        let px = tick.px;
+        let _ = write!(
+            out,
+            r#"<path d="M{fx:.1} {px:.1}h{fw:.1}" stroke="{}"/>"#,
+            grid(&tick)
+        );
+        if let Some(text) = &tick.text {
+            let _ = write!(
+                out,
+                r#"<text x="{:.1}" y="{:.1}" text-anchor="end">{text}</text>"#,
+                fx - 6.0,
+                px + 4.0
+            );
+        }
+    }
+    let _ = write!(
+        out,
+        r#"<text x="{:.1}" y="{:.1}" text-anchor="middle">{}</text>"#,
+        fx + 0.5 * fw,
+        fy + fh + 33.0,
+        escaped(&panel.x.label)
+    );
+    let (lx, ly) = (fx - 52.0, fy + 0.5 * fh);
+    let _ = write!(
+        out,
+        r#"<text x="{lx:.1}" y="{ly:.1}" text-anchor="middle" transform="rotate(-90 {lx:.1} {ly:.1})">{}</text>"#,
+        escaped(&panel.y.label)
+    );
+}
+
+fn colour_bar(out: &mut String, frame: &Frame, scale: crate::Scale, label: &str) {
+    const STEPS: usize = 48;
+    let [low, high] = scale.ends();
+    let (bx, fy, fh) = (frame.at[0] + frame.px[0] + 12.0, frame.at[1], frame.px[1]);
+    let step = fh / STEPS as f64;
+    for k in 0..STEPS {
+        let value = low + (high - low) * (k as f64 + 0.5) / STEPS as f64;
+        let _ = write!(
+            out,
+            r#"<rect x="{bx:.1}" y="{:.2}" width="12" height="{:.2}" fill="{}"/>"#,
+            fy + fh - (k + 1) as f64 * step,
+            step + 0.3,
+            scale.colour(value).hex()
+        );
+    }
+    let axis = crate::Axis::linear(label).over(low, high);
+    for tick in Laid::new(&axis, None, [fy + fh, fy]).ticks(fh / 38.0) {
+        let _ = write!(
+            out,
+            r#"<text x="{:.1}" y="{:.1}">{}</text>"#,
+            bx + 16.0,
+            tick.px + 4.0,
+            tick.text.unwrap_or_default()
+        );
+    }
+    let (lx, ly) = (bx + 62.0, fy + 0.5 * fh);
+    let _ = write!(
+        out,
+        r#"<text x="{lx:.1}" y="{ly:.1}" text-anchor="middle" transform="rotate(-90 {lx:.1} {ly:.1})">{}</text>"#,
+        escaped(label)
+    );
+}
+
+/// Marks with a name, in rows that fit into `width`.
+fn rows_of(marks: &[Mark], width: f64) -> Vec<Vec<&Mark>> {
+    let mut rows: Vec<Vec<&Mark>> = vec![];
+    let mut used = f64::INFINITY;
+    for mark in marks.iter().filter(|mark| mark.name.is_some()) {
+        let needs = entry_px(mark);
+        match rows.last_mut() {
+            Some(row) if used + needs <= width => {
+                row.push(mark);
+                used += needs;
+            }
+            _ => {
+                rows.push(vec![mark]);
+                used = needs;
+            }
+        }
+    }
+    rows
+}
+
+/// Width of an entry, px; arrows have their key behind their name.
+fn entry_px(mark: &Mark) -> f64 {
+    let name = mark.name.as_deref().unwrap_or_default();
+    let key = match &mark.shape {
+        Shape::Arrows { unit, .. } => 60.0 + text_px(unit),
+        _ => 0.0,
+    };
+    48.0 + text_px(name) + key
+}
+
+fn legend(out: &mut String, rows: &[Vec<&Mark>], at: [f64; 2], arrows: Option<&Arrows>) {
+    for (k, row) in rows.iter().enumerate() {
+        let mut x = at[0];
+        let y = at[1] + (k as f64 + 0.5) * LEGEND;
+        for mark in row {
+            let name = mark.name.as_deref().unwrap_or_default();
+            paint::swatch(out, mark, [x, y], arrows);
+            let key = match (&mark.shape, arrows) {
+                (Shape::Arrows { .. }, Some(arrows)) => format!(", key {}", arrows.key_text()),
+                _ => String::new(),
+            };
+            let _ = write!(
+                out,
+                r#"<text x="{:.1}" y="{:.1}">{}{}</text>"#,
+                x + 32.0,
+                y + 4.0,
+                escaped(name),
+                escaped(&key)
+            );
+            x += entry_px(mark);
+        }
+    }
+}
+
+/// Words in lines of at most `width` px.
+fn wrapped(text: &str, width: f64) -> Vec<String> {
+    let mut lines: Vec<String> = vec![];
+    for word in text.split_whitespace() {
+        match lines.last_mut() {
+            Some(line) if text_px(line) + text_px(word) + 6.0 <= width => {
+                line.push(' ');
+                line.push_str(word);
+            }
+            _ => lines.push(word.to_owned()),
+        }
+    }
+    lines
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Axis, Scale};
+
+    fn every_mark() -> Panel {
+        let x = [0.0, 1.0, 2.0, f64::NAN, 4.0];
+        let y = [1.0, 3.0, 2.0, 5.0, -1.0];
+        Panel::new(
+            "all < & >",
+            Axis::linear("x, s"),
+            Axis::linear("y, \"arcsec\""),
+        )
+        .with(Mark::band(&x, &y, &y.map(|v| v + 1.0), Colour::DRAWS).named("band"))
+        .with(Mark::draws(&x, &[y.to_vec(), y.to_vec()], Colour::DRAWS).named("draws"))
+        .with(Mark::line(&x, &y, Colour::MODEL).dashed().named("line"))
+        .with(Mark::points(&x, &y, 2.0, Colour::MEASURED).named("points"))
+        .with(Mark::with_errors(&x, &y, &[0.5; 5], Colour::BOUND).named("errors"))
+        .with(Mark::arrows([&x, &y], [&y, &x], "arcsec", Colour::INK).named("arrows"))
+        .with(Mark::cells(
+            [&x, &y],
+            [0.2, 0.2],
+            &y,
+            Scale::Diverging(3.0),
+            "value, DN",
+        ))
+        .with(Mark::vertical(1.5, Colour::INK))
+        .with(Mark::horizontal(0.5, Colour::INK).named("rule"))
+    }
+
+    /// Every number is finite, every tag closed, and what a reader needs is there.
+    #[test]
+    fn the_document_is_whole() {
+        let figure = Figure::new("A & B", vec![every_mark(), every_mark()]).noted("One sentence.");
+        let svg = figure.svg();
+        assert!(!svg.contains("NaN") && !svg.contains("inf"), "{svg}");
+        for wanted in [
+            "A &amp; B",
+            "all &lt; &amp; &gt;",
+            "x, s",
+            "&quot;arcsec&quot;",
+            "value, DN",
+            "One sentence.",
+        ] {
+            assert!(svg.contains(wanted), "no {wanted}");
+        }
+        let mut open = vec![];
+        for tag in svg.split('<').skip(1) {
+            let name: &str = tag.split([' ', '>', '/']).next().unwrap_or_default();
+            if let Some(closed) = tag.strip_prefix('/') {
+                let closed = closed.split('>').next().unwrap_or_default();
+                assert_eq!(open.pop(), Some(closed.to_owned()));
+            } else if !tag.split('>').next().unwrap_or_default().ends_with('/') {
+                open.push(name.to_owned());
+            }
+        }
+        assert!(open.is_empty(), "left open: {open:?}");
+        assert_eq!(svg, figure.svg(), "the same figure twice");
+    }
+
+    #[test]
+    fn empty_figures_are_drawn() {
+        let none = Figure::new("none", vec![]).svg();
+        assert!(none.ends_with("</svg>\n"));
+        let bare = Figure::new("bare", vec![Panel::psd("x", "arcsec²/Hz")]).svg();
+        assert!(bare.contains("frequency, Hz") && !bare.contains("NaN"));
+        let zeros = Panel::psd("x", "1").with(Mark::line(&[1.0, 2.0], &[0.0, -1.0], Colour::MODEL));
+        assert!(!Figure::new("zeros", vec![zeros]).svg().contains("NaN"));
+    }
+
+    /// Two panels of one legend share it; of two legends each has its own.
+    #[test]
+    fn one_legend_says_it_for_all() {
+        let panel = |name: &str| {
+            Panel::time("t", "arcsec")
+                .with(Mark::line(&[0.0, 1.0], &[1.0, 2.0], Colour::MODEL).named(name))
+        };
+        let count = |panels| Figure::new("f", panels).svg().matches(">mean<").count();
+        assert_eq!(count(vec![panel("mean"), panel("mean")]), 1);
+        assert_eq!(count(vec![panel("mean"), panel("other")]), 1);
+        assert_eq!(count(vec![panel("mean"), panel("other"), panel("mean")]), 2);
+    }
+
+    #[test]
+    fn a_pixel_is_square_on_the_focal_plane() {
+        let panel = Panel::focal_plane("f", [512.0, 256.0]).with(Mark::points(
+            &[-512.0, 512.0],
+            &[-256.0, 256.0],
+            1.0,
+            Colour::MEASURED,
+        ));
+        let svg = Figure::new("f", vec![panel]).svg();
+        let frame = svg.split("<svg ").nth(2).unwrap_or_default();
+        let value = |key: &str| -> f64 {
+            let rest = frame.split(&format!("{key}=\"")).nth(1).unwrap_or_default();
+            rest.split('"')
+                .next()
+                .unwrap_or_default()
+                .parse()
+                .unwrap_or(f64::NAN)
+        };
+        assert!(
+            (value("width") / value("height") - 2.0).abs() < 0.01,
+            "{frame}"
+        );
+    }
+}
