@@ -1,0 +1,142 @@
+//! World files: an instrument in physical settings, and what its maker knows to act in it.
+//!
+//! A world is a file with the tables of this crate beside those of the motion and the run, which the
+//! caller reads. `[truth]` goes into the sealed file beside the bundle and acts on nothing.
+//!
+//! Not physics: reading a file.
+
+use serde::{Deserialize, Serialize};
+
+use crate::thermal::Thermal;
+use crate::{
+    Background, Bracket, Clock, Detector, ImagerError, Optics, Orbit, Readout, Reference, Shutter,
+    Stars,
+};
+
+/// The value of `format` in a world file.
+pub const WORLD_FORMAT: &str = "boresight-world/1";
+
+/// Tables that this crate reads.
+pub const TABLES: [&str; 12] = [
+    "truth",
+    "optics",
+    "shutter",
+    "detector",
+    "background",
+    "readout",
+    "clock",
+    "stars",
+    "orbit",
+    "thermal",
+    "bracket",
+    "reference",
+];
+
+/// Everything that is rendered and read out.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
+#[serde(default)]
+pub struct Instrument {
+    /// `[truth]`
+    pub truth: Truth,
+    /// `[optics]`
+    pub optics: Optics,
+    /// `[shutter]`
+    pub shutter: Shutter,
+    /// `[detector]`
+    pub detector: Detector,
+    /// `[background]`
+    pub background: Background,
+    /// `[readout]`
+    pub readout: Readout,
+    /// `[clock]`
+    pub clock: Clock,
+    /// `[stars]`
+    pub stars: Stars,
+    /// `[orbit]`
+    pub orbit: Orbit,
+    /// `[thermal]`
+    pub thermal: Thermal,
+    /// `[bracket]`
+    pub bracket: Bracket,
+    /// `[reference]`; none in the bundle without it.
+    pub reference: Option<Reference>,
+}
+
+/// `[truth]`: what acts, for whoever judges a diagnosis.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Truth {
+    /// Effects of the catalogue that act, by id.
+    pub effects: Vec<String>,
+    /// What acts and is in no catalogue, in words.
+    pub outside: Vec<String>,
+    /// What the leftover follows, in the words of a report, where something is outside.
+    pub follows: Vec<String>,
+    /// Anything else worth knowing.
+    pub note: Option<String>,
+}
+
+impl Instrument {
+    /// Reads the tables of a world file; `file` is its name in messages, `others` are tables that the
+    /// caller reads from the same text.
+    ///
+    /// # Errors
+    ///
+    /// Another format, a table or key that does not exist, a value of the wrong type, with the line;
+    /// or a number outside its range.
+    ///
+    /// ```
+    /// let text = "format = \"boresight-world/1\"\n[shutter]\nrow_time_s = 30e-6\n[run]\nduration_s = 60\n";
+    /// let world = imager::Instrument::parse(text, "w.toml", &["run"])?;
+    /// assert!(world.shutter.row_time_s > 0.0);
+    /// let error = imager::Instrument::parse(&text.replace("row_t", "rowt"), "w.toml", &["run"]).expect_err("no key");
+    /// assert!(error.to_string().contains("`row_time_s`"));
+    /// # Ok::<(), imager::ImagerError>(())
+    /// ```
+    pub fn parse(text: &str, file: &str, others: &[&str]) -> Result<Self, ImagerError> {
+        let config = telemetry::config::Config::parse(text, file)?;
+        let root = config.root();
+        let mut known = vec!["format"];
+        known.extend(TABLES);
+        known.extend(others);
+        root.allow(&known)?;
+        let format = root.require("format")?;
+        if format.text()? != WORLD_FORMAT {
+            return Err(format.expected(&format!("{WORLD_FORMAT:?}")).into());
+        }
+        let instrument: Self = telemetry::config::deserialise(text, file)?;
+        instrument.check()?;
+        Ok(instrument)
+    }
+
+    /// Checks every number.
+    ///
+    /// # Errors
+    ///
+    /// The first number outside its range, or a thermal node that does not exist.
+    pub fn check(&self) -> Result<(), ImagerError> {
+        self.optics.check()?;
+        self.shutter.check()?;
+        self.detector.check()?;
+        self.background.check()?;
+        self.readout.check()?;
+        self.clock.check()?;
+        self.stars.check()?;
+        self.orbit.check()?;
+        self.thermal.check()?;
+        self.bracket.check()?;
+        self.reference.iter().try_for_each(Reference::check)?;
+        self.optics_node()?;
+        self.bracket_node().map(|_| ())
+    }
+
+    pub(crate) fn optics_node(&self) -> Result<Option<usize>, ImagerError> {
+        let node = self.optics.node.as_ref();
+        node.map(|node| self.thermal.index("optics.node", node)).transpose()
+    }
+
+    pub(crate) fn bracket_node(&self) -> Result<Option<usize>, ImagerError> {
+        let node = self.bracket.node.as_ref();
+        node.map(|node| self.thermal.index("bracket.node", node)).transpose()
+    }
+}
