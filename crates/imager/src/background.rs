@@ -36,10 +36,20 @@ impl Background {
         ImagerError::not_negative("background.stray_e_s2", self.stray_e_s2)?;
         ImagerError::finite("background.stray_from_s", self.stray_from_s)?;
         for value in self.sky_gradient {
-            ImagerError::check("background.sky_gradient", value, value.abs() <= 1.0, "from -1 to 1")?;
+            ImagerError::check(
+                "background.sky_gradient",
+                value,
+                value.abs() <= 1.0,
+                "from -1 to 1",
+            )?;
         }
         for value in self.stray_gradient {
-            ImagerError::check("background.stray_gradient", value, value.abs() <= 1.0, "from -1 to 1")?;
+            ImagerError::check(
+                "background.stray_gradient",
+                value,
+                value.abs() <= 1.0,
+                "from -1 to 1",
+            )?;
         }
         Ok(())
     }

@@ -21,8 +21,8 @@ use serde::{Deserialize, Serialize};
 use crate::ImagerError;
 
 pub use hits::Particles;
-pub use pixels::{Fringe, HotPixel};
 pub(crate) use pixels::PixelTraits;
+pub use pixels::{Fringe, HotPixel};
 pub use trailing::Trailing;
 
 /// `[detector]`
@@ -180,7 +180,9 @@ impl Detector {
             let noise: f64 = StandardNormal.sample(rng);
             let response = *charge * (1.0 - self.nonlinearity * *charge / self.full_well_e);
             let read = response + traits.column_e(column) + self.read_noise_e * noise;
-            *charge = (self.bias_dn + read / self.gain_e_per_dn).round().clamp(0.0, most);
+            *charge = (self.bias_dn + read / self.gain_e_per_dn)
+                .round()
+                .clamp(0.0, most);
         }
     }
 }

@@ -57,7 +57,9 @@ pub enum ImagerError {
     #[error(transparent)]
     Catalogue(#[from] CatalogueError),
     /// The motion holds no frame, or no star was in the field.
-    #[error("no star was seen in {frames} frames (limiting magnitude, field, or span of the motion)")]
+    #[error(
+        "no star was seen in {frames} frames (limiting magnitude, field, or span of the motion)"
+    )]
     NothingSeen {
         /// Frames asked for.
         frames: u64,

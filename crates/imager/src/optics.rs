@@ -96,10 +96,20 @@ impl Default for Optics {
 impl Optics {
     pub(crate) fn check(&self) -> Result<(), ImagerError> {
         let fov = self.fov_deg;
-        ImagerError::check("optics.fov_deg", fov, fov > 0.0 && fov < 120.0, "between 0 and 120")?;
+        ImagerError::check(
+            "optics.fov_deg",
+            fov,
+            fov > 0.0 && fov < 120.0,
+            "between 0 and 120",
+        )?;
         ImagerError::positive("optics.psf_sigma_px", self.psf_sigma_px)?;
         let share = self.coma_share;
-        ImagerError::check("optics.coma_share", share, (0.0..1.0).contains(&share), "from 0 to 1")?;
+        ImagerError::check(
+            "optics.coma_share",
+            share,
+            (0.0..1.0).contains(&share),
+            "from 0 to 1",
+        )?;
         for (name, value) in [
             ("optics.psf_colour_px_per_mag", self.psf_colour_px_per_mag),
             ("optics.coma_px", self.coma_px),
@@ -108,7 +118,10 @@ impl Optics {
             ("optics.p1", self.p1),
             ("optics.p2", self.p2),
             ("optics.centre_px", self.centre_px[0] + self.centre_px[1]),
-            ("optics.lateral_colour_ppm_per_mag", self.lateral_colour_ppm_per_mag),
+            (
+                "optics.lateral_colour_ppm_per_mag",
+                self.lateral_colour_ppm_per_mag,
+            ),
             ("optics.nominal_c", self.nominal_c),
             ("optics.focal_ppm_per_c", self.focal_ppm_per_c),
             ("optics.defocus_px_per_c", self.defocus_px_per_c),
@@ -120,7 +133,9 @@ impl Optics {
             ImagerError::check("optics.tilt_deg", tilt, tilt.abs() < 45.0, "within 45 deg")?;
         }
         if self.node.is_none() && (self.focal_ppm_per_c != 0.0 || self.defocus_px_per_c != 0.0) {
-            return Err(ImagerError::NeedsNode { name: "optics.focal_ppm_per_c or optics.defocus_px_per_c" });
+            return Err(ImagerError::NeedsNode {
+                name: "optics.focal_ppm_per_c or optics.defocus_px_per_c",
+            });
         }
         Ok(())
     }
@@ -147,11 +162,17 @@ impl Optics {
             radial: [self.k1, self.k2],
             decentring: [self.p1, self.p2],
             colour: 1.0 + 1e-6 * self.lateral_colour_ppm_per_mag * colour,
-            tilt: self.tilt_deg.map(|deg| focal_plane::Angle::from_deg(deg).rad().tan()),
+            tilt: self
+                .tilt_deg
+                .map(|deg| focal_plane::Angle::from_deg(deg).rad().tan()),
             focal_px: camera.focal_length_px()[0] * (1.0 + 1e-6 * self.focal_ppm_per_c * warm),
             centre_px: self.centre_px,
             sigma_px: core.hypot(blur),
-            flare: if self.coma_px == 0.0 { 0.0 } else { self.coma_share },
+            flare: if self.coma_px == 0.0 {
+                0.0
+            } else {
+                self.coma_share
+            },
             flare_per_px: self.coma_px / camera.half_size_px()[0],
         }
     }
@@ -220,21 +241,53 @@ mod tests {
         let f = Optics::default().camera().unwrap().focal_length_px()[0];
         let r2 = 0.0125;
         let near = |got: [f64; 2], want: [f64; 2]| {
-            assert!((got[0] - want[0]).abs() < 1e-9 && (got[1] - want[1]).abs() < 1e-9, "{got:?} {want:?}");
+            assert!(
+                (got[0] - want[0]).abs() < 1e-9 && (got[1] - want[1]).abs() < 1e-9,
+                "{got:?} {want:?}"
+            );
         };
         near(shift(&Optics::default(), v, 1.9, None), [0.0; 2]);
-        let k = Optics { k1: 1e-3, k2: 2e-3, ..Optics::default() };
+        let k = Optics {
+            k1: 1e-3,
+            k2: 2e-3,
+            ..Optics::default()
+        };
         let radial = 1e-3 * r2 + 2e-3 * r2 * r2;
-        near(shift(&k, v, 0.6, None), [f * radial * 0.1, -f * radial * 0.05]);
-        let p = Optics { p1: 1e-3, ..Optics::default() };
-        near(shift(&p, v, 0.6, None), [f * 2e-3 * 0.1 * -0.05, f * 1e-3 * (r2 + 2.0 * 0.0025)]);
-        let c = Optics { lateral_colour_ppm_per_mag: 100.0, ..Optics::default() };
+        near(
+            shift(&k, v, 0.6, None),
+            [f * radial * 0.1, -f * radial * 0.05],
+        );
+        let p = Optics {
+            p1: 1e-3,
+            ..Optics::default()
+        };
+        near(
+            shift(&p, v, 0.6, None),
+            [f * 2e-3 * 0.1 * -0.05, f * 1e-3 * (r2 + 2.0 * 0.0025)],
+        );
+        let c = Optics {
+            lateral_colour_ppm_per_mag: 100.0,
+            ..Optics::default()
+        };
         near(shift(&c, v, 1.6, None), [f * 1e-4 * 0.1, -f * 1e-4 * 0.05]);
-        let t = Optics { node: Some("tube".into()), focal_ppm_per_c: 10.0, ..Optics::default() };
-        near(shift(&t, v, 0.6, Some(25.0)), [f * 5e-5 * 0.1, -f * 5e-5 * 0.05]);
-        let tilt = Optics { tilt_deg: [0.0, 1.0], ..Optics::default() };
+        let t = Optics {
+            node: Some("tube".into()),
+            focal_ppm_per_c: 10.0,
+            ..Optics::default()
+        };
+        near(
+            shift(&t, v, 0.6, Some(25.0)),
+            [f * 5e-5 * 0.1, -f * 5e-5 * 0.05],
+        );
+        let tilt = Optics {
+            tilt_deg: [0.0, 1.0],
+            ..Optics::default()
+        };
         let scale = 1.0 / (1.0 + 0.1 * 1_f64.to_radians().tan()) - 1.0;
-        near(shift(&tilt, v, 0.6, None), [f * scale * 0.1, -f * scale * 0.05]);
+        near(
+            shift(&tilt, v, 0.6, None),
+            [f * scale * 0.1, -f * scale * 0.05],
+        );
     }
 
     #[test]

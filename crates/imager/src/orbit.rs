@@ -59,7 +59,8 @@ impl Orbit {
         let period_s = self.period_s.unwrap_or(PERIOD_S);
         let a = TAU * t_s / period_s + self.phase_deg.to_radians();
         let node = Rotation3::from_axis_angle(&Vector3::z_axis(), self.node_deg.to_radians());
-        let tilt = Rotation3::from_axis_angle(&Vector3::x_axis(), self.inclination_deg.to_radians());
+        let tilt =
+            Rotation3::from_axis_angle(&Vector3::x_axis(), self.inclination_deg.to_radians());
         let speed = TAU * self.radius_km / period_s;
         constant + node * tilt * Vector3::new(-a.sin(), a.cos(), 0.0) * speed
     }

@@ -88,7 +88,9 @@ impl Plan {
         sigma_px: f64,
         mut add: impl FnMut(usize, [f64; 2], f64),
     ) {
-        let way = place.windows(2).map(|p| (p[1][0] - p[0][0]).hypot(p[1][1] - p[0][1]));
+        let way = place
+            .windows(2)
+            .map(|p| (p[1][0] - p[0][0]).hypot(p[1][1] - p[0][1]));
         let sigmas = way.sum::<f64>() / sigma_px;
         let at = LEVELS.iter().position(|(_, most)| sigmas <= *most);
         let level = &self.levels[at.unwrap_or(LEVELS.len() - 1)];
@@ -114,7 +116,13 @@ fn chebyshev() -> [f64; NODES] {
 fn lagrange(x: f64) -> [f64; NODES] {
     let at = chebyshev();
     core::array::from_fn(|i| {
-        let factor = |j: usize| if j == i { 1.0 } else { (x - at[j]) / (at[i] - at[j]) };
+        let factor = |j: usize| {
+            if j == i {
+                1.0
+            } else {
+                (x - at[j]) / (at[i] - at[j])
+            }
+        };
         (0..NODES).map(factor).product()
     })
 }
@@ -157,7 +165,11 @@ mod tests {
             let (x, w) = gauss_legendre(n);
             for power in [0, 1, 2, 4] {
                 let sum: f64 = x.iter().zip(&w).map(|(x, w)| w * x.powi(power)).sum();
-                let exact = if power % 2 == 1 { 0.0 } else { 1.0 / f64::from(power + 1) };
+                let exact = if power % 2 == 1 {
+                    0.0
+                } else {
+                    1.0 / f64::from(power + 1)
+                };
                 assert!((sum - exact).abs() < 1e-13, "{n} {power}: {sum}");
             }
         }
@@ -180,7 +192,10 @@ mod tests {
             let b = a + exposure;
             let x = (1.5 * (b * b - a * a) - 40.0 / 3.0 * (b.powi(3) - a.powi(3))) / exposure;
             let y = (1.25 * (b.powi(4) - a.powi(4)) - 200.0 * (b.powi(5) - a.powi(5))) / exposure;
-            assert!((mean[0] - x).abs() < 1e-12 && (mean[1] - y).abs() < 1e-12, "row {row}");
+            assert!(
+                (mean[0] - x).abs() < 1e-12 && (mean[1] - y).abs() < 1e-12,
+                "row {row}"
+            );
         }
     }
 

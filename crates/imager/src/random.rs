@@ -90,7 +90,10 @@ mod tests {
         let variance = x.iter().map(|x| x * x).sum::<f64>() / count;
         let lag = x.windows(2).map(|w| w[0] * w[1]).sum::<f64>() / count;
         assert!(mean.abs() < 5.0 / count.sqrt(), "{mean}");
-        assert!((variance - 1.0).abs() < 5.0 * (2.0 / count).sqrt(), "{variance}");
+        assert!(
+            (variance - 1.0).abs() < 5.0 * (2.0 / count).sqrt(),
+            "{variance}"
+        );
         assert!(lag.abs() < 5.0 / count.sqrt(), "{lag}");
     }
 }

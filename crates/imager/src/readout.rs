@@ -118,7 +118,12 @@ impl Readout {
             BackgroundLevel::Fixed => self.background_dn.unwrap_or(f64::NAN),
             BackgroundLevel::Border => self.background_dn.unwrap_or(0.0),
         };
-        ImagerError::check("readout.background_dn", level, true, "given with background = \"fixed\"")
+        ImagerError::check(
+            "readout.background_dn",
+            level,
+            true,
+            "given with background = \"fixed\"",
+        )
     }
 
     /// First column and row of the window: the one before, or a new one.
@@ -134,7 +139,11 @@ impl Readout {
         }
         [0, 1].map(|k| {
             let most = f64::from(camera.pixels()[k]) - size[k];
-            corner_of((from_edge[k] - 0.5 * size[k]).round().clamp(0.0, most.max(0.0)))
+            corner_of(
+                (from_edge[k] - 0.5 * size[k])
+                    .round()
+                    .clamp(0.0, most.max(0.0)),
+            )
         })
     }
 
@@ -215,7 +224,10 @@ impl Readout {
     }
 }
 
-#[expect(clippy::cast_possible_truncation, reason = "a whole number within the detector")]
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "a whole number within the detector"
+)]
 fn corner_of(px: f64) -> i32 {
     px as i32
 }
@@ -237,15 +249,24 @@ mod tests {
         assert_eq!(readout.corner(&camera, at(1.19), Some(first)), first);
         assert_eq!(readout.corner(&camera, at(1.21), Some(first)), [510, 509]);
         assert_eq!(readout.corner(&camera, at(600.0), None)[0], 1017);
-        let even = Readout { window: [6, 6], ..Readout::default() };
+        let even = Readout {
+            window: [6, 6],
+            ..Readout::default()
+        };
         assert_eq!(even.corner(&camera, at(0.1), None), [509, 509]);
     }
 
     /// The border's median ignores one hot pixel; the threshold cuts below it.
     #[test]
     fn background_and_threshold() {
-        let readout = Readout { window: [3, 3], threshold_dn: Some(5.0), ..Readout::default() };
-        let window = [100.0, 900.0, 100.0, 100.0, 400.0, 103.0, 100.0, 100.0, 100.0];
+        let readout = Readout {
+            window: [3, 3],
+            threshold_dn: Some(5.0),
+            ..Readout::default()
+        };
+        let window = [
+            100.0, 900.0, 100.0, 100.0, 400.0, 103.0, 100.0, 100.0, 100.0,
+        ];
         let level = readout.background_dn(&window);
         assert!((level - 100.0).abs() < 1e-12);
         let c = readout.centroid(&window, level).unwrap();

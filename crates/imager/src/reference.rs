@@ -91,7 +91,9 @@ impl Bracket {
         for value in self.arcsec_per_c {
             ImagerError::finite("bracket.arcsec_per_c", value)?;
             if value != 0.0 && self.node.is_none() {
-                return Err(ImagerError::NeedsNode { name: "bracket.arcsec_per_c" });
+                return Err(ImagerError::NeedsNode {
+                    name: "bracket.arcsec_per_c",
+                });
             }
         }
         ImagerError::finite("bracket.straight_c", self.straight_c)?;
@@ -199,7 +201,10 @@ impl References {
                 rates.push(rate);
             }
         }
-        table.sigma_arcsec = self.reference.declared().map(|sigma| vec![sigma; table.t_s.len()]);
+        table.sigma_arcsec = self
+            .reference
+            .declared()
+            .map(|sigma| vec![sigma; table.t_s.len()]);
         table.rates_rad_s = self.reference.rates.then_some(rates);
         table
     }

@@ -36,7 +36,9 @@ pub(crate) fn add_star(
     let mut place = [[0.0; 2]; NODES];
     let mut middle = Pixel { x: 0.0, y: 0.0 };
     for (k, q) in exposed.attitude.iter().enumerate() {
-        let Some(at) = way.project(&(q * direction)) else { return };
+        let Some(at) = way.project(&(q * direction)) else {
+            return;
+        };
         if k == NODES / 2 {
             middle = at;
         }
@@ -47,14 +49,16 @@ pub(crate) fn add_star(
     }
     let (spot, columns) = (way.spot(middle), exposed.columns);
     let global = exposed.plan.global();
-    exposed.plan.integrate(&place, spot.sigma_px, |row, at, weight| {
-        if global {
-            spot.add_window(at, columns, light * weight, window);
-        } else {
-            let row_of = &mut window[row * columns..(row + 1) * columns];
-            spot.add_row(at, row, light * weight, row_of);
-        }
-    });
+    exposed
+        .plan
+        .integrate(&place, spot.sigma_px, |row, at, weight| {
+            if global {
+                spot.add_window(at, columns, light * weight, window);
+            } else {
+                let row_of = &mut window[row * columns..(row + 1) * columns];
+                spot.add_row(at, row, light * weight, row_of);
+            }
+        });
 }
 
 /// Place of the middle of a window's row, centred px.

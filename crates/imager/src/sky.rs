@@ -133,20 +133,29 @@ impl Stars {
             known("stars.misplaced.star_id", m.star_id)?;
         }
         let directions = catalogue.directions_at(year);
-        let alone = alone(&directions, self.separation_px / camera.focal_length_px()[0]);
+        let alone = alone(
+            &directions,
+            self.separation_px / camera.focal_length_px()[0],
+        );
         let wanted = |mag: f64| mag >= self.brightest_mag && mag <= self.limiting_mag;
         let stars = catalogue.stars().iter().enumerate();
         let mut sources: Vec<Source> = stars
             .filter(|&(k, star)| alone[k] && wanted(star.mag))
             .map(|(k, star)| self.source(star, directions[k]))
             .collect();
-        sources.sort_by(|a, b| (a.entry.mag.total_cmp(&b.entry.mag)).then(a.entry.id.cmp(&b.entry.id)));
+        sources.sort_by(|a, b| {
+            (a.entry.mag.total_cmp(&b.entry.mag)).then(a.entry.id.cmp(&b.entry.id))
+        });
         Ok(sources)
     }
 
     fn source(&self, star: &CatalogueStar, believed: Vector3<f64>) -> Source {
         let east = Vector3::z().cross(&believed);
-        let east = if east.norm() > 0.0 { east.normalize() } else { Vector3::y() };
+        let east = if east.norm() > 0.0 {
+            east.normalize()
+        } else {
+            Vector3::y()
+        };
         let north = believed.cross(&east);
         let moved = |from: Vector3<f64>, e_arcsec: f64, n_arcsec: f64| {
             let rad = |arcsec: f64| Angle::from_arcsec(arcsec).rad();
@@ -157,15 +166,27 @@ impl Stars {
             direction = moved(direction, m.east_arcsec, m.north_arcsec);
         }
         let flux = |mag: f64| 10_f64.powf(-0.4 * mag);
-        let mut lights = vec![Light { direction, flux: flux(star.mag) }];
+        let mut lights = vec![Light {
+            direction,
+            flux: flux(star.mag),
+        }];
         for c in self.companion.iter().filter(|c| c.star_id == star.id) {
             let (sin, cos) = c.position_angle_deg.to_radians().sin_cos();
             lights.push(Light {
-                direction: moved(direction, c.separation_arcsec * sin, c.separation_arcsec * cos),
+                direction: moved(
+                    direction,
+                    c.separation_arcsec * sin,
+                    c.separation_arcsec * cos,
+                ),
                 flux: flux(star.mag + c.fainter_mag),
             });
         }
-        Source { entry: *star, believed, bv: star.bv, lights }
+        Source {
+            entry: *star,
+            believed,
+            bv: star.bv,
+            lights,
+        }
     }
 }
 
@@ -224,7 +245,9 @@ impl Selection {
             }
             places.push(place);
         }
-        let mut free = (0..self.slots.len()).filter(|&s| places[s].is_none()).collect::<Vec<_>>();
+        let mut free = (0..self.slots.len())
+            .filter(|&s| places[s].is_none())
+            .collect::<Vec<_>>();
         free.reverse();
         if free.is_empty() {
             return;
@@ -250,7 +273,13 @@ mod tests {
     use super::*;
 
     fn star(id: i64, ra_deg: f64, dec_deg: f64, mag: f64) -> CatalogueStar {
-        CatalogueStar { id, ra_deg, dec_deg, mag, ..CatalogueStar::default() }
+        CatalogueStar {
+            id,
+            ra_deg,
+            dec_deg,
+            mag,
+            ..CatalogueStar::default()
+        }
     }
 
     /// Two stars 2 px apart fall out, the brightest comes first, and a companion lies where its angle says.
@@ -287,15 +316,30 @@ mod tests {
     /// A star that leaves hands its slot over to the brightest that is free, and the others stay.
     #[test]
     fn slots_are_handed_over() {
-        let stars = (0..6).map(|k| star(k, 4.0 * k as f64, 0.0, 1.0 + 0.1 * k as f64)).collect();
+        let stars = (0..6)
+            .map(|k| star(k, 4.0 * k as f64, 0.0, 1.0 + 0.1 * k as f64))
+            .collect();
         let catalogue = Catalogue::new(2000.0, stars).unwrap();
-        let settings = Stars { followed: 3, ..Stars::default() };
+        let settings = Stars {
+            followed: 3,
+            ..Stars::default()
+        };
         let camera = crate::Optics::default().camera().unwrap();
         let sources = settings.sources(&catalogue, 2000.0, &camera).unwrap();
         // boresight in the x-y plane, x to the east: at right ascension a the rows are north
         let look = |ra_deg: f64| {
             let a = ra_deg.to_radians();
-            let axes = nalgebra::Matrix3::new(-a.sin(), a.cos(), 0.0, 0.0, 0.0, 1.0, a.cos(), a.sin(), 0.0);
+            let axes = nalgebra::Matrix3::new(
+                -a.sin(),
+                a.cos(),
+                0.0,
+                0.0,
+                0.0,
+                1.0,
+                a.cos(),
+                a.sin(),
+                0.0,
+            );
             UnitQuaternion::from_matrix(&axes)
         };
         let mut selection = Selection::new(3);

@@ -135,7 +135,11 @@ mod tests {
             spot.add_row(at, r, 1.0, row);
         }
         assert!(whole.iter().zip(&rows).all(|(a, b)| (a - b).abs() < 1e-15));
-        let x: f64 = whole.iter().enumerate().map(|(k, w)| w * ((k % n) as f64 + 0.5)).sum();
+        let x: f64 = whole
+            .iter()
+            .enumerate()
+            .map(|(k, w)| w * ((k % n) as f64 + 0.5))
+            .sum();
         // aliasing of the core, 1e-7
         assert!((x - at[0] - 0.2 * 0.5).abs() < 1e-6, "{x}");
     }

@@ -106,7 +106,10 @@ impl Thermal {
             node.check()?;
             if self.node[..k].iter().any(|other| other.name == node.name) {
                 let name = node.name.clone();
-                return Err(ImagerError::Repeated { what: "thermal node", name });
+                return Err(ImagerError::Repeated {
+                    what: "thermal node",
+                    name,
+                });
             }
             if let Some(other) = &node.follows
                 && !self.node[..k].iter().any(|before| before.name == *other)
@@ -119,9 +122,15 @@ impl Thermal {
             self.index("thermal.sensor.node", &sensor.node)?;
             ImagerError::not_negative("thermal.sensor.noise_c", sensor.noise_c)?;
             ImagerError::not_negative("thermal.sensor.step_c", sensor.step_c)?;
-            if self.sensor[..k].iter().any(|other| other.channel == sensor.channel) {
+            if self.sensor[..k]
+                .iter()
+                .any(|other| other.channel == sensor.channel)
+            {
                 let name = sensor.channel.clone();
-                return Err(ImagerError::Repeated { what: "channel", name });
+                return Err(ImagerError::Repeated {
+                    what: "channel",
+                    name,
+                });
             }
         }
         ImagerError::positive("thermal.rate_hz", self.rate_hz())
@@ -177,13 +186,21 @@ impl Temperatures {
     pub(crate) fn new(thermal: &Thermal, from_s: f64) -> Self {
         let nodes = thermal.node.clone();
         let place = |name: &String| nodes.iter().position(|node| node.name == *name);
-        let follows = nodes.iter().map(|node| node.follows.as_ref().and_then(place)).collect();
+        let follows = nodes
+            .iter()
+            .map(|node| node.follows.as_ref().and_then(place))
+            .collect();
         let longest = nodes.iter().map(|node| node.tau_s).fold(0.0, f64::max);
         let settling_s = (SETTLING * longest).min(LONGEST_S);
         let first = step_of(from_s - settling_s) - 1;
         let start = |node: &Node| (node.around_c(time_of(first)), false);
         let held = nodes.iter().map(start).collect();
-        let mut temperatures = Self { nodes, follows, first, held };
+        let mut temperatures = Self {
+            nodes,
+            follows,
+            first,
+            held,
+        };
         temperatures.advance([from_s, from_s]);
         temperatures
     }
@@ -245,11 +262,16 @@ impl Temperatures {
 
     fn row(&self, t_s: f64) -> usize {
         let last = usize::try_from(self.steps() - 2).unwrap_or(0);
-        usize::try_from(step_of(t_s) - self.first).unwrap_or(0).min(last)
+        usize::try_from(step_of(t_s) - self.first)
+            .unwrap_or(0)
+            .min(last)
     }
 }
 
-#[expect(clippy::cast_possible_truncation, reason = "seconds of a mission fit by far")]
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "seconds of a mission fit by far"
+)]
 fn step_of(t_s: f64) -> i64 {
     (t_s / STEP_S).floor() as i64
 }
@@ -261,9 +283,19 @@ fn time_of(step: i64) -> f64 {
 
 impl Sensor {
     /// What the sensor says at an instant; the number of the sample makes its noise.
-    pub(crate) fn reads(&self, temperatures: &Temperatures, node: usize, t_s: f64, key: Key) -> f64 {
+    pub(crate) fn reads(
+        &self,
+        temperatures: &Temperatures,
+        node: usize,
+        t_s: f64,
+        key: Key,
+    ) -> f64 {
         if self.channel.ends_with("_on") {
-            return if temperatures.is_on(node, t_s) { 1.0 } else { 0.0 };
+            return if temperatures.is_on(node, t_s) {
+                1.0
+            } else {
+                0.0
+            };
         }
         let noise: f64 = StandardNormal.sample(&mut key.stream());
         let value = temperatures.at(node, t_s) + self.noise_c * noise;
@@ -332,7 +364,10 @@ mod tests {
         for pair in switched.windows(2) {
             let lasted = pair[1].0 - pair[0].0;
             // late by up to a step at either end, and the overshoot has to be made good: 2 more
-            assert!((lasted - if pair[0].1 { on } else { off }).abs() < 1.0, "{lasted}");
+            assert!(
+                (lasted - if pair[0].1 { on } else { off }).abs() < 1.0,
+                "{lasted}"
+            );
         }
         assert!(switched.len() > 10);
         // 100 s after switching on the plate rises by 26 - T over 400 s; its curvature adds tau/400 of the lag

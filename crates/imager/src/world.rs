@@ -7,10 +7,9 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::thermal::Thermal;
 use crate::{
     Background, Bracket, Clock, Detector, ImagerError, Optics, Orbit, Readout, Reference, Shutter,
-    Stars,
+    Stars, Thermal, Truth,
 };
 
 /// The value of `format` in a world file.
@@ -62,20 +61,6 @@ pub struct Instrument {
     pub reference: Option<Reference>,
 }
 
-/// `[truth]`: what acts, for whoever judges a diagnosis.
-#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct Truth {
-    /// Effects of the catalogue that act, by id.
-    pub effects: Vec<String>,
-    /// What acts and is in no catalogue, in words.
-    pub outside: Vec<String>,
-    /// What the leftover follows, in the words of a report, where something is outside.
-    pub follows: Vec<String>,
-    /// Anything else worth knowing.
-    pub note: Option<String>,
-}
-
 impl Instrument {
     /// Reads the tables of a world file; `file` is its name in messages, `others` are tables that the
     /// caller reads from the same text.
@@ -115,6 +100,7 @@ impl Instrument {
     ///
     /// The first number outside its range, or a thermal node that does not exist.
     pub fn check(&self) -> Result<(), ImagerError> {
+        self.truth.check()?;
         self.optics.check()?;
         self.shutter.check()?;
         self.detector.check()?;
@@ -132,11 +118,13 @@ impl Instrument {
 
     pub(crate) fn optics_node(&self) -> Result<Option<usize>, ImagerError> {
         let node = self.optics.node.as_ref();
-        node.map(|node| self.thermal.index("optics.node", node)).transpose()
+        node.map(|node| self.thermal.index("optics.node", node))
+            .transpose()
     }
 
     pub(crate) fn bracket_node(&self) -> Result<Option<usize>, ImagerError> {
         let node = self.bracket.node.as_ref();
-        node.map(|node| self.thermal.index("bracket.node", node)).transpose()
+        node.map(|node| self.thermal.index("bracket.node", node))
+            .transpose()
     }
 }

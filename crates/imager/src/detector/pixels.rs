@@ -40,7 +40,12 @@ pub struct Fringe {
 impl Fringe {
     pub(super) fn check(&self) -> Result<(), ImagerError> {
         let a = self.amplitude;
-        ImagerError::check("detector.fringe.amplitude", a, a.abs() < 1.0, "between -1 and 1")?;
+        ImagerError::check(
+            "detector.fringe.amplitude",
+            a,
+            a.abs() < 1.0,
+            "between -1 and 1",
+        )?;
         ImagerError::positive("detector.fringe.pitch_px", self.pitch_px)?;
         ImagerError::finite("detector.fringe.direction_deg", self.direction_deg)
     }
@@ -119,7 +124,10 @@ impl<'a> PixelTraits<'a> {
                 }
             }
         }
-        let hot = d.hot.iter().filter(|hot| (hot.column, hot.row) == (column, row));
+        let hot = d
+            .hot
+            .iter()
+            .filter(|hot| (hot.column, hot.row) == (column, row));
         dark + hot.map(|hot| hot.e_s).sum::<f64>()
     }
 
@@ -165,12 +173,17 @@ mod tests {
     /// 4000 pixels, binomial standard error; blocks cost less than 1/32 of that.
     #[test]
     fn a_switching_pixel_is_a_telegraph_signal() {
-        let detector = Detector { telegraph_s: 50.0, ..Detector::default() };
+        let detector = Detector {
+            telegraph_s: 50.0,
+            ..Detector::default()
+        };
         let traits = PixelTraits::new(&detector, 5);
         let n = 4000_i32;
         let state = |k: i32, t: f64| traits.is_on(k, 7, t);
         let on = (0..n).filter(|&k| state(k, 1000.0)).count() as f64 / f64::from(n);
-        let changed = (0..n).filter(|&k| state(k, 1000.0) != state(k, 1020.0)).count();
+        let changed = (0..n)
+            .filter(|&k| state(k, 1000.0) != state(k, 1020.0))
+            .count();
         let p = 0.5 * (1.0 - (-2.0 * 20.0 / 50.0_f64).exp());
         let error = |p: f64| 5.0 * (p * (1.0 - p) / f64::from(n)).sqrt();
         assert!((on - 0.5).abs() < error(0.5), "{on}");
@@ -192,11 +205,17 @@ mod tests {
         let n = 40_000_i32;
         let spread = |f: &dyn Fn(i32) -> f64| {
             let mean = (0..n).map(f).sum::<f64>() / f64::from(n);
-            (mean, ((0..n).map(|k| (f(k) - mean).powi(2)).sum::<f64>() / f64::from(n)).sqrt())
+            (
+                mean,
+                ((0..n).map(|k| (f(k) - mean).powi(2)).sum::<f64>() / f64::from(n)).sqrt(),
+            )
         };
         let off = 5.0 / (2.0 * f64::from(n)).sqrt();
         let (mean, rms) = spread(&|k| traits.sensitivity(k % 200, k / 200));
-        assert!((mean - 1.0).abs() < 1e-3 && (rms / 0.01 - 1.0).abs() < off, "{mean} {rms}");
+        assert!(
+            (mean - 1.0).abs() < 1e-3 && (rms / 0.01 - 1.0).abs() < off,
+            "{mean} {rms}"
+        );
         let (_, rms) = spread(&|k| traits.dark_e_s(k % 200, k / 200, 0.0));
         assert!((rms / 30.0 - 1.0).abs() < off, "{rms}");
         let (_, rms) = spread(&|k| traits.column_e(k));

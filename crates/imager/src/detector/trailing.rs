@@ -67,14 +67,28 @@ mod tests {
     /// One bright row: what it loses comes out geometrically behind it, and nothing before it.
     #[test]
     fn a_trail_follows() {
-        let trailing = Trailing { traps_e: 0.1, knee_e: 100.0, release_px: 2.0 };
-        let place = Place { corner: [0, 499], columns: 1, t_s: 0.0, exposure_s: 0.1 };
+        let trailing = Trailing {
+            traps_e: 0.1,
+            knee_e: 100.0,
+            release_px: 2.0,
+        };
+        let place = Place {
+            corner: [0, 499],
+            columns: 1,
+            t_s: 0.0,
+            exposure_s: 0.1,
+        };
         let mut window = [0.0, 1000.0, 0.0, 0.0, 0.0];
         trailing.apply(place, &mut window);
         // row 500 is the 501st transfer
         let captured = 50.1 * (1.0 - (-10.0_f64).exp());
         let a = (-0.5_f64).exp();
-        let want = [0.0, 1000.0 - captured, captured * (1.0 - a), captured * (1.0 - a) * a];
+        let want = [
+            0.0,
+            1000.0 - captured,
+            captured * (1.0 - a),
+            captured * (1.0 - a) * a,
+        ];
         for (got, want) in window.iter().zip(want) {
             assert!((got - want).abs() < 1e-9, "{got} {want}");
         }
@@ -83,12 +97,26 @@ mod tests {
     /// A uniform level stays, whatever the traps: what is captured comes out of the rows before.
     #[test]
     fn a_level_stays() {
-        let trailing = Trailing { traps_e: 0.1, knee_e: 100.0, release_px: 2.0 };
-        let place = Place { corner: [0, 499], columns: 2, t_s: 0.0, exposure_s: 0.1 };
+        let trailing = Trailing {
+            traps_e: 0.1,
+            knee_e: 100.0,
+            release_px: 2.0,
+        };
+        let place = Place {
+            corner: [0, 499],
+            columns: 2,
+            t_s: 0.0,
+            exposure_s: 0.1,
+        };
         let mut window = [40.0; 12];
         trailing.apply(place, &mut window);
         // captured grows by 1/500 a row
         let captured = 50.0 * (1.0 - (-0.4_f64).exp());
-        assert!(window.iter().all(|w| (w - 40.0).abs() < 6.0 * captured / 500.0), "{window:?}");
+        assert!(
+            window
+                .iter()
+                .all(|w| (w - 40.0).abs() < 6.0 * captured / 500.0),
+            "{window:?}"
+        );
     }
 }

@@ -129,7 +129,10 @@ impl<'a> OutTable<'a> {
         cells.map(|(_, cells)| cells.for_parquet()).collect()
     }
 
-    fn parquet_rows<W: Write + Send>(&self, writer: &mut ArrowWriter<W>) -> Result<(), ParquetError> {
+    fn parquet_rows<W: Write + Send>(
+        &self,
+        writer: &mut ArrowWriter<W>,
+    ) -> Result<(), ParquetError> {
         let (cells, schema) = (self.parquet_cells(), schema(self));
         for start in (0..self.rows).step_by(BATCH) {
             let end = self.rows.min(start + BATCH);
