@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use boresight::telemetry::TableFormat;
 use clap::{Args, Parser, Subcommand};
 
 /// Star tracker error models that close the loop with measured data.
@@ -33,7 +34,7 @@ pub(crate) enum Command {
     Close(Close),
     /// Make the bundle that a tracker would have sent
     #[command(
-        after_help = "Examples:\n  boresight simulate fixtures/scenarios/example.toml --out bundle/\n  boresight simulate --preset iht --out bundle/\n  boresight simulate --print-preset pitt > my.toml"
+        after_help = "Examples:\n  boresight simulate fixtures/scenarios/example.toml --out bundle/\n  boresight simulate --preset iht --out bundle/\n  boresight simulate --print-preset pitt > my.toml\n  boresight simulate fixtures/worlds/null_slews.toml --fidelity pixel --out bundle/"
     )]
     Simulate(Simulate),
 }
@@ -53,7 +54,7 @@ pub(crate) struct Close {
 
 #[derive(Debug, Args)]
 pub(crate) struct Simulate {
-    /// Scenario file: a model with [motion], [sky] and [run]
+    /// Scenario file, a model with [motion], [sky] and [run]; or a world file
     #[arg(value_name = "SCENARIO.toml", required_unless_present_any = ["preset", "print_preset"])]
     pub(crate) scenario: Option<PathBuf>,
     /// A scenario of the paper: iht, iht-distance, ict1, ict2, pitt, st2-iht, st2-iht-distance, st2-ict1, st2-ict2
@@ -62,12 +63,23 @@ pub(crate) struct Simulate {
     /// Print the file of a preset, to be edited, and do nothing else
     #[arg(long, value_name = "NAME", num_args = 0..=1, default_missing_value = "", conflicts_with = "scenario")]
     pub(crate) print_preset: Option<String>,
+    /// How measurements are made [default: what the file's format asks for]
+    #[arg(long, value_enum)]
+    pub(crate) fidelity: Option<Fidelity>,
     /// Folder of the bundle
     #[arg(long, value_name = "BUNDLE", required_unless_present = "print_preset")]
     pub(crate) out: Option<PathBuf>,
     /// How tables are written
     #[arg(long, value_enum, default_value_t = Tables::CsvGz)]
     pub(crate) tables: Tables,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub(crate) enum Fidelity {
+    /// By the formulas of the model and its effects
+    Model,
+    /// By rendering pixels: of a world file, or of a scenario without effects
+    Pixel,
 }
 
 #[derive(Clone, Copy, Debug, clap::ValueEnum)]
@@ -78,6 +90,16 @@ pub(crate) enum Tables {
     CsvGz,
     /// Parquet
     Parquet,
+}
+
+impl Tables {
+    pub(crate) fn format(self) -> TableFormat {
+        match self {
+            Self::Csv => TableFormat::Csv,
+            Self::CsvGz => TableFormat::CsvGz,
+            Self::Parquet => TableFormat::Parquet,
+        }
+    }
 }
 
 fn threads(text: &str) -> Result<usize, String> {

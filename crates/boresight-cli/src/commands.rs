@@ -1,4 +1,5 @@
 //! One module a command.
 
 pub(crate) mod close;
+pub(crate) mod render;
 pub(crate) mod simulate;

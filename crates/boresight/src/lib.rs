@@ -13,6 +13,7 @@
 //! | [`effects`] | the catalogue of effects: how each acts, and what it leaves in a residual |
 //! | [`telemetry`] | bundles, models and results on disk |
 //! | [`scenarios`] | motions and skies: bundles simulated from a scenario |
+//! | [`imager`] | pixels: what the detector sees and the tracker reads out, an independent truth |
 //! | [`closed_loop`] | residual, cause, better model |
 //! | [`report`] | text from finished results |
 //!
@@ -62,7 +63,7 @@
 
 #[doc(inline)]
 pub use {
-    centroid, closed_loop, distortion, effects, focal_plane, quest, report, scenarios,
+    centroid, closed_loop, distortion, effects, focal_plane, imager, quest, report, scenarios,
     star_tracker, telemetry,
 };
 

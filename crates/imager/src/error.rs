@@ -50,6 +50,14 @@ pub enum ImagerError {
         /// The star.
         id: i64,
     },
+    /// An effect by name.
+    #[error(
+        "effect `{id}` is a formula: what acts at pixel level is a setting of the instrument, in a world file"
+    )]
+    Formula {
+        /// Its id.
+        id: String,
+    },
     /// The frame itself cannot be described.
     #[error(transparent)]
     Camera(#[from] CameraError),

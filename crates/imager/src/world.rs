@@ -6,6 +6,7 @@
 //! Not physics: reading a file.
 
 use serde::{Deserialize, Serialize};
+use telemetry::Model;
 
 use crate::{
     Background, Bracket, Clock, Detector, ImagerError, Optics, Orbit, Readout, Reference, Shutter,
@@ -90,6 +91,47 @@ impl Instrument {
             return Err(format.expected(&format!("{WORLD_FORMAT:?}")).into());
         }
         let instrument: Self = telemetry::config::deserialise(text, file)?;
+        instrument.check()?;
+        Ok(instrument)
+    }
+
+    /// The instrument that a model speaks of: its detector, field, exposure and number of stars; all
+    /// else is this crate's default. Noise and centroid errors of the model are formulas and mean
+    /// nothing here: they come out of the rendering.
+    ///
+    /// # Errors
+    ///
+    /// A model with effects (they are formulas too), or without a detector.
+    pub fn of_model(model: &Model) -> Result<Self, ImagerError> {
+        if let Some(effect) = model.effects.first() {
+            let id = effect.id.clone();
+            return Err(ImagerError::Formula { id });
+        }
+        let tracker = &model.tracker;
+        let default = Self::default();
+        let pixels = tracker.pixels.unwrap_or(default.optics.pixels);
+        let of_focal = |f: f64| 2.0 * (0.5 * f64::from(pixels[0]) / f).atan().to_degrees();
+        let fov_deg = tracker.fov_deg.map(|fov| fov[0]);
+        let fov_deg = fov_deg.or(tracker.focal_length_px.map(of_focal));
+        let followed = tracker
+            .max_stars
+            .and_then(|stars| usize::try_from(stars).ok());
+        let instrument = Self {
+            optics: Optics {
+                pixels,
+                fov_deg: fov_deg.unwrap_or(default.optics.fov_deg),
+                ..default.optics
+            },
+            shutter: Shutter {
+                exposure_s: tracker.exposure_s.unwrap_or(default.shutter.exposure_s),
+                ..default.shutter
+            },
+            stars: Stars {
+                followed: followed.unwrap_or(default.stars.followed),
+                ..default.stars
+            },
+            ..default
+        };
         instrument.check()?;
         Ok(instrument)
     }

@@ -2,9 +2,9 @@
 
 use anyhow::Context as _;
 use boresight::scenarios::{Scenario, preset, simulate};
-use boresight::telemetry::TableFormat;
 
-use crate::arguments::{Simulate, Tables};
+use crate::arguments::Simulate;
+use crate::commands::render;
 use crate::console::Console;
 
 pub(crate) fn run(options: &Simulate, console: &Console) -> anyhow::Result<()> {
@@ -18,6 +18,11 @@ pub(crate) fn run(options: &Simulate, console: &Console) -> anyhow::Result<()> {
         return Ok(());
     }
     let out = options.out.as_ref().context("--out needs a folder")?;
+    if let Some(path) = &options.scenario
+        && render::wanted(path, options.fidelity)?
+    {
+        return render::run(path, out, options, console);
+    }
     console.progress("reading the scenario");
     let scenario = match (&options.preset, &options.scenario) {
         (Some(name), _) => preset(name)?.scenario()?,
@@ -27,12 +32,7 @@ pub(crate) fn run(options: &Simulate, console: &Console) -> anyhow::Result<()> {
     console.progress("simulating");
     let bundle = simulate(&scenario)?;
     console.progress("writing the bundle");
-    let format = match options.tables {
-        Tables::Csv => TableFormat::Csv,
-        Tables::CsvGz => TableFormat::CsvGz,
-        Tables::Parquet => TableFormat::Parquet,
-    };
-    bundle.write(out, format)?;
+    bundle.write(out, options.tables.format())?;
     let solved = bundle.attitude.as_ref().map_or(0, |a| a.t_s.len());
     let frames = bundle.stars.as_ref().map_or(solved, |s| s.frames());
     let rows = bundle.stars.as_ref().map_or(0, |s| s.rows());
