@@ -8,7 +8,7 @@
 //! px   = f (1 + a (T - T0)) x'' + centre                      focal length with temperature
 //!
 //! s^2  = (s0 + s1 (B-V - 0.6))^2 + (b (T - T_focus))^2        width of the spot
-//! flare displaced by coma_px r / r_edge along the radius
+//! flare displaced from the core by coma_px r / r_edge along the radius, centre of light unmoved
 //! ```
 //!
 //! The tracker believes in a plain pinhole of the nominal focal length: what a calibration takes away

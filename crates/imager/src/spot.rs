@@ -2,11 +2,12 @@
 //!
 //! ```text
 //! share of pixel (c, r) = g_c g_r,   g_c = [erf((c + 1 - x)/(s sqrt 2)) - erf((c - x)/(s sqrt 2))] / 2
-//! spot = (1 - w) G(x, s) + w G(x + d, 1.5 s)
+//! spot = (1 - w) G(x - w d, s) + w G(x + (1 - w) d, 1.5 s)
 //! ```
 //!
-//! x, y in pixels from the first edge of the window; d is the displacement of the flare, w its share of
-//! the light. The shares of an infinite window sum to 1.
+//! x, y in pixels from the first edge of the window; d is the displacement of the flare from the core, w
+//! its share of the light. The shares of an infinite window sum to 1, and their first moment is x: where
+//! the light is on average is what a calibration has measured.
 //!
 //! Source: integral of a normal density over a pixel; coma as a displaced wider component (Welford,
 //! Aberrations of Optical Systems, 1986, ch. 8: a flare along the radius that grows with the field).
@@ -26,7 +27,7 @@ pub struct Spot {
     pub sigma_px: f64,
     /// Share of the light in the flare.
     pub flare: f64,
-    /// Displacement of the flare along x and y, px.
+    /// Displacement of the flare from the core along x and y, px.
     pub flare_px: [f64; 2],
 }
 
@@ -83,10 +84,20 @@ impl Spot {
     }
 
     fn for_components(&self, at: [f64; 2], light: f64, mut add: impl FnMut([f64; 2], f64, f64)) {
-        add(at, self.sigma_px, light * (1.0 - self.flare));
+        let moved = |part: f64| {
+            [
+                at[0] + part * self.flare_px[0],
+                at[1] + part * self.flare_px[1],
+            ]
+        };
+        add(
+            moved(-self.flare),
+            self.sigma_px,
+            light * (1.0 - self.flare),
+        );
         if self.flare > 0.0 {
-            let at = [at[0] + self.flare_px[0], at[1] + self.flare_px[1]];
-            add(at, FLARE_WIDTH * self.sigma_px, light * self.flare);
+            let sigma_px = FLARE_WIDTH * self.sigma_px;
+            add(moved(1.0 - self.flare), sigma_px, light * self.flare);
         }
     }
 }
@@ -120,9 +131,11 @@ mod tests {
         assert!((moment(2, at[0]) - sigma * sigma - 1.0 / 12.0).abs() < 1e-4);
     }
 
-    /// Rows one by one are the window, and a flare displaces the first moment by its share.
+    /// Rows one by one are the window; a flare leaves the first moment and skews the spot: third moment
+    /// of two Gaussians `w (1 - w) d ((1 - 2 w) d^2 + 3 (s_f^2 - s^2))`, to aliasing (1e-6) and the cut
+    /// of the window at 9 s.
     #[test]
-    fn rows_make_the_window_and_a_flare_pulls() {
+    fn rows_make_the_window_and_a_flare_skews() {
         let (n, at) = (25_usize, [12.4, 12.1]);
         let spot = Spot {
             sigma_px: 0.9,
@@ -135,12 +148,13 @@ mod tests {
             spot.add_row(at, r, 1.0, row);
         }
         assert!(whole.iter().zip(&rows).all(|(a, b)| (a - b).abs() < 1e-15));
-        let x: f64 = whole
-            .iter()
-            .enumerate()
-            .map(|(k, w)| w * ((k % n) as f64 + 0.5))
-            .sum();
-        // aliasing of the core, 1e-7
-        assert!((x - at[0] - 0.2 * 0.5).abs() < 1e-6, "{x}");
+        let moment = |power: i32| -> f64 {
+            let one = |(k, w): (usize, &f64)| w * ((k % n) as f64 + 0.5 - at[0]).powi(power);
+            whole.iter().enumerate().map(one).sum()
+        };
+        let (w, d, s) = (0.2, 0.5, 0.9_f64);
+        let skew = w * (1.0 - w) * d * ((1.0 - 2.0 * w) * d * d + 3.0 * s * s * 1.25);
+        assert!(moment(1).abs() < 1e-6, "{}", moment(1));
+        assert!((moment(3) - skew).abs() < 1e-4, "{} {skew}", moment(3));
     }
 }
