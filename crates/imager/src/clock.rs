@@ -45,7 +45,7 @@ pub struct Clock {
 }
 
 impl Shutter {
-    pub(crate) fn check(&self) -> Result<(), ImagerError> {
+    pub(crate) fn check(self) -> Result<(), ImagerError> {
         ImagerError::not_negative("shutter.exposure_s", self.exposure_s)?;
         ImagerError::positive("shutter.exposure_s", self.exposure_s)?;
         ImagerError::finite("shutter.row_time_s", self.row_time_s)

@@ -141,7 +141,7 @@ impl Detector {
             ImagerError::check(name, share, (0.0..=1.0).contains(&share), "from 0 to 1")?;
         }
         self.fringe.iter().try_for_each(Fringe::check)?;
-        self.hot.iter().try_for_each(HotPixel::check)?;
+        self.hot.iter().copied().try_for_each(HotPixel::check)?;
         self.trailing.iter().try_for_each(Trailing::check)?;
         self.particles.iter().try_for_each(Particles::check)
     }
@@ -190,6 +190,7 @@ impl Detector {
 /// Column and row of pixel `k` of a window.
 fn pixel_of(place: Place, k: usize) -> (i32, i32) {
     // windows have at most 64 x 64 pixels
-    let (column, row) = ((k % place.columns) as i32, (k / place.columns) as i32);
+    let whole = |k: usize| i32::try_from(k).unwrap_or(i32::MAX);
+    let (column, row) = (whole(k % place.columns), whole(k / place.columns));
     (place.corner[0] + column, place.corner[1] + row)
 }

@@ -244,7 +244,7 @@ impl Temperatures {
 
     fn steps(&self) -> i64 {
         // a chunk holds some thousand steps
-        (self.held.len() / self.nodes.len()) as i64
+        i64::try_from(self.held.len() / self.nodes.len()).unwrap_or(i64::MAX)
     }
 
     /// Temperature of a node, deg C, at an instant that [`advance`](Self::advance) covers.

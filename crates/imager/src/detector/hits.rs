@@ -57,9 +57,8 @@ impl Particles {
             while left_px > 0.0 {
                 let step = left_px.min(STEP_PX);
                 if x >= 0.0 && x < columns && y >= 0.0 && y < rows {
-                    // inside the window: whole numbers that fit
-                    let (c, r) = (x as usize, y as usize);
-                    window[r * place.columns + c] += self.charge_e_px * charge * step;
+                    let at = cell(y) * place.columns + cell(x);
+                    window[at] += self.charge_e_px * charge * step;
                 }
                 x += step * cos;
                 y += step * sin;
@@ -67,4 +66,13 @@ impl Particles {
             }
         }
     }
+}
+
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "inside a window: not negative, and below its size"
+)]
+fn cell(px: f64) -> usize {
+    px as usize
 }

@@ -70,7 +70,7 @@ pub struct HotPixel {
 }
 
 impl HotPixel {
-    pub(super) fn check(&self) -> Result<(), ImagerError> {
+    pub(super) fn check(self) -> Result<(), ImagerError> {
         ImagerError::not_negative("detector.hot.e_s", self.e_s)
     }
 }
