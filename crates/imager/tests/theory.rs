@@ -1,6 +1,7 @@
 //! Rendered and read out, against closed forms that share nothing with the rendering.
 //!
 //! `docs/imager.md` shows the figures that these tests print (`-- --nocapture`).
+#![expect(clippy::unwrap_used, reason = "helpers of tests")]
 
 use core::f64::consts::{PI, TAU};
 
@@ -388,7 +389,7 @@ fn a_trail_has_the_second_moment_of_a_bar() {
     assert!((moment(true) - trail).abs() < 3e-4 && (moment(false) - still).abs() < 3e-4);
 }
 
-/// Row y is exposed y row times after row 0: the star is found at x(t + row_time y). Along y the light
+/// Row y is exposed y row times after row 0: the star is found at `x(t + row_time y)`. Along y the light
 /// falls on each row at that row's own time, so that the image is squeezed by `1/(1 + v_y row_time)` about
 /// it: `y = y0/(1 - v_y row_time)`, exactly, for a way at constant speed.
 #[test]
