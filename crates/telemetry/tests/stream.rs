@@ -1,4 +1,5 @@
 //! A bundle written in pieces is the bundle written at once.
+#![expect(clippy::unwrap_used, reason = "helpers of tests")]
 
 use std::fs;
 use std::path::Path;
