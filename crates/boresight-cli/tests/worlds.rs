@@ -157,6 +157,28 @@ fn a_scenario_is_rendered_unless_it_names_effects() -> Done {
     Ok(())
 }
 
+/// The example of the page is a world that is rendered.
+#[test]
+fn the_example_of_the_page_is_rendered() -> Done {
+    let page = fs::read_to_string(worlds().join("../../docs/imager.md"))?;
+    let example = page
+        .split("```toml\n")
+        .nth(1)
+        .and_then(|rest| rest.split("```").next());
+    let dir = tempfile::tempdir()?;
+    let world = dir.path().join("example.toml");
+    fs::write(&world, example.ok_or("an example")?)?;
+    let bundle = dir.path().join("bundle");
+    render(&world, &bundle, &[])?;
+    let truth: serde_json::Value =
+        serde_json::from_str(&fs::read_to_string(bundle.join("truth.json"))?)?;
+    assert_eq!(truth["effects"][0]["values"]["line_time_s"], 2.4e-6);
+    assert_eq!(truth["effects"][1]["selectors"]["channel"], "plate_c");
+    assert_eq!(truth["settings"]["detector"]["prnu"], 0.003);
+    assert!(bundle.join("housekeeping.csv").is_file());
+    Ok(())
+}
+
 /// A misspelt key of a world is answered with its line and the nearest key, and nothing is written.
 #[test]
 fn a_misspelt_key_is_answered() -> Done {
