@@ -63,3 +63,24 @@ impl Background {
         self.sky_e_s * linear(self.sky_gradient) + risen * linear(self.stray_gradient)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// By hand at half way to an edge on x, and at the lower edge.
+    #[test]
+    fn sky_and_stray_light_are_linear() {
+        let camera = crate::Optics::default().camera().unwrap();
+        let background = Background {
+            sky_e_s: 100.0,
+            sky_gradient: [0.2, -0.1],
+            stray_e_s2: 3.0,
+            stray_gradient: [0.0, 0.5],
+            stray_from_s: 10.0,
+        };
+        let at = |x: f64, y: f64, t: f64| background.e_s(&camera, Pixel { x, y }, t);
+        assert!((at(256.0, 0.0, 5.0) - 110.0).abs() < 1e-9);
+        assert!((at(0.0, -512.0, 20.0) - (110.0 + 30.0 * 0.5)).abs() < 1e-9);
+    }
+}

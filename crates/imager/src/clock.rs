@@ -70,3 +70,28 @@ impl Clock {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::Use;
+
+    /// Late by the delay, on whole steps; jitter has the spread asked for (1000 stamps: 5/sqrt(2000)).
+    #[test]
+    fn stamps_are_late_stepped_and_jittered() {
+        let key = Key::new(1, 0, Use::Clock);
+        let late = Clock {
+            delay_s: 0.012_34,
+            jitter_s: 0.0,
+            step_s: 0.001,
+        };
+        assert!((late.stamp_s(5.0, key) - 5.012).abs() < 1e-12);
+        let jittered = Clock {
+            jitter_s: 2e-3,
+            ..Clock::default()
+        };
+        let squares = |k: u64| jittered.stamp_s(0.0, key.with(k)).powi(2);
+        let rms = ((0..1000).map(squares).sum::<f64>() / 1000.0).sqrt();
+        assert!((rms / 2e-3 - 1.0).abs() < 5.0 / 2000_f64.sqrt(), "{rms}");
+    }
+}

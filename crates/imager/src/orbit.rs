@@ -65,3 +65,29 @@ impl Orbit {
         constant + node * tilt * Vector3::new(-a.sin(), a.cos(), 0.0) * speed
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Speed 2 pi r/P in the plane of the orbit; at the node it climbs by the inclination.
+    #[test]
+    fn a_circle_is_gone_round_at_its_speed() {
+        let orbit = Orbit {
+            velocity_km_s: [0.0, 0.0, 1.0],
+            radius_km: 7000.0,
+            period_s: Some(6000.0),
+            inclination_deg: 60.0,
+            node_deg: 90.0,
+            ..Orbit::default()
+        };
+        let speed = TAU * 7000.0 / 6000.0;
+        let own = |t| orbit.velocity_km_s(t) - Vector3::z();
+        assert!((own(1234.0).norm() - speed).abs() < 1e-12);
+        // node at +y: there the velocity is half back along x, the rest up
+        let climb = Vector3::new(-0.5, 0.0, 0.75_f64.sqrt()) * speed;
+        assert!((own(0.0) - climb).norm() < 1e-12, "{}", own(0.0));
+        // a quarter on, the velocity is against the node
+        assert!((own(1500.0) + Vector3::y() * speed).norm() < 1e-12);
+    }
+}

@@ -182,6 +182,72 @@ fn housekeeping_covers_the_frames() {
     assert!(switch.contains(&0.0) && switch.contains(&1.0));
 }
 
+/// White 2 and wander 3 arcsec of 100 s: the sum's spread, and the correlation of neighbours
+/// `9 exp(-0.5/100)/13`. 20000 samples are 100 times the correlation time: 5 sqrt(2/100) of the wander's share.
+#[test]
+fn the_reference_errs_as_it_says() {
+    let sky = sky();
+    let instrument = Instrument {
+        reference: Some(Reference {
+            white_arcsec: [2.0, 0.0, 0.0],
+            wander_arcsec: [3.0, 0.0, 0.0],
+            ..Reference::default()
+        }),
+        ..Instrument::default()
+    };
+    let run = Run {
+        frames: 20_000,
+        ..Run::default()
+    };
+    let truth = UniformRotation::default();
+    let reference = frames(&instrument, &truth, &sky, &run)
+        .unwrap()
+        .reference
+        .unwrap();
+    let identity = nalgebra::UnitQuaternion::identity();
+    let arcsec =
+        |q| focal_plane::Angle::from_rad(focal_plane::rotation_vector(q, &identity).x).arcsec();
+    let error: Vec<f64> = reference.q.iter().map(arcsec).collect();
+    let n = error.len() as f64;
+    let variance = error.iter().map(|e| e * e).sum::<f64>() / n;
+    let lag = error.windows(2).map(|w| w[0] * w[1]).sum::<f64>() / n;
+    let gate = 9.0 * 5.0 * (2.0_f64 / 100.0).sqrt();
+    assert!((variance - 13.0).abs() < gate, "{variance}");
+    // what differs between them is white: 5 sqrt(2/n) of 4 and its products with the wander
+    let white = variance - lag - 9.0 * (1.0 - (-0.5_f64 / 100.0).exp());
+    assert!(
+        (white - 4.0).abs() < 5.0 * (4.0 * 2.0_f64.sqrt() + 6.0) / n.sqrt(),
+        "{white}"
+    );
+    let declared = reference.sigma_arcsec.unwrap()[7];
+    assert!((declared[0] - 13.0_f64.sqrt()).abs() < 1e-12);
+}
+
+/// Without noise a draw is like another: the pixels are those of the seed.
+#[test]
+fn pixels_belong_to_the_seed() {
+    let (truth, sky) = (drift(), sky());
+    let mut instrument = Instrument::default();
+    instrument.detector.photon_noise = false;
+    instrument.detector.read_noise_e = 0.0;
+    instrument.detector.prnu = 0.05;
+    let of = |seed: u64, draw: u64| {
+        let run = Run {
+            frames: 5,
+            seed,
+            draw,
+            ..Run::default()
+        };
+        frames(&instrument, &truth, &sky, &run)
+            .unwrap()
+            .stars
+            .unwrap()
+            .x_px
+    };
+    assert_eq!(of(1, 0), of(1, 1));
+    assert_ne!(of(1, 0), of(2, 0));
+}
+
 #[test]
 fn mistakes_are_named() {
     let (truth, sky) = (drift(), sky());
