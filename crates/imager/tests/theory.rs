@@ -566,3 +566,69 @@ fn charge_is_clipped_and_counted() {
     assert!(full >= 5, "{full} pixels are full");
     assert!(window.iter().all(|v| v.fract() == 0.0), "whole numbers");
 }
+
+/// The raw windows of one frame, light alone.
+fn windows(instrument: &Instrument) -> Vec<f64> {
+    let still = UniformRotation::default();
+    let places = [[0.5, 0.5], [1.5, 200.5]];
+    let bundle = render(instrument, &still, &places, &Run::default());
+    bundle.images.unwrap().pixels
+}
+
+/// A response that bends by n at full well, `q (1 - n q/full well)`, and offsets that go with the
+/// column: two windows above each other, one column apart, share them. Steps of 1e-3 electrons.
+#[test]
+fn response_bends_and_columns_differ() {
+    let mut instrument = silent(9);
+    instrument.readout.images = true;
+    instrument.detector.full_well_e = 1e6;
+    let plain = windows(&instrument);
+    instrument.detector.nonlinearity = 0.1;
+    for (bent, plain) in windows(&instrument).iter().zip(&plain) {
+        let q = (plain - 100.0) * 1e-3;
+        let want = q * (1.0 - 0.1 * q / 1e6);
+        assert!(((bent - 100.0) * 1e-3 - want).abs() < 2e-3, "{bent} {want}");
+    }
+    instrument.detector.nonlinearity = 0.0;
+    instrument.detector.column_e = 20.0;
+    instrument.detector.bias_dn = 1e6;
+    let striped = windows(&instrument);
+    let offset = |window: usize, row: usize, column: usize| {
+        let k = 81 * window + 9 * row + column;
+        (striped[k] - 1e6 - (plain[k] - 100.0)) * 1e-3
+    };
+    let mut largest = 0.0_f64;
+    for column in 1..9 {
+        let first = offset(0, 0, column);
+        largest = largest.max(first.abs());
+        assert!((offset(0, 5, column) - first).abs() < 3e-3);
+        assert!((offset(1, 3, column - 1) - first).abs() < 3e-3);
+    }
+    // eight normal numbers of 20: all below 2 with a chance of 1e-9
+    assert!(largest > 2.0, "{largest}");
+}
+
+/// Two stars of one frame have noise of their own: correlation below 5/sqrt(n).
+#[test]
+fn noise_of_two_windows_is_independent() {
+    let mut instrument = silent(7);
+    instrument.detector.read_noise_e = 50.0;
+    instrument.detector.bias_dn = 1e6;
+    instrument.readout.background_dn = Some(1e6);
+    let still = UniformRotation::default();
+    let run = Run {
+        frames: 2000,
+        ..Run::default()
+    };
+    let bundle = render(&instrument, &still, &[[0.5, 0.5], [300.5, 200.5]], &run);
+    let x = |id: i64| {
+        errors(&bundle, &still, id)
+            .iter()
+            .map(|e| e[0])
+            .collect::<Vec<f64>>()
+    };
+    let (a, b) = (x(0), x(1));
+    let product = a.iter().zip(&b).map(|(a, b)| a * b).sum::<f64>() / 2000.0;
+    let correlation = product / (rms(&a) * rms(&b));
+    assert!(correlation.abs() < 5.0 / 2000_f64.sqrt(), "{correlation}");
+}
