@@ -1,17 +1,20 @@
 //! The reference, and the bracket between it and the tracker.
 //!
 //! ```text
-//! q_ref = exp(e) exp(-b) q_true         tracker axes
+//! q_ref = exp(C e) exp(-b) q_true       tracker axes
 //! b     = c (T_bracket - T0) + slips    bending: the tracker turns by b against whatever the reference rides on
 //! e     = white + wander                wander: first-order Gauss-Markov, exact at its own step
 //! ```
+//!
+//! C turns the axes of the reference, which are the tracker's turned about `cant_axis` by `cant_deg`, into the
+//! tracker's: a second tracker that looks elsewhere is worst about its own boresight.
 //!
 //! A filter's error is mostly wander, a second tracker's mostly white.
 //!
 //! Source: linear thermo-elastic bending of a bracket; [M23] Eq. 15 for the wander.
 
 use focal_plane::{Angle, AttitudeSource, rotation_from_vector};
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Rotation3, Unit, Vector3};
 use rand_distr::{Distribution, StandardNormal};
 use serde::{Deserialize, Serialize};
 use telemetry::ReferenceTable;
@@ -28,13 +31,18 @@ pub struct Reference {
     pub rate_hz: Option<f64>,
     /// Whether it comes with rates; default yes.
     pub rates: bool,
-    /// White error of each sample, 1 sigma per axis, arcsec; default 0.
+    /// Axis about which the reference is turned against the tracker; its length does not matter;
+    /// default y.
+    pub cant_axis: [f64; 3],
+    /// Angle of that turn, deg; default 0.
+    pub cant_deg: f64,
+    /// White error of each sample, 1 sigma about each of its axes, arcsec; default 0.
     pub white_arcsec: [f64; 3],
-    /// Standard deviation of the wander, arcsec; default 0.
+    /// Standard deviation of the wander about each of its axes, arcsec; default 0.
     pub wander_arcsec: [f64; 3],
     /// Correlation time of the wander, s; default 100.
     pub wander_tau_s: [f64; 3],
-    /// What it says of its own error, 1 sigma, arcsec; default the truth.
+    /// What it says of its own error, 1 sigma about the tracker's axes, arcsec; default the truth.
     pub declared_arcsec: Option<[f64; 3]>,
 }
 
@@ -43,6 +51,8 @@ impl Default for Reference {
         Self {
             rate_hz: None,
             rates: true,
+            cant_axis: [0.0, 1.0, 0.0],
+            cant_deg: 0.0,
             white_arcsec: [0.0; 3],
             wander_arcsec: [0.0; 3],
             wander_tau_s: [100.0; 3],
@@ -118,6 +128,9 @@ impl Reference {
         if let Some(rate_hz) = self.rate_hz {
             ImagerError::positive("reference.rate_hz", rate_hz)?;
         }
+        let length = Vector3::from(self.cant_axis).norm();
+        ImagerError::positive("reference.cant_axis (length)", length)?;
+        ImagerError::finite("reference.cant_deg", self.cant_deg)?;
         for axis in 0..3 {
             ImagerError::not_negative("reference.white_arcsec", self.white_arcsec[axis])?;
             ImagerError::not_negative("reference.wander_arcsec", self.wander_arcsec[axis])?;
@@ -128,11 +141,20 @@ impl Reference {
         Ok(())
     }
 
+    /// From its own axes to those of the tracker.
+    fn to_tracker(&self) -> Rotation3<f64> {
+        let axis = Unit::new_normalize(Vector3::from(self.cant_axis));
+        Rotation3::from_axis_angle(&axis, Angle::from_deg(self.cant_deg).rad())
+    }
+
     /// What the table says of the error, if anything.
     fn declared(&self) -> Option<[f64; 3]> {
-        let own = [0, 1, 2].map(|k| self.white_arcsec[k].hypot(self.wander_arcsec[k]));
-        let erring = own.iter().any(|sigma| *sigma > 0.0);
-        self.declared_arcsec.or(erring.then_some(own))
+        let squares = |k: usize| self.white_arcsec[k].powi(2) + self.wander_arcsec[k].powi(2);
+        let own = Vector3::from_fn(|axis, _| squares(axis));
+        let turn = self.to_tracker();
+        let covariance = turn * Matrix3::from_diagonal(&own) * turn.inverse();
+        let sigma = [0, 1, 2].map(|axis| covariance[(axis, axis)].sqrt());
+        self.declared_arcsec.or((own.sum() > 0.0).then_some(sigma))
     }
 }
 
@@ -229,6 +251,31 @@ impl References {
         });
         self.wander = Some(wander);
         let white = Vector3::from_fn(|axis, _| r.white_arcsec[axis] * normal());
-        (wander + white).map(|arcsec| Angle::from_arcsec(arcsec).rad())
+        (r.to_tracker() * (wander + white)).map(|arcsec| Angle::from_arcsec(arcsec).rad())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// [M23] Section 4.3.1: 124 arcsec about the boresight of a camera canted by 15 deg, and 1.5 across, are
+    /// (32, 1.5, 120) about the axes of the tracker, to the digits printed.
+    #[test]
+    fn a_canted_reference_is_worst_about_its_own_boresight() {
+        let canted = Reference {
+            cant_deg: 15.0,
+            white_arcsec: [1.5, 1.5, 124.0],
+            ..Reference::default()
+        };
+        let declared = canted.declared().unwrap();
+        let off = |axis: usize, printed: f64| (declared[axis] - printed).abs();
+        assert!(
+            off(0, 32.0) < 0.5 && off(1, 1.5) < 0.05 && off(2, 120.0) < 0.5,
+            "{declared:?}"
+        );
+        // about +y: the reference's boresight leans to +x of the tracker
+        let boresight = canted.to_tracker() * Vector3::z();
+        assert!(boresight.x > 0.25 && boresight.y.abs() < 1e-15);
     }
 }

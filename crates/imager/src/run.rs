@@ -11,12 +11,11 @@
 
 use std::collections::BTreeSet;
 use std::io::Write as _;
-use std::path::Path;
 
 use focal_plane::{AttitudeSource, Catalogue, StarFrames};
 use telemetry::{
-    Bundle, BundleWriter, Epoch, Frames, Metadata, QuaternionSigns, TableFormat, TimeScale,
-    TrackerMeta, VectorFrame,
+    Bundle, BundleWriter, Epoch, Frames, Metadata, QuaternionSigns, TimeScale, TrackerMeta,
+    VectorFrame,
 };
 
 use crate::pieces::{self, Sampler};
@@ -102,8 +101,8 @@ pub fn frames(
     Ok(whole)
 }
 
-/// Writes the bundle of a run into a folder as it grows, with `truth.json` beside the tables:
-/// `progress` is told the share that is done.
+/// Writes the bundle of a run as it grows, with `truth.json` beside the tables; `progress` is told the
+/// share that is done.
 ///
 /// # Errors
 ///
@@ -113,10 +112,9 @@ pub fn write(
     truth: &dyn AttitudeSource,
     catalogue: &Catalogue,
     run: &Run,
-    (dir, format): (&Path, TableFormat),
+    mut writer: BundleWriter,
     progress: &dyn Fn(f64),
 ) -> Result<Summary, ImagerError> {
-    let mut writer = BundleWriter::new(dir, format)?;
     let summary = each(instrument, truth, catalogue, run, &mut |piece, done| {
         progress(done);
         Ok(writer.append(&piece)?)

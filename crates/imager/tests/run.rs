@@ -6,7 +6,7 @@ use imager::{
     Background, Bracket, ImagerError, Instrument, Node, Reference, Run, Sensor, frames, write,
 };
 use nalgebra::Vector3;
-use telemetry::{Bundle, TableFormat};
+use telemetry::{Bundle, BundleWriter, TableFormat};
 
 /// Twelve stars about the pole, of magnitudes 2 to 5.
 fn sky() -> Catalogue {
@@ -81,7 +81,8 @@ fn what_is_written_is_what_is_in_memory() {
     let dir = tempfile::tempdir().unwrap();
     for format in TableFormat::ALL {
         let to = dir.path().join(format!("{format:?}"));
-        let summary = write(&instrument, &truth, &sky, &run, (&to, format), &|_| ()).unwrap();
+        let writer = BundleWriter::new(&to, format).unwrap();
+        let summary = write(&instrument, &truth, &sky, &run, writer, &|_| ()).unwrap();
         let read = Bundle::read(&to).unwrap();
         assert_eq!(read.stars, whole.stars);
         assert_eq!(read.attitude, whole.attitude);

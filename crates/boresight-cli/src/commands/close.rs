@@ -50,7 +50,7 @@ pub(crate) fn run(options: &Close, console: &Console) -> anyhow::Result<()> {
     clippy::exit,
     reason = "the answer to Ctrl-C, after the partial output is gone"
 )]
-fn interrupted() {
+pub(crate) fn interrupted() {
     std::process::exit(130)
 }
 

@@ -3,7 +3,7 @@
 use anyhow::Context as _;
 use boresight::scenarios::{Scenario, preset, simulate};
 
-use crate::arguments::Simulate;
+use crate::arguments::{Fidelity, Simulate};
 use crate::commands::render;
 use crate::console::Console;
 
@@ -19,9 +19,10 @@ pub(crate) fn run(options: &Simulate, console: &Console) -> anyhow::Result<()> {
     }
     let out = options.out.as_ref().context("--out needs a folder")?;
     if let Some(path) = &options.scenario
-        && render::wanted(path, options.fidelity)?
+        && options.fidelity != Some(Fidelity::Model)
+        && render::is_world(path)?
     {
-        return render::run(path, out, options, console);
+        return render::world(path, out, options, console);
     }
     console.progress("reading the scenario");
     let scenario = match (&options.preset, &options.scenario) {
@@ -29,6 +30,9 @@ pub(crate) fn run(options: &Simulate, console: &Console) -> anyhow::Result<()> {
         (None, Some(path)) => Scenario::read(path)?,
         (None, None) => anyhow::bail!("a scenario file or --preset is needed"),
     };
+    if options.fidelity == Some(Fidelity::Pixel) {
+        return render::scenario(&scenario, out, options, console);
+    }
     console.progress("simulating");
     let bundle = simulate(&scenario)?;
     console.progress("writing the bundle");
