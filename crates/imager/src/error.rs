@@ -58,6 +58,9 @@ pub enum ImagerError {
         /// Its id.
         id: String,
     },
+    /// A hybrid empirical model.
+    #[error("a model of kind \"hem\" has no detector that could be rendered")]
+    NoDetector,
     /// The frame itself cannot be described.
     #[error(transparent)]
     Camera(#[from] CameraError),

@@ -6,7 +6,7 @@
 //! Not physics: reading a file.
 
 use serde::{Deserialize, Serialize};
-use telemetry::Model;
+use telemetry::{Model, ModelKind};
 
 use crate::{
     Background, Bracket, Clock, Detector, ImagerError, Optics, Orbit, Readout, Reference, Shutter,
@@ -101,8 +101,11 @@ impl Instrument {
     ///
     /// # Errors
     ///
-    /// A model with effects (they are formulas too), or without a detector.
+    /// A model with effects (they are formulas too), or of kind `"hem"`, which has no detector.
     pub fn of_model(model: &Model) -> Result<Self, ImagerError> {
+        if model.kind == ModelKind::Hem {
+            return Err(ImagerError::NoDetector);
+        }
         if let Some(effect) = model.effects.first() {
             let id = effect.id.clone();
             return Err(ImagerError::Formula { id });
@@ -168,5 +171,33 @@ impl Instrument {
         let node = self.bracket.node.as_ref();
         node.map(|node| self.thermal.index("bracket.node", node))
             .transpose()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_model_gives_its_tracker_and_nothing_else() {
+        let text = "format = \"boresight-model/1\"\nkind = \"pbm\"\n[tracker]\npixels = [512, 512]\n\
+            focal_length_px = 1000.0\nmax_stars = 7\nexposure_s = 0.2\n[noise]\ntemporal_arcsec = 5.0\n";
+        let model = Model::parse(text, "m.toml", &[]).unwrap();
+        let instrument = Instrument::of_model(&model).unwrap();
+        let camera = instrument.optics.camera().unwrap();
+        assert_eq!(camera.pixels(), [512, 512]);
+        assert!((camera.focal_length_px()[0] - 1000.0).abs() < 1e-9);
+        assert_eq!(instrument.stars.followed, 7);
+        assert!((instrument.shutter.exposure_s - 0.2).abs() < 1e-15);
+        assert_eq!(instrument.detector, Detector::default());
+        let effect = "[[effect]]\nid = \"time_tag_offset\"\noffset_s = 0.1\n";
+        let model = Model::parse(&format!("{text}{effect}"), "m.toml", &[]).unwrap();
+        let error = Instrument::of_model(&model).unwrap_err();
+        assert!(error.to_string().contains("time_tag_offset"));
+        let hybrid = Model {
+            kind: ModelKind::Hem,
+            ..Model::default()
+        };
+        assert_eq!(Instrument::of_model(&hybrid), Err(ImagerError::NoDetector));
     }
 }
