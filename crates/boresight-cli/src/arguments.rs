@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use boresight::telemetry::TableFormat;
 use clap::{Args, Parser, Subcommand};
 
 /// Star tracker error models that close the loop with measured data.
@@ -33,7 +34,7 @@ pub(crate) enum Command {
     Close(Close),
     /// Make the bundle that a tracker would have sent
     #[command(
-        after_help = "Examples:\n  boresight simulate fixtures/scenarios/example.toml --out bundle/\n  boresight simulate --preset iht --out bundle/\n  boresight simulate --print-preset pitt > my.toml"
+        after_help = "Examples:\n  boresight simulate fixtures/scenarios/example.toml --out bundle/\n  boresight simulate --preset iht --out bundle/\n  boresight simulate --print-preset pitt > my.toml\n  boresight simulate fixtures/worlds/null_slews.toml --fidelity pixel --out bundle/"
     )]
     Simulate(Simulate),
     /// Fly models along the measured motion, and hold their spectra against the measured ones
@@ -63,7 +64,7 @@ pub(crate) struct Close {
 
 #[derive(Debug, Args)]
 pub(crate) struct Simulate {
-    /// Scenario file: a model with [motion], [sky] and [run]
+    /// Scenario file, a model with [motion], [sky] and [run]; or a world file
     #[arg(value_name = "SCENARIO.toml", required_unless_present_any = ["preset", "print_preset"])]
     pub(crate) scenario: Option<PathBuf>,
     /// A scenario of the paper: iht, iht-distance, ict1, ict2, pitt, st2-iht, st2-iht-distance, st2-ict1, st2-ict2
@@ -72,6 +73,9 @@ pub(crate) struct Simulate {
     /// Print the file of a preset, to be edited, and do nothing else
     #[arg(long, value_name = "NAME", num_args = 0..=1, default_missing_value = "", conflicts_with = "scenario")]
     pub(crate) print_preset: Option<String>,
+    /// How measurements are made [default: what the file's format asks for]
+    #[arg(long, value_enum)]
+    pub(crate) fidelity: Option<Fidelity>,
     /// Folder of the bundle
     #[arg(long, value_name = "BUNDLE", required_unless_present = "print_preset")]
     pub(crate) out: Option<PathBuf>,
@@ -121,6 +125,14 @@ pub(crate) struct Fit {
     pub(crate) exclude_hz: Vec<[f64; 2]>,
 }
 
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub(crate) enum Fidelity {
+    /// By the formulas of the model and its effects
+    Model,
+    /// By rendering pixels: of a world file, or of a scenario without effects
+    Pixel,
+}
+
 #[derive(Clone, Copy, Debug, clap::ValueEnum)]
 pub(crate) enum Tables {
     /// Plain CSV
@@ -140,6 +152,16 @@ fn range(text: &str) -> Result<[f64; 2], String> {
             Ok([low, high])
         }
         _ => Err("two numbers LOW,HIGH with 0 <= LOW < HIGH are needed".to_owned()),
+    }
+}
+
+impl Tables {
+    pub(crate) fn format(self) -> TableFormat {
+        match self {
+            Self::Csv => TableFormat::Csv,
+            Self::CsvGz => TableFormat::CsvGz,
+            Self::Parquet => TableFormat::Parquet,
+        }
     }
 }
 

@@ -3,4 +3,5 @@
 pub(crate) mod close;
 pub(crate) mod compare;
 pub(crate) mod fit;
+pub(crate) mod render;
 pub(crate) mod simulate;

@@ -15,6 +15,7 @@
 //! | [`effects`] | the catalogue of effects: how each acts, and what it leaves in a residual |
 //! | [`telemetry`] | bundles, models and results on disk |
 //! | [`scenarios`] | motions and skies: bundles simulated from a scenario |
+//! | [`imager`] | pixels: what the detector sees and the tracker reads out, an independent truth |
 //! | [`closed_loop`] | residual, cause, better model |
 //! | [`comparison`] | residual, spectrum, fitted process and ensemble of a model beside a bundle |
 //! | [`figures`] | plots as SVG text from plain numbers |
@@ -66,8 +67,8 @@
 
 #[doc(inline)]
 pub use {
-    centroid, closed_loop, comparison, distortion, effects, figures, focal_plane, fogm_fit, quest,
-    report, scenarios, spectra, star_tracker, telemetry,
+    centroid, closed_loop, comparison, distortion, effects, figures, focal_plane, fogm_fit, imager,
+    quest, report, scenarios, spectra, star_tracker, telemetry,
 };
 
 /// The names that almost every program needs.

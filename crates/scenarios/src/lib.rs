@@ -4,6 +4,7 @@
 //! that a tracker of that model, with the effects of the scenario acting in it, would have sent.
 #![forbid(unsafe_code)]
 
+mod course;
 mod error;
 mod housekeeping;
 mod motion;
@@ -14,6 +15,7 @@ mod scenario;
 mod simulate;
 mod sky;
 
+pub use course::Course;
 pub use error::ScenarioError;
 pub use housekeeping::{Channel, Housekeeping, OrbitVelocity, SinusoidChannel, Thermostat};
 pub use motion::{

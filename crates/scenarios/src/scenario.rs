@@ -6,8 +6,6 @@
 //!
 //! Not physics: reading a file.
 
-mod culprit;
-
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
@@ -105,8 +103,7 @@ impl Scenario {
     /// ```
     pub fn parse(text: &str, file: &str) -> Result<Self, ScenarioError> {
         let model = Model::parse(text, file, &TABLES)?;
-        let tables: Tables =
-            toml::from_str(text).map_err(|error| culprit::find(&error, text, file))?;
+        let tables: Tables = telemetry::config::deserialise(text, file)?;
         Ok(Self {
             model,
             motion: tables.motion,

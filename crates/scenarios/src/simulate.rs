@@ -11,6 +11,7 @@
 //!
 //! Source: [M23] Section 2.6 and Figs. 4 and 5.
 
+use std::path::Path;
 use std::sync::Arc;
 
 use centroid::{CentroidError, Triangle};
@@ -31,7 +32,7 @@ use telemetry::{
 
 use crate::housekeeping::Channels;
 use crate::reference::Wander;
-use crate::run::Reported;
+use crate::run::{Reported, Run};
 use crate::sky::Seen;
 use crate::{Motion, Scenario, ScenarioError};
 
@@ -85,7 +86,8 @@ pub fn simulate_with_truth(scenario: &Scenario, draw: u64) -> Result<Simulated, 
         .ok_or(ScenarioError::Missing {
             name: "run.rate_hz or tracker.update_rate_hz",
         })?;
-    let (truth, t_s) = truth_and_times(scenario, rate_hz, draw)?;
+    let (motion, run) = (&scenario.motion, &scenario.run);
+    let (truth, t_s) = truth_and_times(motion, run, &scenario.folder, rate_hz, draw)?;
     let year = scenario
         .run
         .epoch
@@ -177,14 +179,15 @@ fn camera(model: &Model) -> Result<Camera, ScenarioError> {
 }
 
 /// True attitude, and the times of the frames.
-fn truth_and_times(
-    scenario: &Scenario,
+pub(crate) fn truth_and_times(
+    motion: &Motion,
+    run: &Run,
+    folder: &Path,
     rate_hz: f64,
     draw: u64,
 ) -> Result<(AttitudeSeries, Vec<f64>), ScenarioError> {
-    let run = &scenario.run;
     let mut rng = stream(run.seed, draw, Purpose::Motion);
-    let recorded = matches!(scenario.motion, Motion::Recorded(_));
+    let recorded = matches!(motion, Motion::Recorded(_));
     let duration_s = match run.duration_s {
         Some(duration_s) => duration_s,
         None if recorded => 0.0,
@@ -195,7 +198,7 @@ fn truth_and_times(
         }
     };
     let span_s = [-run.margin_s, duration_s + run.margin_s];
-    let truth = scenario.motion.truth(span_s, &scenario.folder, &mut rng)?;
+    let truth = motion.truth(span_s, folder, &mut rng)?;
     let [first_s, last_s] = truth.span_s();
     let (start_s, end_s) = match (recorded, run.duration_s) {
         (true, Some(duration_s)) => (first_s, last_s.min(first_s + duration_s)),

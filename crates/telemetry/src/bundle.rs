@@ -4,6 +4,7 @@
 
 mod convert;
 mod read;
+mod stream;
 mod write;
 
 use std::path::Path;
@@ -14,6 +15,8 @@ use crate::{
     AttitudeTable, ExtraColumns, Files, Folder, Housekeeping, Metadata, Output, RateTable,
     ReferenceTable, TelemetryError, WindowTable,
 };
+
+pub use stream::BundleWriter;
 
 /// How tables are written.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

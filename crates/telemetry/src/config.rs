@@ -5,6 +5,7 @@
 //!
 //! Source: telemetry bundle format, "Bad input" (docs/formats/bundle.md).
 
+mod culprit;
 mod entry;
 mod node;
 
@@ -14,6 +15,7 @@ use std::ops::Range;
 use toml::de::DeTable;
 
 use crate::{TelemetryError, TomlError};
+pub use culprit::deserialise;
 pub use entry::Entry;
 use node::{Table, Value};
 

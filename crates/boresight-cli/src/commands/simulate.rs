@@ -7,9 +7,10 @@ use anyhow::Context as _;
 use boresight::comparison::Scene;
 use boresight::report::scene_figures;
 use boresight::scenarios::{Scenario, Simulated, preset, simulate_with_truth};
-use boresight::telemetry::{Output, TableFormat};
+use boresight::telemetry::Output;
 
-use crate::arguments::{Simulate, Tables};
+use crate::arguments::{Fidelity, Simulate};
+use crate::commands::render;
 use crate::console::Console;
 
 pub(crate) fn run(options: &Simulate, console: &Console) -> anyhow::Result<()> {
@@ -23,22 +24,26 @@ pub(crate) fn run(options: &Simulate, console: &Console) -> anyhow::Result<()> {
         return Ok(());
     }
     let out = options.out.as_ref().context("--out needs a folder")?;
+    if let Some(path) = &options.scenario
+        && options.fidelity != Some(Fidelity::Model)
+        && render::is_world(path)?
+    {
+        return render::world(path, out, options, console);
+    }
     console.progress("reading the scenario");
     let scenario = match (&options.preset, &options.scenario) {
         (Some(name), _) => preset(name)?.scenario()?,
         (None, Some(path)) => Scenario::read(path)?,
         (None, None) => anyhow::bail!("a scenario file or --preset is needed"),
     };
+    if options.fidelity == Some(Fidelity::Pixel) {
+        return render::scenario(&scenario, out, options, console);
+    }
     console.progress("simulating");
     let simulated = simulate_with_truth(&scenario, scenario.run.draw)?;
     let bundle = &simulated.bundle;
     console.progress("writing the bundle");
-    let format = match options.tables {
-        Tables::Csv => TableFormat::Csv,
-        Tables::CsvGz => TableFormat::CsvGz,
-        Tables::Parquet => TableFormat::Parquet,
-    };
-    bundle.write(out, format)?;
+    bundle.write(out, options.tables.format())?;
     if let Some(dir) = &options.figures {
         console.progress("drawing");
         draw(&simulated, dir)?;

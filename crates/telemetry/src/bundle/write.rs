@@ -22,9 +22,15 @@ pub(super) fn write(
     dir: &Path,
     format: TableFormat,
 ) -> Result<(), TelemetryError> {
-    let stale = stale_tables(bundle, dir, format)?;
+    let written: Vec<_> = tables(bundle).into_iter().map(|(table, _)| table).collect();
+    let stale = stale_tables(&written, dir, format)?;
     let output = Output::new(dir)?;
     write_to(bundle, &output, format)?;
+    commit(output, stale, dir)
+}
+
+/// Puts everything in its place, and takes away what would be read with it by mistake.
+pub(super) fn commit(output: Output, stale: Vec<String>, dir: &Path) -> Result<(), TelemetryError> {
     output.commit()?;
     for name in stale {
         let path = dir.join(name);
@@ -35,14 +41,14 @@ pub(super) fn write(
 }
 
 /// Tables of the bundle that is being replaced, which would be taken for tables of the new one.
-fn stale_tables(
-    bundle: &Bundle,
+pub(super) fn stale_tables(
+    written: &[&str],
     dir: &Path,
     format: TableFormat,
 ) -> Result<Vec<String>, TelemetryError> {
-    let written: Vec<String> = tables(bundle)
+    let written: Vec<String> = written
         .iter()
-        .map(|(table, _)| format.file_name(table))
+        .map(|table| format.file_name(table))
         .collect();
     let mut stale = Vec::new();
     for table in layout::TABLES {
@@ -71,20 +77,11 @@ pub(super) fn write_to(
     format: TableFormat,
 ) -> Result<(), TelemetryError> {
     check(bundle)?;
-    let mut meta = Metadata {
-        columns: std::collections::BTreeMap::new(),
-        ..bundle.meta.clone()
-    };
+    let mut meta = bundle.meta.clone();
     if let Some(images) = &bundle.images {
         meta.images = Some(images_meta(images));
     }
-    let text = meta
-        .to_toml()
-        .map_err(|error| TelemetryError::Inconsistent {
-            table: METADATA,
-            reason: error.to_string(),
-        })?;
-    output.write(METADATA, |to| to.write_all(text.as_bytes()))?;
+    metadata(meta, output)?;
     for (table, mut columns) in tables(bundle) {
         if let Some(extra) = bundle.extra.get(table) {
             columns.extra(extra);
@@ -97,8 +94,23 @@ pub(super) fn write_to(
     Ok(())
 }
 
+/// `bundle.toml`; tables are written under the format's own names.
+pub(super) fn metadata(meta: Metadata, output: &Output) -> Result<(), TelemetryError> {
+    let meta = Metadata {
+        columns: std::collections::BTreeMap::new(),
+        ..meta
+    };
+    let text = meta
+        .to_toml()
+        .map_err(|error| TelemetryError::Inconsistent {
+            table: METADATA,
+            reason: error.to_string(),
+        })?;
+    output.write(METADATA, |to| to.write_all(text.as_bytes()))
+}
+
 /// All tables that the bundle has.
-fn tables(bundle: &Bundle) -> Vec<(&'static str, OutTable<'_>)> {
+pub(super) fn tables(bundle: &Bundle) -> Vec<(&'static str, OutTable<'_>)> {
     let mut tables = Vec::new();
     if let Some(attitude) = &bundle.attitude {
         let mut table = OutTable::new(attitude.t_s.len());
@@ -177,7 +189,7 @@ fn images_table(images: &WindowTable) -> OutTable<'_> {
     table
 }
 
-fn images_meta(images: &WindowTable) -> ImagesMeta {
+pub(super) fn images_meta(images: &WindowTable) -> ImagesMeta {
     let unread = images
         .unread
         .iter()
@@ -236,7 +248,7 @@ fn housekeeping_table(housekeeping: &Housekeeping) -> OutTable<'_> {
 }
 
 /// Columns of one length, so that writing cannot fail half-way for a reason known before.
-fn check(bundle: &Bundle) -> Result<(), TelemetryError> {
+pub(super) fn check(bundle: &Bundle) -> Result<(), TelemetryError> {
     let mut lengths: Vec<(&'static str, &str, usize, usize)> = Vec::new();
     if let Some(attitude) = &bundle.attitude {
         lengths.push(("attitude", "q", attitude.q.len(), attitude.t_s.len()));

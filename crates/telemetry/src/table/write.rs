@@ -89,27 +89,18 @@ impl<'a> OutTable<'a> {
     }
 
     /// Writes in one of the forms; `file` is the name in messages.
-    pub(crate) fn write(
+    pub(crate) fn write<'w>(
         &self,
         format: TableFormat,
-        to: impl Write + Send,
+        to: impl Write + Send + 'w,
         file: &str,
     ) -> Result<(), TelemetryError> {
-        let done = match format {
-            TableFormat::Csv => self.csv(to).map(|_| ()),
-            TableFormat::CsvGz => self
-                .csv(GzEncoder::new(to, GZIP_LEVEL))
-                .and_then(|gzip| gzip.finish()?.flush()),
-            TableFormat::Parquet => self.parquet(to).map_err(io::Error::other),
-        };
-        done.map_err(|error| TelemetryError::io(file, "write", &error))
+        let mut writer = TableWriter::begin(self, format, Box::new(to), file)?;
+        writer.append(self)?;
+        writer.finish()
     }
 
-    fn csv<W: Write>(&self, to: W) -> io::Result<W> {
-        let mut csv = csv::WriterBuilder::new()
-            .buffer_capacity(1 << 16)
-            .from_writer(to);
-        csv.write_record(self.columns.iter().map(|(name, _)| name.as_bytes()))?;
+    fn csv_rows<W: Write>(&self, csv: &mut csv::Writer<W>) -> io::Result<()> {
         let mut text = String::new();
         for row in 0..self.rows {
             for (_, cells) in &self.columns {
@@ -124,34 +115,130 @@ impl<'a> OutTable<'a> {
             }
             csv.write_record(None::<&[u8]>)?;
         }
-        csv.into_inner().map_err(|error| error.into_error())
+        Ok(())
     }
 
-    fn parquet(&self, to: impl Write + Send) -> Result<(), ParquetError> {
-        // text that is all numbers, as extra columns of a CSV file are, becomes numbers
-        let columns: Vec<(&str, Cells<'_>)> = self
-            .columns
-            .iter()
-            .map(|(name, cells)| (&**name, cells.for_parquet()))
-            .collect();
-        let fields: Vec<Field> = columns
-            .iter()
-            .map(|(name, cells)| Field::new(*name, cells.data_type(), true))
-            .collect();
-        let schema = Arc::new(Schema::new(fields));
-        let properties = WriterProperties::builder()
-            .set_compression(ParquetCompression::SNAPPY)
-            .set_max_row_group_row_count(Some(GROUP))
-            .build();
-        let mut writer = ArrowWriter::try_new(to, Arc::clone(&schema), Some(properties))?;
+    fn names(&self) -> Vec<&str> {
+        self.columns.iter().map(|(name, _)| &**name).collect()
+    }
+
+    /// The cells as Parquet has them: text that is all numbers, as extra columns of a CSV file are,
+    /// becomes numbers.
+    fn parquet_cells(&self) -> Vec<Cells<'_>> {
+        let cells = self.columns.iter();
+        cells.map(|(_, cells)| cells.for_parquet()).collect()
+    }
+
+    fn parquet_rows<W: Write + Send>(
+        &self,
+        writer: &mut ArrowWriter<W>,
+    ) -> Result<(), ParquetError> {
+        let (cells, schema) = (self.parquet_cells(), schema(self));
         for start in (0..self.rows).step_by(BATCH) {
             let end = self.rows.min(start + BATCH);
-            let arrays = columns.iter().map(|(_, cells)| cells.array(start, end));
+            let arrays = cells.iter().map(|cells| cells.array(start, end));
             let batch = RecordBatch::try_new(Arc::clone(&schema), arrays.collect());
             writer.write(&batch.map_err(|error: ArrowError| error)?)?;
         }
-        writer.close().map(|_| ())
+        Ok(())
     }
+}
+
+fn schema(table: &OutTable<'_>) -> Arc<Schema> {
+    let cells = table.parquet_cells();
+    let fields = table.names().into_iter().zip(&cells);
+    let fields = fields.map(|(name, cells)| Field::new(name, cells.data_type(), true));
+    Arc::new(Schema::new(fields.collect::<Vec<_>>()))
+}
+
+type Sink<'w> = Box<dyn Write + Send + 'w>;
+
+enum Form<'w> {
+    Csv(csv::Writer<Sink<'w>>),
+    CsvGz(csv::Writer<GzEncoder<Sink<'w>>>),
+    Parquet(ArrowWriter<Sink<'w>>),
+}
+
+/// A table that grows piece by piece: what is held does not depend on its length.
+pub(crate) struct TableWriter<'w> {
+    file: String,
+    /// Columns of the first piece, which all others must have.
+    names: Vec<String>,
+    form: Form<'w>,
+}
+
+impl<'w> TableWriter<'w> {
+    /// Begins a table with the columns of `table`, whose rows are not written yet; `file` is the name
+    /// in messages.
+    pub(crate) fn begin(
+        table: &OutTable<'_>,
+        format: TableFormat,
+        to: Sink<'w>,
+        file: &str,
+    ) -> Result<Self, TelemetryError> {
+        let form = Form::begin(table, format, to);
+        Ok(Self {
+            file: file.to_owned(),
+            names: table.names().into_iter().map(str::to_owned).collect(),
+            form: form.map_err(|error| TelemetryError::io(file, "write", &error))?,
+        })
+    }
+
+    /// Adds rows of the same columns.
+    pub(crate) fn append(&mut self, table: &OutTable<'_>) -> Result<(), TelemetryError> {
+        if table.names() != self.names {
+            return Err(TelemetryError::Inconsistent {
+                table: "bundle",
+                reason: format!("a piece of {} has other columns than the first", self.file),
+            });
+        }
+        let done = match &mut self.form {
+            Form::Csv(csv) => table.csv_rows(csv),
+            Form::CsvGz(csv) => table.csv_rows(csv),
+            Form::Parquet(writer) => table.parquet_rows(writer).map_err(io::Error::other),
+        };
+        done.map_err(|error| TelemetryError::io(&*self.file, "write", &error))
+    }
+
+    pub(crate) fn finish(self) -> Result<(), TelemetryError> {
+        let done = match self.form {
+            Form::Csv(csv) => into_inner(csv).and_then(|mut to| to.flush()),
+            Form::CsvGz(csv) => into_inner(csv).and_then(|gzip| gzip.finish()?.flush()),
+            Form::Parquet(writer) => writer.close().map(|_| ()).map_err(io::Error::other),
+        };
+        done.map_err(|error| TelemetryError::io(&*self.file, "write", &error))
+    }
+}
+
+impl<'w> Form<'w> {
+    fn begin(table: &OutTable<'_>, format: TableFormat, to: Sink<'w>) -> io::Result<Self> {
+        match format {
+            TableFormat::Csv => csv_with_header(table, to).map(Self::Csv),
+            TableFormat::CsvGz => {
+                csv_with_header(table, GzEncoder::new(to, GZIP_LEVEL)).map(Self::CsvGz)
+            }
+            TableFormat::Parquet => {
+                let properties = WriterProperties::builder()
+                    .set_compression(ParquetCompression::SNAPPY)
+                    .set_max_row_group_row_count(Some(GROUP))
+                    .build();
+                let writer = ArrowWriter::try_new(to, schema(table), Some(properties));
+                writer.map(Self::Parquet).map_err(io::Error::other)
+            }
+        }
+    }
+}
+
+fn csv_with_header<W: Write>(table: &OutTable<'_>, to: W) -> io::Result<csv::Writer<W>> {
+    let mut csv = csv::WriterBuilder::new()
+        .buffer_capacity(1 << 16)
+        .from_writer(to);
+    csv.write_record(table.names())?;
+    Ok(csv)
+}
+
+fn into_inner<W: Write>(csv: csv::Writer<W>) -> io::Result<W> {
+    csv.into_inner().map_err(|error| error.into_error())
 }
 
 impl Cells<'_> {

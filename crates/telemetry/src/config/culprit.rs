@@ -1,13 +1,40 @@
-//! Which key of a scenario file an error is about, and which key was probably meant.
+//! Which key of a file an error of `serde` is about, and which key was probably meant.
 //!
 //! Not physics: reading a file.
 
 use core::ops::Range;
 
-use telemetry::{TelemetryError, TomlError};
+use serde::de::DeserializeOwned;
+
+use crate::{TelemetryError, TomlError};
+
+/// Reads text into a type whose fields are the keys; `file` is its name in messages. For whoever adds
+/// tables of their own to a file: a type that denies unknown fields answers a misspelt key.
+///
+/// ```
+/// #[derive(Debug, serde::Deserialize)]
+/// struct File { run: Run }
+/// #[derive(Debug, serde::Deserialize)]
+/// #[serde(deny_unknown_fields)]
+/// struct Run { seed: u64 }
+///
+/// let read = telemetry::config::deserialise::<File>;
+/// assert_eq!(read("[run]\nseed = 3\n", "a.toml")?.run.seed, 3);
+/// let error = read("[run]\nsede = 3\n", "a.toml").expect_err("sede is no key").to_string();
+/// assert!(error.starts_with("a.toml, line 2, column 1:") && error.contains("`seed`"));
+/// # Ok::<(), telemetry::TelemetryError>(())
+/// ```
+///
+/// # Errors
+///
+/// A key that does not exist (with the nearest that does), a missing key, or a value of the wrong
+/// type, with the line.
+pub fn deserialise<T: DeserializeOwned>(text: &str, file: &str) -> Result<T, TelemetryError> {
+    toml::from_str(text).map_err(|error| find(&error, text, file))
+}
 
 /// The error with its line, and with the nearest key or name where one does not exist.
-pub(super) fn find(error: &toml::de::Error, text: &str, file: &str) -> TelemetryError {
+fn find(error: &toml::de::Error, text: &str, file: &str) -> TelemetryError {
     let said = error.message();
     let names: Vec<&str> = said.split('`').skip(1).step_by(2).collect();
     let unknown = said.starts_with("unknown field") || said.starts_with("unknown variant");

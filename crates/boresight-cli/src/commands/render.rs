@@ -1,0 +1,129 @@
+//! `boresight simulate --fidelity pixel`: a bundle from rendered pixels.
+
+use std::path::Path;
+
+use anyhow::Context as _;
+use boresight::imager::{self, Instrument, Run, WORLD_FORMAT};
+use boresight::scenarios::{Course, Scenario, hipparcos};
+use boresight::telemetry::BundleWriter;
+use boresight::telemetry::config::Config;
+
+use crate::arguments::Simulate;
+use crate::commands::close::interrupted;
+use crate::console::Console;
+
+/// Frames per second where neither run nor model says.
+const RATE_HZ: f64 = 2.0;
+/// Positions of stars where no date is given, Julian year.
+const YEAR: f64 = 2000.0;
+
+/// Whether a file is a world.
+pub(crate) fn is_world(path: &Path) -> anyhow::Result<bool> {
+    let text = read(path)?;
+    // a file that cannot be parsed is refused by whoever reads it
+    let Ok(config) = Config::parse(&text, &path.display().to_string()) else {
+        return Ok(false);
+    };
+    let format = config.root().require("format");
+    Ok(format.is_ok_and(|format| format.text().is_ok_and(|text| text == WORLD_FORMAT)))
+}
+
+fn read(path: &Path) -> anyhow::Result<String> {
+    std::fs::read_to_string(path).with_context(|| format!("{}: cannot read", path.display()))
+}
+
+/// A world file.
+pub(crate) fn world(
+    path: &Path,
+    out: &Path,
+    options: &Simulate,
+    console: &Console,
+) -> anyhow::Result<()> {
+    console.progress("reading the world");
+    let (text, file) = (read(path)?, path.display().to_string());
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let instrument = Instrument::parse(&text, &file, &Course::TABLES)?;
+    let course = Course::parse(&text, &file, folder)?;
+    render(&instrument, &course, RATE_HZ, out, options, console)
+}
+
+/// A scenario, whose tracker and reference are taken as they are.
+pub(crate) fn scenario(
+    scenario: &Scenario,
+    out: &Path,
+    options: &Simulate,
+    console: &Console,
+) -> anyhow::Result<()> {
+    let mut instrument = Instrument::of_model(&scenario.model)?;
+    instrument.reference = scenario
+        .reference
+        .as_ref()
+        .map(|reference| imager::Reference {
+            rate_hz: reference.rate_hz,
+            rates: reference.rates,
+            cant_axis: reference.cant_axis,
+            cant_deg: reference.cant_deg,
+            white_arcsec: reference.white_arcsec,
+            wander_arcsec: reference.wander_arcsec,
+            wander_tau_s: reference.wander_tau_s,
+            ..imager::Reference::default()
+        });
+    let rate_hz = scenario.model.tracker.update_rate_hz.unwrap_or(RATE_HZ);
+    render(
+        &instrument,
+        &Course::from(scenario),
+        rate_hz,
+        out,
+        options,
+        console,
+    )
+}
+
+fn render(
+    instrument: &Instrument,
+    course: &Course,
+    rate_hz: f64,
+    out: &Path,
+    options: &Simulate,
+    console: &Console,
+) -> anyhow::Result<()> {
+    let settings = &course.run;
+    let (truth, t_s) = course.truth(rate_hz)?;
+    let year = settings.epoch.map_or(YEAR, |epoch| epoch.julian_year(0.0));
+    let run = Run {
+        title: settings.title.clone(),
+        first_s: t_s[0],
+        frames: t_s.len() as u64,
+        rate_hz: settings.rate_hz.unwrap_or(rate_hz),
+        seed: settings.seed,
+        draw: settings.draw,
+        epoch: settings.epoch,
+        time_scale: settings.time_scale,
+    };
+    let progress = |done: f64| console.progress(&format!("rendering, {:.0} %", 100.0 * done));
+    let writer = BundleWriter::new(out, options.tables.format())?;
+    // An interrupted run leaves nothing behind.
+    let partial = writer.output().partial().to_owned();
+    let _ = ctrlc::set_handler(move || {
+        let _ = std::fs::remove_dir_all(&partial);
+        interrupted();
+    });
+    let done = imager::write(
+        instrument,
+        &truth,
+        &hipparcos(year)?,
+        &run,
+        writer,
+        &progress,
+    )?;
+    let out = out.display();
+    console.say(&format!(
+        "{} frames, {} star rows rendered to {out}, {} windows without a star",
+        done.frames, done.star_rows, done.lost
+    ));
+    console.machine(
+        &serde_json::json!({ "bundle": out.to_string(), "frames": done.frames, "star_rows": done.star_rows, "lost": done.lost })
+            .to_string(),
+    );
+    Ok(())
+}

@@ -1,0 +1,201 @@
+//! An inertial hold at both fidelities: rendered pixels, and the physics-based model with sigmas that were
+//! measured on the rendered stars. `docs/imager.md` shows what is printed (`-- --nocapture`).
+#![expect(clippy::unwrap_used, reason = "helpers of tests")]
+
+use boresight::focal_plane::{
+    ARCSEC_PER_RAD, AttitudeSeries, AttitudeSource, Camera, Pixel, rotation_vector,
+};
+use boresight::imager::{BackgroundLevel, Instrument, Run, frames};
+use boresight::scenarios::{Course, Scenario, hipparcos, simulate};
+use boresight::telemetry::Bundle;
+use nalgebra::{Matrix3, Vector3};
+use spectra::{LogAverage, Psd, Welch, WelchSettings};
+
+/// Two hours of the hold of [M23] Section 4.1, with its printed periods: a pixel of x in 765 s, one of y
+/// in 486.5 s.
+const COURSE: &str = r#"
+[motion]
+kind = "hold"
+start = { ra_deg = 75.0, dec_deg = 12.0, roll_deg = 20.0 }
+drift_arcsec_s = [0.146, 0.0929, 0.0]
+[run]
+duration_s = 7200.0
+rate_hz = 2.0
+seed = 11
+"#;
+
+/// A small spot in faint light, so that both parts are about as large as those of the paper.
+fn instrument() -> Instrument {
+    let mut instrument = Instrument::default();
+    instrument.optics.psf_sigma_px = 0.28;
+    instrument.detector.electrons_s_mag0 = 1.5e6;
+    instrument.detector.full_well_e = 4e5;
+    instrument.detector.bits = 16;
+    instrument.readout.background = BackgroundLevel::Fixed;
+    instrument.readout.background_dn = Some(100.0);
+    instrument.stars.separation_px = 0.0;
+    instrument
+}
+
+/// Attitude error, arcsec, axis by axis.
+fn attitude_errors(bundle: &Bundle, truth: &AttitudeSeries) -> [Vec<f64>; 3] {
+    let attitude = bundle.attitude.as_ref().unwrap();
+    let mut axes = [const { Vec::new() }; 3];
+    for (t, q) in attitude.t_s.iter().zip(&attitude.q) {
+        let error = rotation_vector(q, &truth.attitude(*t).unwrap()) * ARCSEC_PER_RAD;
+        for (axis, error) in axes.iter_mut().zip(error.iter()) {
+            axis.push(*error);
+        }
+    }
+    axes
+}
+
+/// Variances of one star, arcsec^2 of one axis: white, and the rest.
+struct StarNoise {
+    at: Pixel,
+    white: [f64; 2],
+    rest: [f64; 2],
+}
+
+/// The white part from differences of neighbouring frames, in which the drift of 0.001 px changes
+/// nothing else.
+fn star_noise(bundle: &Bundle, truth: &AttitudeSeries, camera: &Camera) -> Vec<StarNoise> {
+    let (stars, catalogue) = (
+        bundle.stars.as_ref().unwrap(),
+        bundle.catalog.as_ref().unwrap(),
+    );
+    let scale = camera.arcsec_per_px()[0];
+    let mut by_slot: Vec<Vec<[f64; 2]>> = vec![Vec::new(); 14];
+    let mut places = vec![Pixel::default(); 14];
+    for k in 0..stars.frames() {
+        let q = truth.attitude(stars.t_s[k]).unwrap();
+        for row in stars.rows_of(k) {
+            let index = catalogue.index_of(stars.star_id[row]).unwrap();
+            let at = camera
+                .project(&(q * catalogue.direction_at(index, 2000.0)))
+                .unwrap();
+            let error = [stars.x_px[row] - at.x, stars.y_px[row] - at.y].map(|e| e * scale);
+            let slot = usize::try_from(stars.slot[row]).unwrap();
+            by_slot[slot].push(error);
+            places[slot] = at;
+        }
+    }
+    let one = |(errors, at): (&Vec<[f64; 2]>, Pixel)| {
+        let n = errors.len() as f64;
+        let white = [0, 1].map(|axis| {
+            let squares = errors.windows(2).map(|w| (w[1][axis] - w[0][axis]).powi(2));
+            0.5 * squares.sum::<f64>() / (n - 1.0)
+        });
+        let all = [0, 1].map(|axis| errors.iter().map(|e| e[axis].powi(2)).sum::<f64>() / n);
+        let rest = [all[0] - white[0], all[1] - white[1]];
+        StarNoise { at, white, rest }
+    };
+    by_slot.iter().zip(places).map(one).collect()
+}
+
+/// Mean over stars and axes.
+fn mean(stars: &[StarNoise], of: impl Fn(&StarNoise) -> [f64; 2]) -> f64 {
+    stars
+        .iter()
+        .map(|star| of(star).iter().sum::<f64>())
+        .sum::<f64>()
+        / (2.0 * stars.len() as f64)
+}
+
+/// By how much the white variance about each axis is above that of stars that are all alike: all weigh the
+/// same, `P = N^-1 (sum J^T R J) N^-1`, `N = sum J^T J`.
+fn unlike_stars(stars: &[StarNoise], camera: &Camera) -> [f64; 3] {
+    let (mut normal, mut noise) = (Matrix3::zeros(), Matrix3::zeros());
+    for star in stars {
+        for (row, variance) in camera.rotation_jacobian(star.at).iter().zip(star.white) {
+            let row = Vector3::from(*row);
+            normal += row * row.transpose();
+            noise += row * row.transpose() * variance;
+        }
+    }
+    let inverse = normal.try_inverse().unwrap();
+    let unlike = inverse * noise * inverse;
+    let alike = inverse * mean(stars, |star| star.white);
+    [0, 1, 2].map(|axis| unlike[(axis, axis)] / alike[(axis, axis)])
+}
+
+fn spectrum(x: &[f64]) -> Psd {
+    Welch::new(WelchSettings::half_overlap(4096, 2.0))
+        .unwrap()
+        .process(x)
+        .unwrap()
+}
+
+/// What agrees, because the model holds it: the white level, and the power at the pixel's own period. What
+/// does not, because it idealises: a triangle has odd harmonics, a spot of 0.28 px has none to speak of;
+/// and one sigma for stars of all magnitudes, which geometry weighs differently about the boresight.
+#[test]
+fn both_fidelities_agree_where_the_model_holds() {
+    let course = Course::parse(COURSE, "hold.toml", ".".as_ref()).unwrap();
+    let (truth, t_s) = course.truth(2.0).unwrap();
+    let run = Run {
+        frames: t_s.len() as u64,
+        seed: course.run.seed,
+        ..Run::default()
+    };
+    let pixel = frames(&instrument(), &truth, &hipparcos(2000.0).unwrap(), &run).unwrap();
+    let camera = pixel.camera.clone().unwrap();
+    let stars = star_noise(&pixel, &truth, &camera);
+    let (white, rest) = (
+        mean(&stars, |star| star.white),
+        mean(&stars, |star| star.rest),
+    );
+    let geometry = unlike_stars(&stars, &camera);
+    // circular; and the peak of a triangle of this variance
+    let (temporal, peak) = ((2.0 * white).sqrt(), (3.0 * rest).sqrt());
+    println!(
+        "measured on stars: temporal {temporal:.2} arcsec circular, triangle {peak:.2} arcsec peak"
+    );
+    let model = format!(
+        "format = \"boresight-model/1\"\nkind = \"pbm\"\n[tracker]\npixels = [1024, 1024]\nfov_deg = [20.0, 20.0]\n\
+         max_stars = 14\n[noise]\ntemporal_arcsec = {temporal}\ncentroid_arcsec = {peak}\n\
+         [sky]\nkind = \"hipparcos\"\nlimiting_mag = 5.5\nmargin_px = 8.0\n{COURSE}"
+    );
+    let scenario = Scenario::parse(&model, "hold.toml").unwrap();
+    let formula = simulate(&scenario).unwrap();
+    assert_eq!(
+        pixel.catalog.as_ref().unwrap().len(),
+        formula.catalog.as_ref().unwrap().len(),
+        "the same stars"
+    );
+    let [ours, theirs] = [&pixel, &formula]
+        .map(|bundle| attitude_errors(bundle, &truth).map(|errors| spectrum(&errors)));
+    for (axis, name) in ["X", "Y", "Z"].iter().enumerate() {
+        let (a, b) = (&ours[axis], &theirs[axis]);
+        let plan = LogAverage::new(a, 3.0).unwrap();
+        let means = |psd: &Psd| plan.apply(psd, &[1.0]);
+        let (ma, mb) = (means(a), means(b));
+        let bands: Vec<String> = (0..ma.len())
+            .map(|k| format!("{:.4} Hz {:.2}", ma.frequency_hz[k], ma.psd[k] / mb.psd[k]))
+            .collect();
+        println!("{name}: pixel/model {}", bands.join(", "));
+    }
+    let ratio = |axis: usize, low: f64, high: f64| {
+        ours[axis].band_variance(low, high).unwrap()
+            / theirs[axis].band_variance(low, high).unwrap()
+    };
+    for axis in 0..3 {
+        let white = ratio(axis, 0.2, 0.9);
+        let (period, harmonics) = (ratio(axis, 0.0009, 0.0030), ratio(axis, 0.0045, 0.0085));
+        let by_geometry = geometry[axis];
+        println!(
+            "axis {axis}: white {white:.3} (unlike stars: {by_geometry:.3}), pixel's period {period:.3}, harmonics {harmonics:.3}"
+        );
+        // 2 x 0.7 Hz x 7200 s numbers on either side: 5 sqrt(2 x 2/10080) of each other
+        assert!(
+            (white / by_geometry - 1.0).abs() < 0.1,
+            "axis {axis}: {white} {by_geometry}"
+        );
+        // a triangle has 96/pi^4 = 0.986 of its variance at the period, a sinus all: 1.015. The phases of
+        // the stars are the same on both sides; white noise is a tenth of the power there and scatters
+        // by half over its few averages
+        assert!((period - 1.0).abs() < 0.15, "axis {axis}: {period}");
+        // the triangle's third harmonic is not there
+        assert!(harmonics < 0.8, "axis {axis}: {harmonics}");
+    }
+}
