@@ -14,7 +14,7 @@ use crate::error::CloseError;
 use crate::evidence::{Evidence, Residuals};
 use crate::figures;
 use crate::folds::Folds;
-use crate::motion;
+use crate::motion::{self, Around};
 use crate::search::{Found, amplitudes, borrowed, fit};
 use crate::situation::Situation;
 use crate::star_data::median_step;
@@ -58,7 +58,8 @@ pub(crate) fn run(
         data.subtract(effect.as_ref());
     }
     let folds = Folds::cut(data.t_s.len());
-    let motion = resolved_motion(situation);
+    let around = resolved_motion(situation, &data.t_s);
+    let motion = around.as_deref();
     if motion.is_none() {
         data.rate = std::array::from_fn(|_| vec![0.0; data.t_s.len()]);
     }
@@ -108,8 +109,11 @@ fn names(found: &Found, set: &[usize]) -> String {
     set.iter().map(name).collect::<Vec<_>>().join(" + ")
 }
 
-/// The reference as a motion, where its samples resolve one.
-pub(crate) fn resolved_motion<'a>(situation: &'a Situation<'_>) -> Option<&'a dyn AttitudeSource> {
+/// The reference as a motion around each frame, where its samples resolve one.
+pub(crate) fn resolved_motion(
+    situation: &Situation<'_>,
+    t_s: &[f64],
+) -> Option<Box<dyn AttitudeSource>> {
     let reference = situation.reference.as_ref()?;
     // Rates that were measured do not come from differences.
     let known = situation
@@ -117,7 +121,8 @@ pub(crate) fn resolved_motion<'a>(situation: &'a Situation<'_>) -> Option<&'a dy
         .reference
         .as_ref()
         .is_some_and(|r| r.rates_rad_s.is_some());
-    (known || motion::resolved(reference.quaternions())).then_some(reference as &dyn AttitudeSource)
+    (known || motion::resolved(reference.quaternions()))
+        .then(|| Box::new(Around::new(reference, t_s)) as Box<dyn AttitudeSource>)
 }
 
 /// The before residual, with outliers marked per axis.

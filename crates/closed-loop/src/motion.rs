@@ -17,6 +17,10 @@
 //!
 //! Source: Lagrange interpolation; the errors-in-variables trap of regression.
 
+mod around;
+
+pub(crate) use around::Around;
+
 use focal_plane::rotation_vector;
 use nalgebra::{UnitQuaternion, Vector3};
 

@@ -115,7 +115,7 @@ impl StarData {
         let mut data = Self::keep(inputs, &star, stars, &attitude);
         data.free_attitude = free_attitude;
         data.free_directions = free_directions;
-        data.project(inputs.reference);
+        data.project();
         data.disturb(inputs.reference, inputs.effects);
         data.modelled = data.projected.clone();
         data.update_phase(inputs.phase);
@@ -215,30 +215,42 @@ impl StarData {
         }
     }
 
-    /// Projected positions, and the motion across the detector from the
-    /// attitude at three instants around each frame.
-    fn project(&mut self, reference: Option<&AttitudeSeries>) {
-        let own = self.own_motion();
-        let motion = reference.or(own.as_ref());
-        // Short against any motion that the samples resolve, long against the
-        // rounding of a difference of positions.
-        let h = 0.05 * median_step(&self.frames.t_s).unwrap_or(1.0);
+    /// Projected positions.
+    fn project(&mut self) {
         for k in 0..self.frames.frames() {
-            let t = self.frames.t_s[k];
-            let around = motion.and_then(|m| Some([m.attitude(t - h)?, m.attitude(t + h)?]));
             for row in self.frames.rows_of(k) {
                 let u = self.stars[self.star[row]].direction;
                 let centre = self.position(&self.attitude[k], &u);
                 self.projected[0][row] = centre[0];
                 self.projected[1][row] = centre[1];
-                let Some([before, after]) = &around else {
-                    continue;
-                };
-                let (p, q) = (self.position(before, &u), self.position(after, &u));
+            }
+        }
+    }
+
+    /// Velocity and acceleration across the detector, from `motion` at three
+    /// instants around each frame; zero where there is none.
+    pub(crate) fn follow(&mut self, motion: Option<&dyn AttitudeSource>) {
+        // Short against any motion that the samples resolve, long against the
+        // rounding of a difference of positions.
+        let h = 0.05 * median_step(&self.frames.t_s).unwrap_or(1.0);
+        for k in 0..self.frames.frames() {
+            let t = self.frames.t_s[k];
+            let around =
+                motion.and_then(|m| Some([m.attitude(t - h)?, m.attitude(t)?, m.attitude(t + h)?]));
+            for row in self.frames.rows_of(k) {
+                let u = self.stars[self.star[row]].direction;
+                let path = around
+                    .as_ref()
+                    .map(|a| a.each_ref().map(|q| self.position(q, &u)));
                 for axis in 0..2 {
-                    self.velocity[axis][row] = (q[axis] - p[axis]) / (2.0 * h);
-                    self.acceleration[axis][row] =
-                        (q[axis] - 2.0 * centre[axis] + p[axis]) / (h * h);
+                    let [v, a] = path.as_ref().map_or([0.0; 2], |[p, c, q]| {
+                        [
+                            (q[axis] - p[axis]) / (2.0 * h),
+                            (q[axis] - 2.0 * c[axis] + p[axis]) / (h * h),
+                        ]
+                    });
+                    self.velocity[axis][row] = v;
+                    self.acceleration[axis][row] = a;
                 }
             }
         }

@@ -24,7 +24,7 @@ use crate::figures;
 use crate::folds::Folds;
 use crate::image_level::{self, ImageLevel, Side};
 use crate::images::{self, Formed};
-use crate::motion;
+use crate::motion::{self, Around};
 use crate::nuisance::StarNuisance;
 use crate::reference_wander::{self, REFERENCE_ERROR};
 use crate::search::{Found, amplitudes, borrowed, fit};
@@ -75,12 +75,15 @@ pub(crate) fn run(
     progress("residuals of the declared model");
     let before = settle(&mut data, situation, &phase, &folds)?;
 
-    let own = data.own_motion();
-    let motion: Option<&dyn AttitudeSource> = match (&situation.reference, &own) {
-        (Some(_), _) => resolved_motion(situation),
-        (None, Some(own)) if motion::resolved(&data.attitude) => Some(own),
-        _ => None,
+    let around: Option<Box<dyn AttitudeSource>> = match &situation.reference {
+        Some(_) => resolved_motion(situation, &data.frames.t_s),
+        None => data
+            .own_motion()
+            .filter(|_| motion::resolved(&data.attitude))
+            .map(|own| Box::new(Around::new(&own, &data.frames.t_s)) as Box<dyn AttitudeSource>),
     };
+    let motion = around.as_deref();
+    data.follow(motion);
     let measured = evidence(&data, situation, vec![data.measured_residual()], motion);
 
     let formed = match &situation.bundle.images {

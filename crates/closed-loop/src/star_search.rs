@@ -10,7 +10,9 @@
 //!
 //! Candidates are put forward twice, by what white evidence and by what the present
 //! noise makes of them; the few best of each are scored, and the best that stands
-//! is added. Where the rotations of the declared model's residual are white, the
+//! is added. An effect beside which the reference needs no slow error competes with
+//! that error as a whole: it stands if white evidence says so and it is the likelier
+//! of the two. Where the rotations of the declared model's residual are white, the
 //! plain search is all there is.
 //!
 //! Source: Wilks 1938 (likelihood ratio).
@@ -35,6 +37,12 @@ const ALTERNATIONS: usize = 2;
 /// The ratio of a noise model that is only nearly right runs this much wider than
 /// chi-squared (as at attitude level).
 pub(crate) const WIDENING: f64 = 1.3;
+/// An effect that leaves no slow error behind explains the residual in its place:
+/// it has to be this many times likelier (natural logarithm).
+const INSTEAD: f64 = 4.0;
+/// ... and beyond doubt under white noise: a wandering reference looks like a step
+/// or a heater at 1e-3 in one of three runs of ten minutes, at 1e-5 in one of thirty.
+const INSTEAD_ALPHA: f64 = 1e-5;
 /// Most effects that are added.
 const MOST: usize = 8;
 
@@ -124,6 +132,18 @@ struct Scored {
     estimate: Estimate,
     /// Columns of each candidate within the estimate, and whether its sizes are credible.
     parts: Vec<(std::ops::Range<usize>, bool)>,
+}
+
+impl Scored {
+    /// Whether this hypothesis does without the slow error that `other` needs;
+    /// `white_p` is what white evidence says of what it adds.
+    fn stands_instead(&self, other: &Self, white_p: f64) -> bool {
+        let slow = |s: &Self| significant(&s.rotations.slow_ratio(&s.noise)).contains(&true);
+        white_p < INSTEAD_ALPHA
+            && self.loglik > other.loglik + INSTEAD
+            && !slow(self)
+            && slow(other)
+    }
 }
 
 /// The list of candidates, and what scores them.
@@ -239,10 +259,14 @@ fn coloured<'a>(
         noise = base.noise;
         let mut stands = Vec::new();
         let mut fallen = None;
+        let white_alone = judged(&plain.fits, &plain.groups, &chosen, tried);
         for (at, &g) in chosen.iter().enumerate() {
             let others: Vec<usize> = chosen.iter().copied().filter(|&c| c != g).collect();
             let without = trial.score(&others, &noise).ok_or(CloseError::Singular)?;
-            let judgement = trial.judge(&base, at, &without, plain.groups[g].choices, tried);
+            let mut judgement = trial.judge(&base, at, &without, plain.groups[g].choices, tried);
+            if base.stands_instead(&without, white_alone[g].p_value) {
+                judgement.p_value = white_alone[g].p_value;
+            }
             if !judgement.stands() {
                 fallen = Some(g);
             }
@@ -279,7 +303,10 @@ fn coloured<'a>(
                 with.push(g);
                 let scored = trial.score(&with, &noise)?;
                 let group = &plain.groups[g];
-                let judgement = trial.judge(&scored, chosen.len(), &base, group.choices, tried);
+                let mut judgement = trial.judge(&scored, chosen.len(), &base, group.choices, tried);
+                if scored.stands_instead(&base, white_alone[g].p_value) {
+                    judgement.p_value = white_alone[g].p_value;
+                }
                 let rank = judgement.delta_loglik - price(group, plain.scalars);
                 judgement.stands().then_some((g, rank, scored.noise))
             })
@@ -317,9 +344,13 @@ fn coloured<'a>(
 impl Wander {
     /// Axes on which the slow error is beyond doubt: two parameters each, three axes.
     pub(crate) fn axes(&self) -> [bool; 3] {
-        self.ratio.map(|ratio| {
-            let p = ChiSquared::new(2.0).map_or(1.0, |law| law.sf(ratio.max(0.0) / WIDENING));
-            3.0 * p < FAMILY_ALPHA
-        })
+        significant(&self.ratio)
     }
+}
+
+fn significant(ratio: &[f64; 3]) -> [bool; 3] {
+    ratio.map(|ratio| {
+        let p = ChiSquared::new(2.0).map_or(1.0, |law| law.sf(ratio.max(0.0) / WIDENING));
+        3.0 * p < FAMILY_ALPHA
+    })
 }
