@@ -60,6 +60,8 @@ pub enum Shape {
         dy: Vec<f64>,
         /// Unit of the components: the legend shows an arrow of a round number of it.
         unit: String,
+        /// What a long arrow stands for; `None`: what nine tenths of these stay below.
+        long: Option<f64>,
     },
     /// Cells of one size, coloured by their value; a bar beside the panel has the scale.
     Cells {
@@ -210,6 +212,7 @@ impl Mark {
             dx: d[0].to_vec(),
             dy: d[1].to_vec(),
             unit: unit.to_owned(),
+            long: None,
         };
         Self::new(shape, colour)
     }
@@ -292,6 +295,16 @@ impl Mark {
     pub fn wide(mut self, px: f64) -> Self {
         if let Shape::Lines { width, .. } = &mut self.shape {
             *width = px;
+        }
+        self
+    }
+
+    /// The same arrows, a long one standing for `value`: arrows of several panels can be compared. Other
+    /// marks are as they are, and so are arrows of a value that is not positive.
+    #[must_use]
+    pub fn to_scale(mut self, value: f64) -> Self {
+        if let Shape::Arrows { long, .. } = &mut self.shape {
+            *long = (value > 0.0 && value.is_finite()).then_some(value);
         }
         self
     }

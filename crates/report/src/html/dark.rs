@@ -1,0 +1,115 @@
+//! The dark map, where one was estimated.
+
+use std::collections::BTreeMap;
+
+use figures::{Figure, Mark, Panel, Scale};
+use telemetry::DarkMap;
+
+use super::{Page, Run};
+use crate::number::short;
+
+/// Pixels farther apart than this belong to different windows.
+const APART: f64 = 6.0;
+/// Windows that get a panel each; more share one map of the detector.
+const WINDOWS: usize = 9;
+/// Cells to a side of that map.
+const CELLS: f64 = 96.0;
+
+pub(super) fn map(page: &mut Page, run: &Run<'_>) {
+    let Some(dark) = run.closed.dark_map.as_ref().filter(|d| !d.dn.is_empty()) else {
+        return;
+    };
+    let camera = run.bundle.camera.as_ref();
+    let half = camera.map(|camera| camera.half_size_px());
+    page.section("dark-map", "Dark map", |page| {
+        let windows = windows(dark);
+        let mut sorted = dark.dn.clone();
+        sorted.sort_by(f64::total_cmp);
+        let top = sorted[(sorted.len() - 1) * 99 / 100].max(f64::MIN_POSITIVE);
+        let scale = Scale::Sequential([0.0, top]);
+        let (panels, size, note) = match half {
+            Some(half) if windows.len() > WINDOWS => {
+                let cell = (2.0 * half[0].max(half[1]) / CELLS).ceil().max(1.0);
+                let panel = binned(dark, half, cell, scale);
+                let note = format!("Each cell: the brightest of its {cell} by {cell} pixels.");
+                (vec![panel], [640.0, 600.0], note)
+            }
+            _ => {
+                let shown = &windows[..windows.len().min(WINDOWS)];
+                let panels = shown.iter().map(|w| window(dark, w, scale)).collect();
+                (panels, [360.0, 300.0], "Each cell: one pixel of the detector; white was under no window.".to_owned())
+            }
+        };
+        let brightest = (0..dark.dn.len()).max_by(|&a, &b| dark.dn[a].total_cmp(&dark.dn[b]));
+        let at = brightest.unwrap_or(0);
+        let clear = (0..dark.dn.len())
+            .filter(|&k| dark.dn[k] > 5.0 * dark.sigma_dn[k])
+            .count();
+        let title = format!(
+            "{clear} of {} pixels are warm beyond 5σ; the warmest, at ({}, {}) px, has {} ± {} DN",
+            dark.dn.len(),
+            dark.x_px[at],
+            dark.y_px[at],
+            short(dark.dn[at]),
+            short(dark.sigma_dn[at]),
+        );
+        page.figure(
+            &Figure::new(&title, panels).sized(size),
+            &format!("Dark level of single pixels, in the unit of the images, estimated from all frames. {note} The scale ends at the 99th percentile. All values with their σ: dark_map.csv."),
+        );
+    });
+}
+
+/// Pixels by window: near one another on both axes.
+fn windows(dark: &DarkMap) -> Vec<Vec<usize>> {
+    let mut out: Vec<([f64; 4], Vec<usize>)> = vec![];
+    for k in 0..dark.dn.len() {
+        let (x, y) = (dark.x_px[k], dark.y_px[k]);
+        let near = |b: &[f64; 4]| {
+            x > b[0] - APART && x < b[1] + APART && y > b[2] - APART && y < b[3] + APART
+        };
+        match out.iter_mut().find(|(b, _)| near(b)) {
+            Some((b, pixels)) => {
+                *b = [b[0].min(x), b[1].max(x), b[2].min(y), b[3].max(y)];
+                pixels.push(k);
+            }
+            None => out.push(([x, x, y, y], vec![k])),
+        }
+    }
+    out.into_iter().map(|(_, pixels)| pixels).collect()
+}
+
+fn window(dark: &DarkMap, pixels: &[usize], scale: Scale) -> Panel {
+    let pick = |of: &[f64]| -> Vec<f64> { pixels.iter().map(|&k| of[k]).collect() };
+    let (x, y, dn) = (pick(&dark.x_px), pick(&dark.y_px), pick(&dark.dn));
+    let middle = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
+    Panel::map(&format!("around ({:.0}, {:.0}) px", middle(&x), middle(&y))).with(Mark::cells(
+        [&x, &y],
+        [1.0; 2],
+        &dn,
+        scale,
+        "dark level, DN",
+    ))
+}
+
+fn binned(dark: &DarkMap, half: [f64; 2], cell: f64, scale: Scale) -> Panel {
+    let mut cells: BTreeMap<[i64; 2], f64> = BTreeMap::new();
+    for k in 0..dark.dn.len() {
+        #[expect(clippy::cast_possible_truncation, reason = "a cell of a detector")]
+        let at = [dark.x_px[k], dark.y_px[k]].map(|p| (p / cell).floor() as i64);
+        let value = cells.entry(at).or_insert(f64::NEG_INFINITY);
+        *value = value.max(dark.dn[k]);
+    }
+    let middle = |axis: usize| -> Vec<f64> {
+        let of = |at: &[i64; 2]| (at[axis] as f64 + 0.5) * cell;
+        cells.keys().map(of).collect()
+    };
+    let values: Vec<f64> = cells.values().copied().collect();
+    Panel::focal_plane("warm pixels", half).with(Mark::cells(
+        [&middle(0), &middle(1)],
+        [cell; 2],
+        &values,
+        scale,
+        "dark level, DN",
+    ))
+}
