@@ -82,14 +82,27 @@ fn verdict(page: &mut Page, run: &Run<'_>) {
         Verdict::PartlyExplained => "partly_explained",
         Verdict::Unexplained => "unexplained",
     };
+    let said = sentence(report);
+    let said = match report.verdict {
+        Verdict::Consistent => format!("consistent: {said}"),
+        Verdict::Unexplained => format!("unexplained: {said}"),
+        Verdict::Explained | Verdict::PartlyExplained => said,
+    };
     page.section("verdict", "Verdict", |page| {
         page.raw(&format!(
-            "<p class=\"verdict {class}\"><strong>{}</strong>: {}.</p>",
-            class.replace('_', " "),
-            escaped(&sentence(report))
+            "<p class=\"verdict {class}\"><strong>{}.</strong></p>",
+            escaped(&capitalised(&said))
         ));
         findings::in_a_line_each(page, report);
+        data::in_a_line(page, run);
     });
+}
+
+fn capitalised(text: &str) -> String {
+    let mut chars = text.chars();
+    chars.next().map_or_else(String::new, |first| {
+        first.to_uppercase().chain(chars).collect()
+    })
 }
 
 const STYLE: &str = "
@@ -104,12 +117,13 @@ header p { margin: 0; overflow-wrap: anywhere; }
 .partly_explained { border-left-color: #e69f00; }
 .unexplained { border-left-color: #d55e00; }
 .wide { overflow-x: auto; }
-table { border-collapse: collapse; margin: .5rem 0 1rem; font-size: .93em; }
-caption { text-align: left; padding: .2rem 0; color: #40464e; }
+table { border-collapse: collapse; margin: .5rem 0 1rem; font-size: .88em; }
+caption { text-align: left; padding: .2rem 0; color: #40464e; min-width: 30rem; }
 th, td { padding: .22rem .7rem .22rem 0; border-bottom: 1px solid #d3d7dc; text-align: left; vertical-align: top; }
 thead th { border-bottom: 1.5px solid #20242a; }
 tbody th { font-weight: normal; }
-.n { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
+.n { text-align: right; font-variant-numeric: tabular-nums; }
+.n, .v { white-space: nowrap; }
 figure { margin: .6rem 0 1.4rem; }
 figure > svg { display: block; max-width: 100%; height: auto; }
 figcaption { max-width: 62rem; }

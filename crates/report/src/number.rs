@@ -59,6 +59,28 @@ pub(crate) fn with_sigma(value: f64, sigma: f64) -> String {
     }
 }
 
+/// A share in percent, without its sign.
+pub(crate) fn percent(share: f64) -> String {
+    let value = 100.0 * share;
+    if !value.is_finite() {
+        return "–".to_owned();
+    }
+    let digits = usize::from(value.abs() < 99.95) + usize::from(value.abs() < 9.995);
+    let text = format!("{value:.digits$}");
+    // nothing is not less than nothing
+    let text = if text == "-0.00" { "0.00" } else { &text };
+    text.replace('-', "−")
+}
+
+/// A change with its sign, one decimal; nothing has no sign.
+pub(crate) fn change(value: f64) -> String {
+    let text = format!("{value:+.1}");
+    match text.as_str() {
+        "+0.0" | "-0.0" => "0.0".to_owned(),
+        text => text.replace('-', "−"),
+    }
+}
+
 /// A probability.
 pub(crate) fn probability(p: f64) -> String {
     if p.is_nan() {
@@ -152,6 +174,14 @@ mod tests {
         assert_eq!(probability(2.4e-33), "2.4 × 10⁻³³");
         assert_eq!(probability(0.0), "< 10⁻³⁰⁰");
         assert_eq!(probability(0.26), "0.260");
+        assert_eq!(percent(0.243), "24.3");
+        assert_eq!(percent(8.02e-5), "0.01");
+        assert_eq!(percent(-1e-6), "0.00");
+        assert_eq!(percent(1.0), "100");
+        assert_eq!(
+            [change(-0.04), change(0.06), change(-3.0)],
+            ["0.0", "+0.1", "−3.0"]
+        );
         assert_eq!(hertz(2.1e-5), "21.0 µHz");
         assert_eq!(hertz(0.05), "50.0 mHz");
         assert_eq!(hertz(1.5), "1.50 Hz");

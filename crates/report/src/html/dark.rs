@@ -6,7 +6,7 @@ use figures::{Figure, Mark, Panel, Scale};
 use telemetry::DarkMap;
 
 use super::{Page, Run};
-use crate::number::short;
+use crate::number::with_sigma;
 
 /// Pixels farther apart than this belong to different windows.
 const APART: f64 = 6.0;
@@ -46,18 +46,21 @@ pub(super) fn map(page: &mut Page, run: &Run<'_>) {
             .filter(|&k| dark.dn[k] > 5.0 * dark.sigma_dn[k])
             .count();
         let title = format!(
-            "{clear} of {} pixels are warm beyond 5σ; the warmest, at ({}, {}) px, has {} ± {} DN",
+            "{clear} of {} pixels are warm beyond 5σ; the warmest, at ({}, {}) px, has {} DN",
             dark.dn.len(),
-            dark.x_px[at],
-            dark.y_px[at],
-            short(dark.dn[at]),
-            short(dark.sigma_dn[at]),
+            place(dark.x_px[at]),
+            place(dark.y_px[at]),
+            with_sigma(dark.dn[at], dark.sigma_dn[at]),
         );
         page.figure(
             &Figure::new(&title, panels).sized(size),
             &format!("Dark level of single pixels, in the unit of the images, estimated from all frames. {note} The scale ends at the 99th percentile. All values with their σ: dark_map.csv."),
         );
     });
+}
+
+fn place(px: f64) -> String {
+    px.to_string().replace('-', "−")
 }
 
 /// Pixels by window: near one another on both axes.
@@ -83,7 +86,8 @@ fn window(dark: &DarkMap, pixels: &[usize], scale: Scale) -> Panel {
     let pick = |of: &[f64]| -> Vec<f64> { pixels.iter().map(|&k| of[k]).collect() };
     let (x, y, dn) = (pick(&dark.x_px), pick(&dark.y_px), pick(&dark.dn));
     let middle = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
-    Panel::map(&format!("around ({:.0}, {:.0}) px", middle(&x), middle(&y))).with(Mark::cells(
+    let [cx, cy] = [middle(&x), middle(&y)].map(|v| place(v.round()));
+    Panel::map(&format!("around ({cx}, {cy}) px")).with(Mark::cells(
         [&x, &y],
         [1.0; 2],
         &dn,

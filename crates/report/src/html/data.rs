@@ -96,17 +96,33 @@ pub(super) fn rms(values: impl Iterator<Item = f64>) -> f64 {
     (sum / n).sqrt()
 }
 
+/// What the numbers rest on.
+pub(super) fn in_a_line(page: &mut Page, run: &Run<'_>) {
+    let report = &run.closed.report;
+    let spans = View::all(run).into_iter().map(|view| view.span_s());
+    let [from, to] = spans.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], s| {
+        [low.min(s[0]), high.max(s[1])]
+    });
+    let span = to - from;
+    let over = match span {
+        s if s > 2.0 * 86400.0 => format!(" over {} d", short(s / 86400.0)),
+        s if s > 2.0 * 3600.0 => format!(" over {} h", short(s / 3600.0)),
+        s if s.is_finite() => format!(" over {} s", short(s)),
+        _ => String::new(),
+    };
+    page.raw(&format!(
+        "<p>{} rows{over}, {} outliers left out, {} outside the reference; {} folds, every figure out of fold.</p>",
+        count("/rows/used", report.rows.used),
+        count("/rows/outliers", report.rows.outliers),
+        count("/rows/outside_reference", report.rows.outside_reference),
+        count("/folds", report.folds),
+    ));
+}
+
 /// Rows, folds and stars.
 pub(super) fn rows(page: &mut Page, run: &Run<'_>) {
-    let report = &run.closed.report;
     page.section("rows", "Rows, folds and stars", |page| {
-        page.raw(&format!(
-            "<p>{} rows used, {} outliers (beyond 8 robust σ of the residual before; left out of every figure, the same rows before and after), {} outside the reference; {} folds.</p>",
-            count("/rows/used", report.rows.used),
-            count("/rows/outliers", report.rows.outliers),
-            count("/rows/outside_reference", report.rows.outside_reference),
-            count("/folds", report.folds),
-        ));
+        page.paragraph("Outliers are rows beyond 8 robust σ of the residual before; they are left out of every figure, the same rows before and after, and flagged in the tables of residuals.");
         page.raw(&format!("<p>The bundle holds: {}.</p>", escaped(&holds(run))));
         let meta = &run.bundle.meta;
         for (name, text) in [("Source", &meta.source), ("Licence", &meta.licence)] {

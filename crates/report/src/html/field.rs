@@ -19,25 +19,47 @@ const STARS: usize = 4;
 /// Bins of a pixel.
 const PHASES: usize = 24;
 
-/// Half the detector, px, and where its pixels begin.
-fn detector(run: &Run<'_>) -> Option<([f64; 2], f64)> {
+/// The detector under the stars.
+struct Detector {
+    /// Half its size, px.
+    half: [f64; 2],
+    /// Where the centre of a pixel is in it.
+    centre: f64,
+    /// Where the declared model expects each row, px: measured positions hold the noise that is to be
+    /// looked at, and whatever is sorted by its own noise shows a pattern.
+    at: [Vec<f64>; 2],
+}
+
+fn detector(run: &Run<'_>, stars: &StarResiduals) -> Option<Detector> {
     let model = run.closed.model.camera().ok().flatten();
     let camera = run.bundle.camera.clone().or(model)?;
-    Some((camera.half_size_px(), camera.pixel_centre()))
+    let scale = camera.arcsec_per_px();
+    let expected = |axis: usize, measured: &[f64]| -> Vec<f64> {
+        let pairs = measured.iter().zip(&stars.before_arcsec[axis]);
+        pairs.map(|(p, r)| p - r / scale[axis]).collect()
+    };
+    Some(Detector {
+        half: camera.half_size_px(),
+        centre: camera.pixel_centre(),
+        at: [expected(0, &stars.x_px), expected(1, &stars.y_px)],
+    })
 }
 
 pub(super) fn focal_plane(page: &mut Page, run: &Run<'_>) {
-    let (Some(stars), Some((half, _))) = (&run.closed.stars, detector(run)) else {
+    let Some(stars) = &run.closed.stars else {
+        return;
+    };
+    let Some(Detector { half, at, .. }) = detector(run, stars) else {
         return;
     };
     let added = !run.closed.report.effects.is_empty();
     page.section("field", "Residual over the focal plane", |page| {
         let rows: Vec<usize> = (0..stars.t_s.len()).collect();
-        let field = Field::of(stars, &rows, [0.0; 2], half, CELLS);
+        let field = Field::of(stars, &at, &rows, [0.0; 2], half, CELLS);
         if field.before.x.len() >= FEW {
             over_the_detector(page, &field, half, added);
         } else {
-            star_by_star(page, stars, added);
+            star_by_star(page, stars, &at, added);
         }
     });
 }
@@ -54,6 +76,7 @@ impl Field {
     /// Of these rows, in `cells` by `cells` around `centre`.
     fn of(
         stars: &StarResiduals,
+        at: &[Vec<f64>; 2],
         rows: &[usize],
         centre: [f64; 2],
         half: [f64; 2],
@@ -63,7 +86,7 @@ impl Field {
         let pick = |values: &[f64], less: f64| -> Vec<f64> {
             rows.iter().map(|&r| values[r] - less).collect()
         };
-        let (x, y) = (pick(&stars.x_px, centre[0]), pick(&stars.y_px, centre[1]));
+        let (x, y) = (pick(&at[0], centre[0]), pick(&at[1], centre[1]));
         let least = if rows.len() > 1000 { 5 } else { 2 };
         let [before, after] = [0, 1].map(|when| {
             let d = [0, 1].map(|axis| pick(&view.kept(when, axis), 0.0));
@@ -147,11 +170,11 @@ fn over_the_detector(page: &mut Page, field: &Field, half: [f64; 2], added: bool
     };
     page.figure(
         &Figure::new(&title, panels).sized([540.0, 560.0]),
-        "Arrows: the mean residual of the rows in each cell of the detector; the key is in the legend. Scatter alone: what the means of as many rows without any pattern would have.",
+        "Arrows: the mean residual of the rows that the declared model expects in each cell of the detector; the key is in the legend. Scatter alone: what the means of as many rows without any pattern would have.",
     );
 }
 
-fn star_by_star(page: &mut Page, stars: &StarResiduals, added: bool) {
+fn star_by_star(page: &mut Page, stars: &StarResiduals, at: &[Vec<f64>; 2], added: bool) {
     let mut of: BTreeMap<i64, Vec<usize>> = BTreeMap::new();
     for row in (0..stars.t_s.len()).filter(|&row| !stars.outlier[row]) {
         of.entry(stars.star_id[row]).or_default().push(row);
@@ -161,14 +184,14 @@ fn star_by_star(page: &mut Page, stars: &StarResiduals, added: bool) {
         .into_iter()
         .filter(|(_, rows)| rows.len() > 20)
         .map(|(star, rows)| {
-            let ends = [&stars.x_px, &stars.y_px].map(|at| inner(&rows, at));
+            let ends = at.each_ref().map(|at| inner(&rows, at));
             let centre = ends.map(|[low, high]| 0.5 * (low + high));
             // a little room, and one scale on both axes
             let half = ends
                 .iter()
                 .map(|[low, high]| 0.55 * (high - low))
                 .fold(0.05, f64::max);
-            let field = Field::of(stars, &rows, centre, [half; 2], LOCAL);
+            let field = Field::of(stars, at, &rows, centre, [half; 2], LOCAL);
             (star, field, centre.map(|c| [c - half, c + half]))
         })
         .collect();
@@ -240,12 +263,14 @@ fn inner(rows: &[usize], at: &[f64]) -> [f64; 2] {
 }
 
 pub(super) fn pixel_phase(page: &mut Page, run: &Run<'_>) {
-    let (Some(stars), Some((_, centre))) = (&run.closed.stars, detector(run)) else {
+    let Some(stars) = &run.closed.stars else {
+        return;
+    };
+    let Some(Detector { centre, at, .. }) = detector(run, stars) else {
         return;
     };
     let added = !run.closed.report.effects.is_empty();
     let view = View::of_stars(stars);
-    let at = [&stars.x_px, &stars.y_px];
     let mut said = vec![];
     let mut panels = vec![];
     for (axis, name) in view.axes.iter().enumerate() {
@@ -279,8 +304,11 @@ pub(super) fn pixel_phase(page: &mut Page, run: &Run<'_>) {
         };
         for &(when, colour, label) in looks {
             let b = &bins[when];
+            // beside each other, so that equal ones are both seen
+            let aside = (when as f64 - 0.5) * 0.4 / PHASES as f64;
+            let phase: Vec<f64> = b.phase.iter().map(|p| p + aside).collect();
             panel = panel.with(
-                Mark::with_errors(&b.phase, &b.mean, &b.sigma, colour)
+                Mark::with_errors(&phase, &b.mean, &b.sigma, colour)
                     .named(&format!("{label} ± 1σ")),
             );
         }
@@ -294,7 +322,7 @@ pub(super) fn pixel_phase(page: &mut Page, run: &Run<'_>) {
                 panels,
             )
             .sized([540.0, 320.0]),
-            "Means of all stars over a 24th of a pixel. Scatter alone: what such means have without any dependence on phase. An error bar takes the rows of a bin as independent.",
+            "Means of all stars over a 24th of a pixel, at the position that the declared model expects. Scatter alone: what such means have without any dependence on phase. An error bar takes the rows of a bin as independent.",
         );
     });
 }

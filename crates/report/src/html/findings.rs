@@ -5,7 +5,7 @@ use telemetry::report::{ConsideredEffect, Errors, Estimate, FoundEffect, Report}
 
 use super::Page;
 use super::write::{Cell, datum, escaped, step};
-use crate::number::{hertz, probability, short, with_sigma};
+use crate::number::{change, hertz, percent, probability, short, with_sigma};
 use crate::text::selectors;
 
 /// Chance below which an effect counts as seen.
@@ -34,7 +34,7 @@ pub(super) fn in_a_line_each(page: &mut Page, report: &Report) {
                 .variance_explained
                 .map_or_else(String::new, |v| format!(
                     ", {} % of the variance",
-                    short(100.0 * v)
+                    percent(v)
                 )),
         ));
     }
@@ -143,9 +143,9 @@ fn axes<const N: usize>(
         return;
     };
     for k in 0..N {
-        let change = 100.0 * (after[k] / before[k] - 1.0);
-        let change = if change.is_finite() {
-            format!("{change:+.1} %").replace('-', "−")
+        let ratio = 100.0 * (after[k] / before[k] - 1.0);
+        let change = if ratio.is_finite() {
+            format!("{} %", change(ratio))
         } else {
             "–".to_owned()
         };
@@ -165,48 +165,32 @@ pub(super) fn effects(page: &mut Page, report: &Report) {
             page.paragraph("Nothing: no effect of the catalogue predicts the residual out of fold.");
             return;
         }
-        let mut rows = vec![];
-        for (k, effect) in report.effects.iter().enumerate() {
-            rows.extend(rows_of(k, effect));
-        }
+        let rows = report
+            .effects
+            .iter()
+            .enumerate()
+            .map(|(k, effect)| row_of(k, effect))
+            .collect();
         page.table(
-            "In the order added, estimated jointly. Gain in out-of-fold log-likelihood; share of the variance before; likeness of the columns of two effects in this data, from −1 to 1.",
-            &["effect", "parameter", "value ± 1σ", "unit", "gain, nats", "p", "share, %", "hard to tell from"],
+            "In the order added, estimated jointly; ± is 1σ. Gain in out-of-fold log-likelihood; share of the variance before; in brackets the likeness of the columns of two effects in this data, from −1 to 1.",
+            &["effect", "parameters", "gain, nats", "p", "share, %", "hard to tell from"],
             rows,
         );
     });
 }
 
-fn rows_of(k: usize, effect: &FoundEffect) -> Vec<Vec<Cell>> {
-    let mut parameters: Vec<Vec<Cell>> = effect
+fn row_of(k: usize, effect: &FoundEffect) -> Vec<Cell> {
+    let parameters: Vec<String> = effect
         .parameters
         .iter()
         .map(|(name, e)| {
-            let at = format!("/effects/{k}/parameters/{}", step(name));
-            let mut value = match e.sigma {
-                Some(sigma) => {
-                    let both = with_sigma(e.value, sigma);
-                    format!(
-                        "{}<data value=\"{sigma:e}\" data-key=\"{}/sigma\"></data>",
-                        datum(&format!("{at}/value"), e.value, &both),
-                        escaped(&at)
-                    )
-                }
-                None => datum(&format!("{at}/value"), e.value, &short(e.value)),
-            };
-            if let Some([from, to]) = e.interval {
-                value.push_str(&format!(
-                    " <small>(95 %: {} to {})</small>",
-                    datum(&format!("{at}/interval/0"), from, &short(from)),
-                    datum(&format!("{at}/interval/1"), to, &short(to))
-                ));
-            }
-            vec![Cell::text(name), Cell::html(value), Cell::text(&e.unit)]
+            format!(
+                "<span class=\"v\">{} = {}</span>",
+                escaped(name),
+                estimate(k, name, e)
+            )
         })
         .collect();
-    if parameters.is_empty() {
-        parameters.push(vec![Cell::text("–"), Cell::number("–"), Cell::text("")]);
-    }
     let alike: Vec<String> = effect
         .confusable_with
         .iter()
@@ -221,42 +205,55 @@ fn rows_of(k: usize, effect: &FoundEffect) -> Vec<Vec<Cell>> {
             )
         })
         .collect();
-    let alike = if alike.is_empty() {
-        "nothing in this data".to_owned()
-    } else {
-        alike.join(", ")
+    let or_dash = |list: &[String], between: &str| match list {
+        [] => "–".to_owned(),
+        list => list.join(between),
     };
-    let mut out = vec![];
-    for (i, mut cells) in parameters.into_iter().enumerate() {
-        let mut row = if i == 0 {
-            vec![Cell::words(format!(
-                "<strong>{}</strong>{}<br/><small>{}</small>",
-                escaped(&effect.id),
-                escaped(&selectors(effect)),
-                escaped(meaning(&effect.id))
-            ))]
-        } else {
-            vec![Cell::text("")]
-        };
-        row.append(&mut cells);
-        if i == 0 {
-            let key = |name: &str| format!("/effects/{k}/{name}");
-            row.push(Cell::datum(&key("delta_loglik"), effect.delta_loglik));
-            row.push(Cell::html(datum(
-                &key("p_value"),
-                effect.p_value,
-                &probability(effect.p_value),
-            )));
-            row.push(effect.variance_explained.map_or_else(
-                || Cell::number("–"),
-                |v| Cell::html(datum(&key("variance_explained"), v, &short(100.0 * v))),
-            ));
-            row.push(Cell::words(alike.clone()));
-        } else {
-            row.extend((0..3).map(|_| Cell::number("")));
-            row.push(Cell::text(""));
+    let key = |name: &str| format!("/effects/{k}/{name}");
+    vec![
+        Cell::words(format!(
+            "<strong>{}</strong>{}<br/><small>{}</small>",
+            escaped(&effect.id),
+            escaped(&selectors(effect)),
+            escaped(meaning(&effect.id))
+        )),
+        Cell::words(or_dash(&parameters, "<br/>")),
+        Cell::datum(&key("delta_loglik"), effect.delta_loglik),
+        Cell::html(datum(
+            &key("p_value"),
+            effect.p_value,
+            &probability(effect.p_value),
+        )),
+        effect.variance_explained.map_or_else(
+            || Cell::number("–"),
+            |v| Cell::html(datum(&key("variance_explained"), v, &percent(v))),
+        ),
+        Cell::words(or_dash(&alike, "<br/>")),
+    ]
+}
+
+/// Value, sigma or interval, and unit.
+fn estimate(k: usize, name: &str, e: &Estimate) -> String {
+    let at = format!("/effects/{k}/parameters/{}", step(name));
+    let value = |shown: &str| datum(&format!("{at}/value"), e.value, shown);
+    let mut out = match e.sigma {
+        Some(sigma) => {
+            let both = value(&with_sigma(e.value, sigma));
+            // the sigma is in the text already; this is for machines
+            format!("{both}{}", datum(&format!("{at}/sigma"), sigma, ""))
         }
-        out.push(row);
+        None => value(&short(e.value)),
+    };
+    if let Some([from, to]) = e.interval {
+        out.push_str(&format!(
+            " <small>(95 %: {} to {})</small>",
+            datum(&format!("{at}/interval/0"), from, &short(from)),
+            datum(&format!("{at}/interval/1"), to, &short(to))
+        ));
+    }
+    if !e.unit.is_empty() {
+        out.push(' ');
+        out.push_str(&escaped(&e.unit));
     }
     out
 }
@@ -273,7 +270,7 @@ pub(super) fn rivals(page: &mut Page, closed: &Closed) {
             return;
         };
         page.paragraph(&format!(
-            "Each by itself in place of what was added. The most likely of them is {}, by {} nats over the declared model.",
+            "Each line is an account of its own, in place of what was added, out of fold. The most likely of them is {}, by {} nats over the declared model.",
             best.what,
             short(best.delta_loglik)
         ));
@@ -311,11 +308,10 @@ pub(super) fn considered(page: &mut Page, report: &Report) {
         let gain = |c: &ConsideredEffect| c.delta_loglik.unwrap_or(f64::NEG_INFINITY);
         seen.sort_by(|a, b| gain(b.1).total_cmp(&gain(a.1)));
         if !seen.is_empty() {
-            let added = !report.effects.is_empty();
             page.table(
-                "Gain and p beside what was added. Sizes are those of the parameter named.",
-                &["effect", "gain, nats", "p", "parameter", "detectable at 5σ", "needed", "unit", "why not"],
-                seen.into_iter().map(|(k, c)| considered_row(k, c, added)).collect(),
+                "Gain and p beside what was added. Detectable: the size that would have shown at 5σ; needed: the size that would explain what is left by itself.",
+                &["effect", "size in", "detectable", "needed", "gain, nats", "p", "why not"],
+                seen.into_iter().map(|(k, c)| considered_row(k, c, report)).collect(),
             );
         }
         let unseen: Vec<&ConsideredEffect> =
@@ -334,46 +330,50 @@ pub(super) fn considered(page: &mut Page, report: &Report) {
     });
 }
 
-fn considered_row(k: usize, c: &ConsideredEffect, added: bool) -> Vec<Cell> {
+fn considered_row(k: usize, c: &ConsideredEffect, report: &Report) -> Vec<Cell> {
     let key = |name: &str| format!("/considered/{k}/{name}");
     let p = c.p_value.map_or_else(
         || Cell::number("–"),
         |p| Cell::html(datum(&key("p_value"), p, &probability(p))),
     );
+    let unit = c.unit.as_deref().filter(|unit| !unit.is_empty());
+    let size = match (c.parameter.as_deref(), unit) {
+        (Some(parameter), Some(unit)) => format!("{parameter}, {unit}"),
+        (Some(parameter), None) => parameter.to_owned(),
+        (None, _) => "–".to_owned(),
+    };
     vec![
         Cell::words(format!(
             "{}<br/><small>{}</small>",
             escaped(&c.id),
             escaped(meaning(&c.id))
         )),
-        Cell::maybe(&key("delta_loglik"), c.delta_loglik),
-        p,
-        Cell::text(c.parameter.as_deref().unwrap_or("–")),
+        Cell::text(&size),
         Cell::maybe(&key("detectable"), c.detectable),
         Cell::maybe(&key("needed"), c.needed),
-        Cell::text(c.unit.as_deref().unwrap_or("")),
-        Cell::text(&why_not(c, added)),
+        Cell::maybe(&key("delta_loglik"), c.delta_loglik),
+        p,
+        Cell::text(&why_not(c, report)),
     ]
 }
 
-fn why_not(c: &ConsideredEffect, added: bool) -> String {
+fn why_not(c: &ConsideredEffect, report: &Report) -> String {
     let gains = c.delta_loglik.is_some_and(|gain| gain > 0.0);
-    let seen = gains && c.p_value.is_some_and(|p| p < SIGNIFICANT);
-    if seen {
-        return if added {
-            "visible by itself, but not worth its parameters beside what was added".to_owned()
+    if gains && c.p_value.is_some_and(|p| p < SIGNIFICANT) {
+        let why = if report.effects.is_empty() {
+            "of a size that nature does not make, or without less error"
         } else {
-            "visible by itself, but of a size that nature does not make, or without less error"
-                .to_owned()
+            "not worth its parameters beside what was added"
         };
+        return format!("visible alone, but {why}");
     }
     match (c.detectable, c.needed) {
-        (Some(d), Some(n)) if n > d => format!(
-            "not significant; ruled out as the cause: a size that explains what is left would show at {}σ",
+        (Some(d), Some(n)) if report.unattributed.present && n > d => format!(
+            "not significant; not the cause of what is left: that would show at {}σ",
             short(5.0 * n / d)
         ),
-        (Some(_), Some(_)) => {
-            "not significant; not ruled out: the size needed is too small to show here".to_owned()
+        (Some(_), Some(_)) if report.unattributed.present => {
+            "not significant; still possible: the size needed is below what shows".to_owned()
         }
         _ => "not significant".to_owned(),
     }
@@ -386,7 +386,7 @@ pub(super) fn leftover(page: &mut Page, report: &Report) {
         let share = left.variance_fraction.map_or_else(String::new, |v| {
             format!(
                 " Its share of the variance before: {} %.",
-                datum("/unattributed/variance_fraction", v, &short(100.0 * v))
+                datum("/unattributed/variance_fraction", v, &percent(v))
             )
         });
         let first = if left.present {
@@ -407,7 +407,7 @@ pub(super) fn leftover(page: &mut Page, report: &Report) {
                     let v = d.variance_explained;
                     vec![
                         Cell::text(&d.variable),
-                        Cell::html(datum(&key("variance_explained"), v, &short(100.0 * v))),
+                        Cell::html(datum(&key("variance_explained"), v, &percent(v))),
                         Cell::html(datum(&key("p_value"), d.p_value, &probability(d.p_value))),
                     ]
                 })

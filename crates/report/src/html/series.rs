@@ -62,11 +62,9 @@ fn one(page: &mut Page, view: &View<'_>, added: bool) {
     .in_columns(1)
     .sized([1080.0, 210.0]);
     let how = if view.t_s.len() > POINTS {
-        format!(
-            "Lines: the median of each {STRETCHES}th of the span; areas: the middle 90 % of the rows in it."
-        )
+        format!("Medians, and the middle 90 % of the rows, over each {STRETCHES}th of the span.")
     } else {
-        "A point for each row.".to_owned()
+        "A point for each row, and the medians.".to_owned()
     };
     page.figure(
         &figure,
@@ -77,26 +75,35 @@ fn one(page: &mut Page, view: &View<'_>, added: bool) {
     );
 }
 
+/// Before is an area or points, after lies over it as lines or points.
 fn drawn(panel: Panel, t: &[f64], y: &[f64], colour: Colour, label: &str) -> Panel {
     if t.len() <= POINTS {
-        return panel.with(
-            Mark::points(t, y, 1.2, colour)
-                .at_opacity(0.75)
-                .named(label),
-        );
+        let e = Envelope::new(t, y, MEDIANS);
+        return panel
+            .with(Mark::points(t, y, 1.2, colour).at_opacity(0.6).named(label))
+            .with(
+                Mark::line(&e.x, &e.median, colour)
+                    .wide(2.2)
+                    .named(&format!("{label}, medians")),
+            );
     }
     let e = Envelope::new(t, y, STRETCHES);
-    panel
-        .with(
+    let middle = format!("{label}, middle 90 %");
+    let panel = if colour == Colour::AFTER {
+        let ends = vec![[e.x.clone(), e.low.clone()], [e.x.clone(), e.high.clone()]];
+        panel.with(Mark::lines(ends, 0.9, colour).named(&middle))
+    } else {
+        panel.with(
             Mark::band(&e.x, &e.low, &e.high, colour)
-                .at_opacity(0.3)
-                .named(&format!("{label}, middle 90 %")),
+                .at_opacity(0.35)
+                .named(&middle),
         )
-        .with(
-            Mark::line(&e.x, &e.median, colour)
-                .wide(1.3)
-                .named(&format!("{label}, median")),
-        )
+    };
+    panel.with(
+        Mark::line(&e.x, &e.median, colour)
+            .wide(1.9)
+            .named(&format!("{label}, median")),
+    )
 }
 
 /// Range of the medians over stretches of the span.

@@ -15,7 +15,7 @@ use telemetry::StarResiduals;
 
 use super::data::View;
 use super::{Page, Run};
-use crate::number::{hertz, short};
+use crate::number::{change, hertz, short};
 
 const UNIT: &str = "arcsec²/Hz";
 /// Stars whose spectra are averaged.
@@ -112,11 +112,7 @@ fn draw(page: &mut Page, run: &Run<'_>, view: &View<'_>, pairs: &Pairs, how: &st
         panels.push(panel);
     }
     let title = if added {
-        format!(
-            "The density of the {} residual {}",
-            view.kind,
-            falls(pairs, view)
-        )
+        changes(pairs, view)
     } else {
         let said: Vec<String> = pairs
             .iter()
@@ -139,40 +135,38 @@ fn draw(page: &mut Page, run: &Run<'_>, view: &View<'_>, pairs: &Pairs, how: &st
     );
 }
 
-/// Where each axis falls most, and whether it rises.
-fn falls(pairs: &Pairs, view: &View<'_>) -> String {
-    let said: Vec<String> = pairs
-        .iter()
-        .zip(view.axes)
-        .map(|([before, after], name)| {
-            let db: Vec<(f64, f64)> = before
-                .f
-                .iter()
-                .zip(before.psd.iter().zip(&after.psd))
-                .map(|(f, (b, a))| (*f, 10.0 * (a / b).log10()))
-                .filter(|(_, db)| db.is_finite())
-                .collect();
-            let least = db.iter().copied().min_by(|a, b| a.1.total_cmp(&b.1));
-            let most = db.iter().map(|d| d.1).fold(0.0, f64::max);
-            match least {
-                Some((f, fall)) if fall < -0.5 => {
-                    let rise = if most > 0.5 {
-                        format!(", and rises by up to {} dB elsewhere", short(most))
-                    } else {
-                        String::new()
-                    };
-                    format!(
-                        "{name} falls by up to {} dB at {}{rise}",
-                        short(-fall),
-                        hertz(f)
-                    )
-                }
-                _ if most > 0.5 => format!("{name} rises by up to {} dB", short(most)),
-                _ => format!("{name} stays within 0.5 dB"),
-            }
-        })
-        .collect();
-    said.join("; ")
+/// How the density changes in each third of the frequencies, dB an axis.
+fn changes(pairs: &Pairs, view: &View<'_>) -> String {
+    let f = &pairs[0][0].f;
+    let (low, high) = (f[0], f[f.len() - 1]);
+    let third = (high / low).powf(1.0 / 3.0);
+    let cuts = [low * third, high / third];
+    let of = |from: f64, to: f64| -> String {
+        let said: Vec<String> = pairs
+            .iter()
+            .map(|[before, after]| {
+                // equal steps of ln f: a sum of f psd is the power
+                let power = |d: &Density| -> f64 {
+                    let bins = d.f.iter().zip(&d.psd);
+                    bins.filter(|(f, _)| (from..to).contains(*f))
+                        .map(|(f, p)| f * p)
+                        .sum()
+                };
+                change(10.0 * (power(after) / power(before)).log10())
+            })
+            .collect();
+        said.join(", ")
+    };
+    format!(
+        "Power of the {} residual {}, after over before: {} dB below {}; {} dB up to {}; {} dB above",
+        view.kind,
+        view.axes.join(", "),
+        of(0.0, cuts[0]),
+        hertz(cuts[0]),
+        of(cuts[0], cuts[1]),
+        hertz(cuts[1]),
+        of(cuts[1], f64::INFINITY),
+    )
 }
 
 /// Mean density of the lowest tenth of the frequencies over that of the highest, dB.
