@@ -324,6 +324,10 @@ impl Mark {
                 Box::new(of(x))
             }
             (Shape::Band { low, high, .. }, _) => Box::new(of(low).chain(of(high))),
+            (Shape::Points { y, sigma, .. }, _) if !sigma.is_empty() => {
+                let pairs = y.iter().zip(sigma);
+                Box::new(pairs.flat_map(|(y, s)| [*y, y - s, y + s]))
+            }
             (Shape::Points { y, .. } | Shape::Arrows { y, .. }, _) => Box::new(of(y)),
             (Shape::Cells { x, y, size, .. }, _) => {
                 let half = 0.5 * size[axis];

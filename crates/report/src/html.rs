@@ -125,7 +125,7 @@ tbody th { font-weight: normal; }
 .n { text-align: right; font-variant-numeric: tabular-nums; }
 .n, .v { white-space: nowrap; }
 figure { margin: .6rem 0 1.4rem; }
-figure > svg { display: block; max-width: 100%; height: auto; }
+svg[role] { display: block; max-width: 100%; height: auto; }
 figcaption { max-width: 62rem; }
 pre { background: #f4f5f7; border: 1px solid #d3d7dc; padding: .6rem; overflow-x: auto; font-size: .85em; }
 small { color: #50565e; font-size: .92em; }

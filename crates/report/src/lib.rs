@@ -1,6 +1,6 @@
 //! Text and pictures from finished results.
 //!
-//! Nothing is computed here: the crate can be deleted without changing a number.
+//! Nothing is computed here that is not drawn: the crate can be deleted without changing a number.
 #![forbid(unsafe_code)]
 
 mod compare_figures;

@@ -341,6 +341,27 @@ fn every_kind_has_its_sections_and_is_well_formed() {
     }
 }
 
+/// The table of the documentation names the sections in their order.
+#[test]
+fn the_documentation_names_every_section() {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/formats/report.md");
+    let text = std::fs::read_to_string(path).unwrap_or_default();
+    let table = text.split("## `report.html`").nth(1).unwrap_or_default();
+    let named: Vec<&str> = table
+        .split("\n## ")
+        .next()
+        .unwrap_or_default()
+        .lines()
+        .filter_map(|line| line.strip_prefix("| `")?.split('`').next())
+        .collect();
+    let (_, mut all) = kinds().remove(2);
+    all.dark_map = Some(dark_map());
+    let page = page(&all);
+    let sections = page.split("<section id=\"").skip(1);
+    let there: Vec<&str> = sections.filter_map(|s| s.split('"').next()).collect();
+    assert_eq!(there, named);
+}
+
 /// A picture has a title for those who cannot see it that states a number, units, and a caption.
 #[test]
 fn every_picture_says_something() {

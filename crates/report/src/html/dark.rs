@@ -10,8 +10,9 @@ use crate::number::with_sigma;
 
 /// Pixels farther apart than this belong to different windows.
 const APART: f64 = 6.0;
-/// Windows that get a panel each; more share one map of the detector.
+/// Windows that get a panel each, and pixels in them; more share one map of the detector.
 const WINDOWS: usize = 9;
+const PIXELS: usize = 3000;
 /// Cells to a side of that map.
 const CELLS: f64 = 96.0;
 
@@ -20,25 +21,27 @@ pub(super) fn map(page: &mut Page, run: &Run<'_>) {
         return;
     };
     let camera = run.bundle.camera.as_ref();
-    let half = camera.map(|camera| camera.half_size_px());
+    let extent = |of: &[f64]| of.iter().fold(1.0_f64, |most, p| most.max(p.abs()));
+    let half = camera.map_or_else(
+        || [extent(&dark.x_px), extent(&dark.y_px)],
+        |camera| camera.half_size_px(),
+    );
     page.section("dark-map", "Dark map", |page| {
         let windows = windows(dark);
         let mut sorted = dark.dn.clone();
         sorted.sort_by(f64::total_cmp);
         let top = sorted[(sorted.len() - 1) * 99 / 100].max(f64::MIN_POSITIVE);
         let scale = Scale::Sequential([0.0, top]);
-        let (panels, size, note) = match half {
-            Some(half) if windows.len() > WINDOWS => {
-                let cell = (2.0 * half[0].max(half[1]) / CELLS).ceil().max(1.0);
-                let panel = binned(dark, half, cell, scale);
-                let note = format!("Each cell: the brightest of its {cell} by {cell} pixels.");
-                (vec![panel], [640.0, 600.0], note)
-            }
-            _ => {
-                let shown = &windows[..windows.len().min(WINDOWS)];
-                let panels = shown.iter().map(|w| window(dark, w, scale)).collect();
-                (panels, [360.0, 300.0], "Each cell: one pixel of the detector; white was under no window.".to_owned())
-            }
+        let many = windows.len() > WINDOWS || dark.dn.len() > PIXELS;
+        let (panels, size, note) = if many {
+            let cell = (2.0 * half[0].max(half[1]) / CELLS).ceil().max(1.0);
+            let panel = binned(dark, half, cell, scale);
+            let note = format!("Each cell: the brightest of its {cell} by {cell} pixels.");
+            (vec![panel], [640.0, 600.0], note)
+        } else {
+            let panels = windows.iter().map(|w| window(dark, w, scale)).collect();
+            let note = "Each cell: one pixel of the detector; white was under no window.";
+            (panels, [360.0, 300.0], note.to_owned())
         };
         let brightest = (0..dark.dn.len()).max_by(|&a, &b| dark.dn[a].total_cmp(&dark.dn[b]));
         let at = brightest.unwrap_or(0);

@@ -234,7 +234,7 @@ fn by_star(page: &mut Page, stars: &StarResiduals) {
         .map(|axis| [0, 1].map(|when| view.kept(when, axis)))
         .collect();
     let all = of.len();
-    let mut list: Vec<((i64, i32), Vec<usize>, [f64; 4])> = of
+    let mut list: Vec<(_, Vec<usize>, [f64; 4])> = of
         .into_iter()
         .map(|(key, rows)| {
             let value = |axis: usize, when: usize| rms(rows.iter().map(|&r| kept[axis][when][r]));

@@ -105,7 +105,8 @@ pub(super) fn numbers(page: &mut Page, report: &Report) {
         b.log_psd_cost,
         a.log_psd_cost,
     );
-    let single: [(&str, &str, fn(&Errors) -> Option<f64>); 2] = [
+    type Get = fn(&Errors) -> Option<f64>;
+    let single: [(&str, &str, Get); 2] = [
         ("chi-squared per degree of freedom", "chi2_per_dof", |e| {
             e.chi2_per_dof
         }),
@@ -266,7 +267,7 @@ pub(super) fn rivals(page: &mut Page, closed: &Closed) {
             .iter()
             .max_by(|a, b| a.delta_loglik.total_cmp(&b.delta_loglik))
         else {
-            page.paragraph("None was worked out beside what was added: the table of what was considered holds the gain of each effect alone.");
+            page.paragraph("None was worked out in place of what was added. What each other effect gains beside it is in the next table.");
             return;
         };
         page.paragraph(&format!(
