@@ -145,8 +145,8 @@ fn findings(stars: bool, attitude: bool) -> Report {
                 variance_explained: 0.21,
                 p_value: 3e-4,
             }],
-            lines_hz: vec![0.0123],
-            jumps_s: vec![1234.5],
+            lines_hz: vec![0.0123, 0.31],
+            jumps_s: vec![1234.5, 2345.5],
         },
     }
 }
@@ -576,6 +576,32 @@ fn titles_state_what_is_drawn() {
             );
         }
     }
+}
+
+/// Stars that rest at pixel centres, with noise alone. Sorted by where they are expected all rows fall
+/// into one bin, whose mean is within five of its sigmas: 5 * 8 / sqrt(12 * 2000) = 0.26 arcsec. Sorted by
+/// where they were measured the bins beside it would hold nothing but rows of one sign, 3 arcsec off.
+#[test]
+fn noise_makes_no_pattern_over_pixel_phase() {
+    let mut rows = star_rows(200);
+    let scale = bundle().camera.map_or(f64::NAN, |c| c.arcsec_per_px()[0]);
+    for r in 0..rows.t_s.len() {
+        let centre = 40.0 * f64::from(rows.slot[r]) - 180.5;
+        rows.x_px[r] = centre + rows.before_arcsec[0][r] / scale;
+    }
+    let mut closed = closed(Some(rows), None);
+    closed.report.effects.clear();
+    let page = page(&closed);
+    let title = page
+        .split("The rms over pixel phase is ")
+        .nth(1)
+        .unwrap_or_default();
+    let rms: f64 = title
+        .split(' ')
+        .next()
+        .and_then(|w| w.parse().ok())
+        .unwrap_or(f64::NAN);
+    assert!(rms < 0.26, "{rms}");
 }
 
 /// Where nothing was added there is no before and after, and the page says so.
