@@ -65,6 +65,7 @@ fn results_are_whole_and_the_model_can_be_used_again() -> Done {
     );
     for file in [
         "report.json",
+        "report.html",
         "summary.txt",
         "model.toml",
         "residuals_stars.parquet",
@@ -86,6 +87,40 @@ fn results_are_whole_and_the_model_can_be_used_again() -> Done {
         .output()?;
     let report: serde_json::Value = serde_json::from_slice(&again.stdout)?;
     assert_eq!(report["verdict"], "consistent");
+    Ok(())
+}
+
+/// The page of a real run, with ensembles of both models, says what its `report.json` says.
+#[test]
+fn the_page_is_true_to_the_report() -> Done {
+    let dir = tempfile::tempdir()?;
+    let out = dir.path().join("results");
+    let run = boresight().arg("close").arg("--out").arg(&out).output()?;
+    assert!(run.status.success());
+    let page = fs::read_to_string(out.join("report.html"))?;
+    let report: serde_json::Value = serde_json::from_slice(&fs::read(out.join("report.json"))?)?;
+    let mut numbers = 0;
+    for piece in page.split("<data value=\"").skip(1) {
+        let mut parts = piece.split('"');
+        let value: f64 = parts.next().ok_or("value")?.parse()?;
+        let key = parts.nth(1).ok_or("key")?;
+        let wanted = report.pointer(key).and_then(serde_json::Value::as_f64);
+        assert_eq!(wanted.map(f64::to_bits), Some(value.to_bits()), "{key}");
+        numbers += 1;
+    }
+    assert!(numbers > 60, "{numbers}");
+    // the declared model lacks the effect: its cost about the boresight is the larger one
+    let costs = page
+        .split("Log-PSD cost about X, Y, Z: ")
+        .nth(1)
+        .and_then(|rest| rest.split('<').next())
+        .ok_or("ensembles of both models")?;
+    let costs: Vec<f64> = costs
+        .split([' ', ','])
+        .filter_map(|word| word.parse().ok())
+        .collect();
+    assert_eq!(costs.len(), 6, "{costs:?}");
+    assert!(costs[2] > costs[5], "{costs:?}");
     Ok(())
 }
 

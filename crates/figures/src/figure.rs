@@ -450,6 +450,27 @@ mod tests {
         assert_eq!(count(vec![panel("mean"), panel("other"), panel("mean")]), 2);
     }
 
+    /// Arrows a tenth as long have the key of the longer ones when drawn to their scale, and a key of
+    /// their own otherwise.
+    #[test]
+    fn arrows_of_two_panels_share_a_scale() {
+        let at = [0.0, 1.0, 2.0];
+        let key = |length: f64, scale: Option<f64>| {
+            let mark = Mark::arrows([&at, &at], [&[length; 3], &[0.0; 3]], "arcsec", Colour::INK);
+            let mark = match scale {
+                Some(value) => mark.to_scale(value),
+                None => mark,
+            };
+            let panel = Panel::map("p").with(mark.named("mean"));
+            let svg = Figure::new("f", vec![panel]).svg();
+            let text = svg.split("mean, key ").nth(1).unwrap_or_default();
+            text.split('<').next().unwrap_or_default().to_owned()
+        };
+        assert_eq!(key(2.0, None), key(0.2, Some(2.0)));
+        assert_ne!(key(2.0, None), key(0.2, None));
+        assert_eq!(key(0.2, None), key(0.2, Some(f64::NAN)));
+    }
+
     #[test]
     fn a_pixel_is_square_on_the_focal_plane() {
         let panel = Panel::focal_plane("f", [512.0, 256.0]).with(Mark::points(

@@ -60,6 +60,8 @@ pub enum Shape {
         dy: Vec<f64>,
         /// Unit of the components: the legend shows an arrow of a round number of it.
         unit: String,
+        /// What a long arrow stands for; `None`: what nine tenths of these stay below.
+        long: Option<f64>,
     },
     /// Cells of one size, coloured by their value; a bar beside the panel has the scale.
     Cells {
@@ -210,6 +212,7 @@ impl Mark {
             dx: d[0].to_vec(),
             dy: d[1].to_vec(),
             unit: unit.to_owned(),
+            long: None,
         };
         Self::new(shape, colour)
     }
@@ -296,6 +299,16 @@ impl Mark {
         self
     }
 
+    /// The same arrows, a long one standing for `value`: arrows of several panels can be compared. Other
+    /// marks are as they are, and so are arrows of a value that is not positive.
+    #[must_use]
+    pub fn to_scale(mut self, value: f64) -> Self {
+        if let Shape::Arrows { long, .. } = &mut self.shape {
+            *long = (value > 0.0 && value.is_finite()).then_some(value);
+        }
+        self
+    }
+
     /// All x and all y that the axes must show.
     pub(crate) fn extent(&self, axis: usize) -> Box<dyn Iterator<Item = f64> + '_> {
         fn of(values: &[f64]) -> impl Iterator<Item = f64> + '_ {
@@ -311,6 +324,10 @@ impl Mark {
                 Box::new(of(x))
             }
             (Shape::Band { low, high, .. }, _) => Box::new(of(low).chain(of(high))),
+            (Shape::Points { y, sigma, .. }, _) if !sigma.is_empty() => {
+                let pairs = y.iter().zip(sigma);
+                Box::new(pairs.flat_map(|(y, s)| [*y, y - s, y + s]))
+            }
             (Shape::Points { y, .. } | Shape::Arrows { y, .. }, _) => Box::new(of(y)),
             (Shape::Cells { x, y, size, .. }, _) => {
                 let half = 0.5 * size[axis];

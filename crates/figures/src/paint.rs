@@ -41,7 +41,12 @@ impl Arrows {
     /// The scale at which the longest tenth of the arrows just reaches the next one.
     pub(crate) fn of(mark: &Mark, frame: &Frame) -> Option<Self> {
         let Shape::Arrows {
-            x, dx, dy, unit, ..
+            x,
+            dx,
+            dy,
+            unit,
+            long,
+            ..
         } = &mark.shape
         else {
             return None;
@@ -49,7 +54,7 @@ impl Arrows {
         let mut lengths: Vec<f64> = dx.iter().zip(dy).map(|(a, b)| a.hypot(*b)).collect();
         lengths.retain(|l| l.is_finite() && *l > 0.0);
         lengths.sort_by(f64::total_cmp);
-        let long = *lengths.get(lengths.len() * 9 / 10)?;
+        let long = long.or_else(|| lengths.get(lengths.len() * 9 / 10).copied())?;
         let spacing = (frame.px[0] * frame.px[1] / x.len() as f64).sqrt();
         let px_per_unit = spacing.clamp(14.0, 34.0) / long;
         // the key is the longest round number that fits into its place in the legend

@@ -1,12 +1,14 @@
 //! Text and pictures from finished results.
 //!
-//! Nothing is computed here: the crate can be deleted without changing a number.
+//! Nothing is computed here that is not drawn: the crate can be deleted without changing a number.
 #![forbid(unsafe_code)]
 
 mod compare_figures;
 mod compare_tables;
 mod compare_text;
 mod fit_text;
+mod html;
+mod number;
 mod scene_figures;
 mod text;
 
@@ -14,5 +16,6 @@ pub use compare_figures::compare_figures;
 pub use compare_tables::compare_tables;
 pub use compare_text::compare_summary;
 pub use fit_text::fit_summary;
+pub use html::{Run, html};
 pub use scene_figures::scene_figures;
 pub use text::summary;

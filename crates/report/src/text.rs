@@ -5,6 +5,8 @@ use std::fmt::Write as _;
 use closed_loop::Closed;
 use telemetry::report::{Errors, FoundEffect, Report, Selector, Verdict};
 
+use crate::number::number;
+
 /// The findings of a run in words and numbers, some 20 lines of at most 100 columns.
 #[must_use]
 pub fn summary(closed: &Closed) -> String {
@@ -25,9 +27,10 @@ macro_rules! line {
     ($out:expr, $($arg:tt)*) => {{ let _ = writeln!($out, $($arg)*); }};
 }
 
-fn verdict(out: &mut String, report: &Report) {
+/// The verdict as a sentence.
+pub(crate) fn sentence(report: &Report) -> String {
     let names: Vec<&str> = report.effects.iter().map(|e| e.id.as_str()).collect();
-    let sentence = match report.verdict {
+    match report.verdict {
         Verdict::Consistent => {
             "the data follows the declared model; nothing is left to explain".to_owned()
         }
@@ -39,7 +42,11 @@ fn verdict(out: &mut String, report: &Report) {
         Verdict::Unexplained => {
             "something is left that no effect of the catalogue explains".to_owned()
         }
-    };
+    }
+}
+
+fn verdict(out: &mut String, report: &Report) {
+    let sentence = sentence(report);
     line!(out, "Verdict   {sentence}");
     line!(
         out,
@@ -145,7 +152,7 @@ fn effects(out: &mut String, report: &Report) {
     }
 }
 
-fn selectors(effect: &FoundEffect) -> String {
+pub(crate) fn selectors(effect: &FoundEffect) -> String {
     if effect.selectors.is_empty() {
         return String::new();
     }
@@ -249,40 +256,5 @@ fn leftover(out: &mut String, report: &Report) {
             100.0 * d.variance_explained,
             d.p_value
         );
-    }
-}
-
-/// Four significant digits, plain where that is readable.
-fn number(value: f64) -> String {
-    let size = value.abs();
-    if value == 0.0 || (1e-3..1e6).contains(&size) {
-        let digits = if size >= 1000.0 {
-            0
-        } else if size >= 1.0 {
-            3
-        } else {
-            5
-        };
-        let text = format!("{value:.digits$}");
-        return if text.contains('.') {
-            text.trim_end_matches('0').trim_end_matches('.').to_owned()
-        } else {
-            text
-        };
-    }
-    format!("{value:.3e}")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::number;
-
-    #[test]
-    fn numbers_stay_readable() {
-        assert_eq!(number(3.01e-5), "3.010e-5");
-        assert_eq!(number(0.9), "0.9");
-        assert_eq!(number(408.0), "408");
-        assert_eq!(number(12345.6), "12346");
-        assert_eq!(number(0.0), "0");
     }
 }

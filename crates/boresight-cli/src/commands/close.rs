@@ -4,7 +4,8 @@ use std::io::Write as _;
 
 use anyhow::Context as _;
 use boresight::closed_loop::{Closed, close};
-use boresight::report::summary;
+use boresight::comparison::{CompareSettings, compare};
+use boresight::report::{Run, html, summary};
 use boresight::telemetry::{Bundle, Model, Output};
 
 use crate::arguments::Close;
@@ -36,6 +37,8 @@ pub(crate) fn run(options: &Close, console: &Console) -> anyhow::Result<()> {
             interrupted();
         });
         write(&closed, &text, &output)?;
+        let page = page(&model, &bundle, &closed, &title, console);
+        output.write("report.html", |to| to.write_all(page.as_bytes()))?;
         output.commit()?;
     }
     console.say(&format!("Input     {title}\n{text}"));
@@ -52,6 +55,29 @@ pub(crate) fn run(options: &Close, console: &Console) -> anyhow::Result<()> {
 )]
 pub(crate) fn interrupted() {
     std::process::exit(130)
+}
+
+/// Draws of each model behind its spectrum: enough for a mean and its 3 sigma.
+const DRAWS: u64 = 40;
+
+/// `report.html`; where no ensemble can be had, it says why.
+fn page(model: &Model, bundle: &Bundle, closed: &Closed, title: &str, console: &Console) -> String {
+    let settings = CompareSettings {
+        draws: DRAWS,
+        ..CompareSettings::default()
+    };
+    let added = (!closed.report.effects.is_empty()).then(|| closed.model.clone());
+    let others: Vec<Model> = added.into_iter().collect();
+    let compared = compare(model, &others, bundle, &settings, &|what| {
+        console.progress(what);
+    })
+    .map_err(|error| error.to_string());
+    html(&Run {
+        closed,
+        bundle,
+        input: title,
+        compared: compared.as_ref().map_err(String::as_str),
+    })
 }
 
 fn write(closed: &Closed, text: &str, output: &Output) -> anyhow::Result<()> {
