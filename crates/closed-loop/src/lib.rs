@@ -26,6 +26,7 @@ mod gram;
 mod image_level;
 mod images;
 mod motion;
+mod noise_effects;
 mod nuisance;
 mod reference_wander;
 mod search;

@@ -25,6 +25,7 @@ use crate::folds::Folds;
 use crate::image_level::{self, ImageLevel, Side};
 use crate::images::{self, Formed};
 use crate::motion;
+use crate::noise_effects;
 use crate::nuisance::StarNuisance;
 use crate::reference_wander::{self, REFERENCE_ERROR};
 use crate::search::{Found, amplitudes, borrowed, fit};
@@ -382,12 +383,17 @@ fn finish(f: &Finish<'_>) -> Result<Closed, CloseError> {
         effects.push(effect);
         entries.push(entry);
     }
+    let noise =
+        noise_effects::claim(f.situation, f.level, f.found, f.folds, &after.axes)?;
+    effects.extend(noise.effects.iter().cloned());
+    entries.extend(noise.entries.iter().cloned());
     model.effects.extend(entries);
 
     let unattributed = figures::unattributed(f.found, last / whole);
     let excess = excess(f, last);
     let mut considered = figures::considered(f.found, excess);
     considered.retain(|c| !effects.iter().any(|e| e.id == c.id));
+    noise.tell(&mut considered);
     if let Some((level, _)) = f.image {
         for (id, step) in [
             (images::DARK_MAP, &level.dark_map),
