@@ -25,6 +25,7 @@ mod folds;
 mod gram;
 mod image_level;
 mod images;
+mod leftover;
 mod motion;
 mod noise_effects;
 mod nuisance;

@@ -202,7 +202,7 @@ impl NoiseEffects {
 /// Residuals with everything estimated from all data: a mean predicted from other
 /// folds has an error of its own, which is no noise of the rows. `None` where
 /// centroids themselves depend on the fold.
-fn in_sample(level: &StarEvidence<'_>, found: &Found) -> Option<Vec<Vec<f64>>> {
+pub(crate) fn in_sample(level: &StarEvidence<'_>, found: &Found) -> Option<Vec<Vec<f64>>> {
     if level.residuals.len() != 1 {
         return None;
     }

@@ -24,6 +24,7 @@ use crate::figures;
 use crate::folds::Folds;
 use crate::image_level::{self, ImageLevel, Side};
 use crate::images::{self, Formed};
+use crate::leftover;
 use crate::motion;
 use crate::noise_effects;
 use crate::nuisance::StarNuisance;
@@ -389,7 +390,10 @@ fn finish(f: &Finish<'_>) -> Result<Closed, CloseError> {
     entries.extend(noise.entries.iter().cloned());
     model.effects.extend(entries);
 
-    let unattributed = figures::unattributed(f.found, last / whole);
+    let mut unattributed = figures::unattributed(f.found, last / whole);
+    let inside = noise_effects::in_sample(f.level, f.found);
+    let tracks = leftover::star_tracks(f.data, inside.as_deref().unwrap_or(&after.axes));
+    leftover::describe(&tracks).tell(&mut unattributed);
     let excess = excess(f, last);
     let mut considered = figures::considered(f.found, excess);
     considered.retain(|c| !effects.iter().any(|e| e.id == c.id));
