@@ -33,6 +33,9 @@ use crate::star_design::{rotation_inverse, rotation_row};
 use crate::star_search::WIDENING;
 use telemetry::report::Unattributed;
 
+#[cfg(test)]
+mod tests;
+
 /// Fewest points of a series that is searched.
 const MIN_POINTS: usize = 60;
 /// Grid points in 1/span.
@@ -174,7 +177,10 @@ pub(crate) fn attitude_tracks(
 
 impl Track {
     fn span(&self) -> f64 {
-        self.t_s.last().zip(self.t_s.first()).map_or(0.0, |(l, f)| l - f)
+        self.t_s
+            .last()
+            .zip(self.t_s.first())
+            .map_or(0.0, |(l, f)| l - f)
     }
 
     /// Points that count, about their mean, without spikes, averaged where they are too many.
@@ -277,7 +283,10 @@ impl Track {
         }
         // once more each, without what the others left in it
         for k in 0..found.len() {
-            let others: Vec<f64> = (0..found.len()).filter(|&j| j != k).map(|j| found[j]).collect();
+            let others: Vec<f64> = (0..found.len())
+                .filter(|&j| j != k)
+                .map(|j| found[j])
+                .collect();
             let noise = self.noise();
             if let Some((_, left)) = whole.take_out(&noise, &whole.sinusoids(&others)) {
                 let step = 1.0 / (FINER as f64 * self.span());
@@ -324,15 +333,17 @@ impl Track {
             floating_mean: true,
             fs_hz: 1.0,
         };
-        let power = LombScargle::new(&self.t_s, settings).ok()?.process(&white).ok()?.psd;
+        let power = LombScargle::new(&self.t_s, settings)
+            .ok()?
+            .process(&white)
+            .ok()?
+            .psd;
         let near = |k: usize| -> (f64, f64) {
             let (mut sum, mut count) = (0.0, 0.0);
-            for side in [-1_i64, 1] {
-                for j in GUARD + 1..=GUARD + AROUND {
-                    let at = (j * FINER) as i64 * side + k as i64;
-                    if (0..bins as i64).contains(&at) {
-                        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "in range")]
-                        let p = power[at as usize];
+            for j in GUARD + 1..=GUARD + AROUND {
+                let off = j * FINER;
+                for at in [k.checked_sub(off), Some(k + off)].into_iter().flatten() {
+                    if let Some(p) = power.get(at) {
                         sum += p;
                         count += 1.0;
                     }
@@ -392,8 +403,9 @@ impl Track {
                 .iter()
                 .filter_map(|n| self.best_step(n))
                 .filter_map(|at| {
-                    let step: Vec<f64> =
-                        (0..self.t_s.len()).map(|k| f64::from(u8::from(k >= at))).collect();
+                    let step: Vec<f64> = (0..self.t_s.len())
+                        .map(|k| f64::from(u8::from(k >= at)))
+                        .collect();
                     let columns = [vec![1.0; step.len()], step];
                     let mut its_noise = noise;
                     let mut left = self.take_out(&white, &columns)?.1;

@@ -15,6 +15,8 @@
 
 mod judge;
 mod rows;
+#[cfg(test)]
+mod tests;
 mod variance;
 
 use std::collections::BTreeMap;
@@ -27,7 +29,7 @@ use telemetry::{EffectEntry, EffectValue};
 
 use crate::declared;
 use crate::error::CloseError;
-use crate::evidence::{Amplitudes, Evidence};
+use crate::evidence::{Amplitudes, Evidence, Residuals};
 use crate::folds::Folds;
 use crate::search::{Found, borrowed};
 use crate::selection::columns_of;
@@ -94,6 +96,21 @@ pub(crate) fn declared_variance(
         all * all
     });
     Ok(variance.collect())
+}
+
+/// Squared residuals of the rows that count, each over its declared variance.
+pub(crate) fn in_declared_sigmas(
+    situation: &Situation<'_>,
+    data: &StarData,
+    residual: &Residuals,
+) -> Option<f64> {
+    let declared = declared_variance(situation, data).ok()?;
+    let rows = (0..data.t_s.len()).filter(|&r| !data.outlier[r]);
+    let squares = rows.map(|r| {
+        let square: f64 = residual.axes.iter().map(|a| a[r] * a[r]).sum();
+        square / declared[r]
+    });
+    Some(squares.filter(|s| s.is_finite()).sum())
 }
 
 /// Declared outliers: share and size.

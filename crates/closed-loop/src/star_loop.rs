@@ -345,10 +345,10 @@ impl Finish<'_> {
             attitude_rms_arcsec: attitude,
             log_psd_cost: None,
             // with free attitudes three of each frame's numbers are spent
-            chi2_per_dof: declared.map(|circular| {
-                let n: usize = self.data.outlier.iter().filter(|o| !**o).count();
-                let dof = self.found.fitted.scalars;
-                n as f64 * (rms[0] * rms[0] + rms[1] * rms[1]) / (0.5 * circular * circular * dof)
+            chi2_per_dof: declared.and_then(|_| {
+                let square =
+                    noise_effects::in_declared_sigmas(self.situation, self.data, residual)?;
+                Some(square / self.found.fitted.scalars)
             }),
             loglik_per_frame: loglik.map(|l| l / self.data.frames.frames() as f64),
         }
@@ -384,8 +384,7 @@ fn finish(f: &Finish<'_>) -> Result<Closed, CloseError> {
         effects.push(effect);
         entries.push(entry);
     }
-    let noise =
-        noise_effects::claim(f.situation, f.level, f.found, f.folds, &after.axes)?;
+    let noise = noise_effects::claim(f.situation, f.level, f.found, f.folds, &after.axes)?;
     effects.extend(noise.effects.iter().cloned());
     entries.extend(noise.entries.iter().cloned());
     model.effects.extend(entries);

@@ -45,6 +45,9 @@ const MIN_SPIKES: f64 = 3.0;
 /// Rounds of rows (whose rotation is weighed by the noise) and fit.
 const ROUNDS: usize = 2;
 
+/// Makes the rows under a belief: the variance of a row, and how likely it is no spike.
+pub(super) type Make<'a> = dyn Fn(&dyn Fn(&Row) -> [f64; 2]) -> Vec<Row> + 'a;
+
 type Free = [bool; PARAMETERS];
 
 /// One effect beside the others.
@@ -85,7 +88,7 @@ struct Bench<'a> {
 /// Judges. `make` gives the rows under a belief of variance and soundness; `moving`
 /// says whether rates are known; `declared` are declared outliers (share, size).
 pub(super) fn judge(
-    make: &dyn Fn(&dyn Fn(&Row) -> [f64; 2]) -> Vec<Row>,
+    make: &Make<'_>,
     folds: &Folds,
     moving: bool,
     declared: Option<[f64; 2]>,
@@ -114,11 +117,19 @@ pub(super) fn judge(
     let [mut magnitude, mut rate] = [MAGNITUDE, RATE].map(|k| bench.one(k, &full));
     if magnitude.observable && rate.observable && magnitude.stands != rate.stands {
         // the one that stands, without the freedom of the other
-        let (alone, other) = if magnitude.stands { (MAGNITUDE, RATE) } else { (RATE, MAGNITUDE) };
+        let (alone, other) = if magnitude.stands {
+            (MAGNITUDE, RATE)
+        } else {
+            (RATE, MAGNITUDE)
+        };
         let fit = bench.without(&full, other);
         let again = bench.one(alone, &fit);
         if again.stands {
-            *(if alone == MAGNITUDE { &mut magnitude } else { &mut rate }) = again;
+            *(if alone == MAGNITUDE {
+                &mut magnitude
+            } else {
+                &mut rate
+            }) = again;
         }
     } else if magnitude.observable && rate.observable && !magnitude.stands {
         // they may hide behind each other
@@ -221,11 +232,21 @@ impl Bench<'_> {
         let ratio = 2.0 * (full.loglik - self.with(full, k, least).loglik) / widened;
         let mut p = likely(ratio, 1.0);
         let beyond = value - least;
-        p = p.max(wald(beyond, variance(&blocks), blocks.map_or(0, |c| c.1), 1));
-        let mut sigma2 = variance(&self.model.covariance(full, &self.rows, |r| r.block))
-            .max(variance(&cells));
+        p = p.max(wald(
+            beyond,
+            variance(&blocks),
+            blocks.map_or(0, |c| c.1),
+            1,
+        ));
+        let mut sigma2 =
+            variance(&self.model.covariance(full, &self.rows, |r| r.block)).max(variance(&cells));
         if k == MAGNITUDE {
-            p = p.max(wald(beyond, variance(&stars), stars.as_ref().map_or(0, |c| c.1), 2));
+            p = p.max(wald(
+                beyond,
+                variance(&stars),
+                stars.as_ref().map_or(0, |c| c.1),
+                2,
+            ));
             sigma2 = sigma2.max(variance(&stars));
         }
         let gain = self.gain(&self.rows, full, &without);
@@ -233,7 +254,11 @@ impl Bench<'_> {
             [value, sigma2.sqrt()]
         } else {
             let root = value.max(0.0).sqrt();
-            let sigma = if root > 0.0 { 0.5 * sigma2.sqrt() / root } else { 0.0 };
+            let sigma = if root > 0.0 {
+                0.5 * sigma2.sqrt() / root
+            } else {
+                0.0
+            };
             [root, sigma]
         };
         let credible = match k {
@@ -292,7 +317,8 @@ impl Bench<'_> {
         let share = sigmoid(with.at[SHARE]);
         let size = (0.5 * with.at[SIZE]).exp();
         let sigma = |k: usize| -> f64 {
-            let of = |c: Option<(super::variance::Matrix, usize)>| c.map_or(0.0, |(m, _)| m[(k, k)]);
+            let of =
+                |c: Option<(super::variance::Matrix, usize)>| c.map_or(0.0, |(m, _)| m[(k, k)]);
             of(self.model.covariance(&with, &rows, |r| r.block))
                 .max(of(self
                     .model

@@ -79,8 +79,7 @@ impl Model {
 
     /// No effect but the level.
     pub(super) fn plain(&self, rows: &[Row]) -> Vector {
-        let declared: f64 =
-            rows.iter().map(|r| r.declared).sum::<f64>() / rows.len().max(1) as f64;
+        let declared: f64 = rows.iter().map(|r| r.declared).sum::<f64>() / rows.len().max(1) as f64;
         let mut at = Vector::zeros();
         at[LEVEL] = (self.variance / declared).ln();
         at[SHARE] = logit(NO_SHARE);
@@ -321,7 +320,11 @@ impl Model {
                 weight += 1.0;
             }
         }
-        if weight > 0.0 { (sum / weight).max(1.0) } else { 1.0 }
+        if weight > 0.0 {
+            (sum / weight).max(1.0)
+        } else {
+            1.0
+        }
     }
 }
 
