@@ -11,14 +11,17 @@ use crate::coloured::Coloured;
 use crate::declared;
 use crate::empirical::{Empirical, Variable};
 use crate::error::CloseError;
-use crate::evidence::{Evidence, Residuals};
+use crate::evidence::{Amplitudes, Evidence, Residuals};
 use crate::figures;
 use crate::folds::Folds;
+use crate::leftover;
 use crate::motion::{self, Around};
 use crate::search::{Found, amplitudes, borrowed, fit};
+use crate::selection::columns_of;
 use crate::situation::Situation;
 use crate::star_data::median_step;
 use focal_plane::{AttitudeSource, Series};
+use nalgebra::DVector;
 use spectra::robust;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use telemetry::AttitudeResiduals;
@@ -305,6 +308,24 @@ fn slow_leftover(
         .sort_by(|a, b| b.variance_explained.total_cmp(&a.variance_explained));
 }
 
+/// Residuals with the chosen effects estimated from all data: what other folds
+/// predict has steps of its own where folds meet.
+fn in_sample(evidence: &AttitudeEvidence<'_>, rows: usize, found: &Found) -> Option<Residuals> {
+    let set = columns_of(&found.fitted.groups, &found.selection.chosen);
+    let value = found.fitted.fits.estimate(&set)?.value;
+    let list = borrowed(&found.candidates);
+    let columns = list.iter().map(|c| c.coefficients().len()).sum();
+    let mut beta = DVector::zeros(columns);
+    for (i, &c) in set.iter().enumerate() {
+        beta[c] = value[i];
+    }
+    let amplitudes = Amplitudes {
+        nuisance: Vec::new(),
+        candidates: vec![beta],
+    };
+    Some(evidence.residuals(&Folds::whole(rows), &list, &amplitudes))
+}
+
 fn finish(
     situation: &Situation<'_>,
     data: &AttitudeData,
@@ -339,6 +360,13 @@ fn finish(
     if situation.model.hem.is_none() {
         slow_leftover(data, &after, &mut unattributed, last / whole);
     }
+    let inside = in_sample(&evidence, data.t_s.len(), found);
+    let tracks = leftover::attitude_tracks(
+        &data.t_s,
+        &inside.as_ref().unwrap_or(&after).axes,
+        &data.outlier,
+    );
+    leftover::describe(&tracks).tell(&mut unattributed);
     let errors = |r: &Residuals| Errors {
         star_rms_arcsec: None,
         attitude_rms_arcsec: Some(std::array::from_fn(|a| {

@@ -24,7 +24,9 @@ use crate::figures;
 use crate::folds::Folds;
 use crate::image_level::{self, ImageLevel, Side};
 use crate::images::{self, Formed};
+use crate::leftover;
 use crate::motion::{self, Around};
+use crate::noise_effects;
 use crate::nuisance::StarNuisance;
 use crate::reference_wander::{self, REFERENCE_ERROR};
 use crate::search::{Found, amplitudes, borrowed, fit};
@@ -346,10 +348,10 @@ impl Finish<'_> {
             attitude_rms_arcsec: attitude,
             log_psd_cost: None,
             // with free attitudes three of each frame's numbers are spent
-            chi2_per_dof: declared.map(|circular| {
-                let n: usize = self.data.outlier.iter().filter(|o| !**o).count();
-                let dof = self.found.fitted.scalars;
-                n as f64 * (rms[0] * rms[0] + rms[1] * rms[1]) / (0.5 * circular * circular * dof)
+            chi2_per_dof: declared.and_then(|_| {
+                let square =
+                    noise_effects::in_declared_sigmas(self.situation, self.data, residual)?;
+                Some(square / self.found.fitted.scalars)
             }),
             loglik_per_frame: loglik.map(|l| l / self.data.frames.frames() as f64),
         }
@@ -385,12 +387,19 @@ fn finish(f: &Finish<'_>) -> Result<Closed, CloseError> {
         effects.push(effect);
         entries.push(entry);
     }
+    let noise = noise_effects::claim(f.situation, f.level, f.found, f.folds, &after.axes)?;
+    effects.extend(noise.effects.iter().cloned());
+    entries.extend(noise.entries.iter().cloned());
     model.effects.extend(entries);
 
-    let unattributed = figures::unattributed(f.found, last / whole);
+    let mut unattributed = figures::unattributed(f.found, last / whole);
+    let inside = noise_effects::in_sample(f.level, f.found);
+    let tracks = leftover::star_tracks(f.data, inside.as_deref().unwrap_or(&after.axes));
+    leftover::describe(&tracks).tell(&mut unattributed);
     let excess = excess(f, last);
     let mut considered = figures::considered(f.found, excess);
     considered.retain(|c| !effects.iter().any(|e| e.id == c.id));
+    noise.tell(&mut considered);
     if let Some((level, _)) = f.image {
         for (id, step) in [
             (images::DARK_MAP, &level.dark_map),

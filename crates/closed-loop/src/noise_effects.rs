@@ -1,0 +1,247 @@
+//! Effects on the noise level: what they make of the squares of the residuals.
+//!
+//! They move no centroid, so that no regressor shows them. What the stars of a frame
+//! do not share is held against a model of its variance (`noise_effects/variance.rs`),
+//! relative to the declared one; the level itself is free.
+//!
+//! ```text
+//! sigma^2 = s^2 sigma_declared^2 10^(0.4 slope (m - 5)) + (arcsec_per_deg_s rate)^2,   spikes: rate, size
+//! ```
+//!
+//! What the model declares of these effects is in `sigma_declared`: a finding is what
+//! comes on top, and is written as an entry of its own behind it.
+//!
+//! Source: effects.md of the design notes (`magnitude_noise`, `rate_noise`, `outliers`).
+
+mod judge;
+mod rows;
+#[cfg(test)]
+mod tests;
+mod variance;
+
+use std::collections::BTreeMap;
+
+use focal_plane::Pixel;
+use nalgebra::DVector;
+use star_tracker::StarView;
+use telemetry::report::{ConsideredEffect, Estimate, FoundEffect};
+use telemetry::{EffectEntry, EffectValue};
+
+use crate::declared;
+use crate::error::CloseError;
+use crate::evidence::{Amplitudes, Evidence, Residuals};
+use crate::folds::Folds;
+use crate::search::{Found, borrowed};
+use crate::selection::columns_of;
+use crate::situation::Situation;
+use crate::star_data::StarData;
+use crate::star_design::StarEvidence;
+use judge::{Judged, judge};
+use rows::{Row, Source};
+
+/// Identities in the catalogue.
+const MAGNITUDE: &str = "magnitude_noise";
+const RATE: &str = "rate_noise";
+const OUTLIERS: &str = "outliers";
+/// Sigmas that a size takes to be seen.
+const SEEN: f64 = 5.0;
+
+/// What was found, and what was only considered.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct NoiseEffects {
+    pub(crate) effects: Vec<FoundEffect>,
+    pub(crate) entries: Vec<EffectEntry>,
+    considered: Vec<ConsideredEffect>,
+}
+
+impl NoiseEffects {
+    /// Puts what is known of the effects that were not claimed into the list.
+    pub(crate) fn tell(&self, considered: &mut [ConsideredEffect]) {
+        for known in &self.considered {
+            for entry in considered.iter_mut().filter(|c| c.id == known.id) {
+                entry.clone_from(known);
+            }
+        }
+    }
+}
+
+/// Declared variance per axis of every row, arcsec^2; of 1 arcsec where no noise is
+/// declared. Declared effects on the noise level count.
+pub(crate) fn declared_variance(
+    situation: &Situation<'_>,
+    data: &StarData,
+) -> Result<Vec<f64>, CloseError> {
+    let circular = situation.model.noise.temporal_arcsec.filter(|s| *s > 0.0);
+    // circular to per axis
+    let sigma = circular.map_or(1.0, |s| s * std::f64::consts::FRAC_1_SQRT_2);
+    let mut effects = declared::effects(situation)?;
+    effects.retain(|e| e.stages().noise);
+    let scale = data.camera.arcsec_per_px();
+    let variance = (0..data.t_s.len()).map(|r| {
+        let star = StarView {
+            t_s: data.t_s[r],
+            slot: data.frames.slot[r],
+            star_id: data.frames.star_id[r],
+            mag: data.mag[r],
+            bv: data.bv[r],
+            at: Pixel {
+                x: data.modelled[0][r],
+                y: data.modelled[1][r],
+            },
+        };
+        let speed = (data.velocity[0][r] * scale[0]).hypot(data.velocity[1][r] * scale[1]);
+        let all = effects
+            .iter()
+            .fold(sigma, |s, e| e.noise_sigma_arcsec(&star, speed, s));
+        all * all
+    });
+    Ok(variance.collect())
+}
+
+/// Squared residuals of the rows that count, each over its declared variance.
+pub(crate) fn in_declared_sigmas(
+    situation: &Situation<'_>,
+    data: &StarData,
+    residual: &Residuals,
+) -> Option<f64> {
+    let declared = declared_variance(situation, data).ok()?;
+    let rows = (0..data.t_s.len()).filter(|&r| !data.outlier[r]);
+    let squares = rows.map(|r| {
+        let square: f64 = residual.axes.iter().map(|a| a[r] * a[r]).sum();
+        square / declared[r]
+    });
+    Some(squares.filter(|s| s.is_finite()).sum())
+}
+
+/// Declared outliers: share and size.
+fn declared_outliers(situation: &Situation<'_>) -> Result<Option<[f64; 2]>, CloseError> {
+    let mut found = None;
+    for effect in declared::effects(situation)? {
+        if effect.id() == OUTLIERS {
+            let value = |name: &str| {
+                let all = effect.parameters();
+                all.iter().find(|p| p.name == name).map_or(0.0, |p| p.value)
+            };
+            found = Some([value("rate"), value("size_arcsec")]);
+        }
+    }
+    Ok(found)
+}
+
+/// Looks for effects on the noise in what `found` leaves at `level`.
+pub(crate) fn claim(
+    situation: &Situation<'_>,
+    level: &StarEvidence<'_>,
+    found: &Found,
+    folds: &Folds,
+    out_of_fold: &[Vec<f64>],
+) -> Result<NoiseEffects, CloseError> {
+    let data = level.data;
+    let inside = in_sample(level, found);
+    let declared = declared_variance(situation, data)?;
+    let source = Source {
+        data,
+        residual: inside.as_deref().unwrap_or(out_of_fold),
+        declared: &declared,
+        folds,
+    };
+    let outliers = declared_outliers(situation)?;
+    let make = |belief: &dyn Fn(&Row) -> [f64; 2]| source.rows(belief);
+    let Some(verdicts) = judge(&make, folds, level.motion.is_some(), outliers) else {
+        return Ok(NoiseEffects::default());
+    };
+    let mut out = NoiseEffects::default();
+    out.add(MAGNITUDE, &[("slope", "")], &verdicts.magnitude);
+    out.add(
+        RATE,
+        &[("arcsec_per_deg_s", "arcsec/(deg/s)")],
+        &verdicts.rate,
+    );
+    out.add(
+        OUTLIERS,
+        &[("rate", ""), ("size_arcsec", "arcsec")],
+        &verdicts.outliers,
+    );
+    Ok(out)
+}
+
+impl NoiseEffects {
+    fn add(&mut self, id: &str, names: &[(&str, &str)], judged: &Judged) {
+        if !judged.observable {
+            return;
+        }
+        if !judged.stands {
+            let [value, sigma] = judged.values[0];
+            self.considered.push(ConsideredEffect {
+                id: id.to_owned(),
+                delta_loglik: Some(judged.gain),
+                p_value: Some(judged.p_value),
+                observable: true,
+                // a rate adds in square, and a share of spikes has no size at which it shows
+                detectable: match id {
+                    MAGNITUDE => Some(SEEN * sigma),
+                    RATE if value > 0.0 => Some((2.0 * SEEN * value * sigma).sqrt()),
+                    _ => None,
+                },
+                needed: None,
+                parameter: Some(names[0].0.to_owned()),
+                unit: Some(names[0].1.to_owned()),
+            });
+            return;
+        }
+        let mut parameters = BTreeMap::new();
+        let mut written = BTreeMap::new();
+        for ((name, unit), [value, sigma]) in names.iter().zip(judged.values) {
+            written.insert((*name).to_owned(), EffectValue::Number(value));
+            parameters.insert(
+                (*name).to_owned(),
+                Estimate {
+                    value,
+                    sigma: (sigma > 0.0).then_some(sigma),
+                    unit: (*unit).to_owned(),
+                    interval: None,
+                },
+            );
+        }
+        self.effects.push(FoundEffect {
+            id: id.to_owned(),
+            selectors: BTreeMap::new(),
+            parameters,
+            delta_loglik: judged.gain,
+            p_value: judged.p_value,
+            variance_explained: None,
+            confusable_with: Vec::new(),
+        });
+        self.entries.push(EffectEntry::new(id, written));
+    }
+}
+
+/// Residuals with everything estimated from all data: a mean predicted from other
+/// folds has an error of its own, which is no noise of the rows. `None` where
+/// centroids themselves depend on the fold.
+pub(crate) fn in_sample(level: &StarEvidence<'_>, found: &Found) -> Option<Vec<Vec<f64>>> {
+    if level.residuals.len() != 1 {
+        return None;
+    }
+    let set = columns_of(&found.fitted.groups, &found.selection.chosen);
+    let value = found.fitted.fits.estimate(&set)?.value;
+    let columns = found
+        .candidates
+        .iter()
+        .map(|c| c.coefficients().len())
+        .sum();
+    let mut beta = DVector::zeros(columns);
+    for (i, &c) in set.iter().enumerate() {
+        beta[c] = value[i];
+    }
+    let amplitudes = Amplitudes {
+        nuisance: vec![found.fitted.fits.nuisance(None, &set, &value)],
+        candidates: vec![beta],
+    };
+    let whole = Folds::whole(level.data.frames.frames());
+    Some(
+        level
+            .residuals(&whole, &borrowed(&found.candidates), &amplitudes)
+            .axes,
+    )
+}

@@ -1,0 +1,368 @@
+//! Which noise effects the residuals call for.
+//!
+//! Each is held against the joint model of all of them (variance.rs): slope and rate
+//! beside each other, and both beside spikes, whether those are claimed or not.
+//!
+//! ```text
+//! p = 3 max( chi2 of 2 (L - L_without) / c,  F of beta^2 / var(beta) )
+//!     c: how much wider than chi2_2 the squares scatter
+//!     L_without: at no rate, no spikes, and for the slope at 0.1: nearer is as declared
+//!     var: over blocks of time; for the slope also over stars, which may differ for no reason at all
+//! gain = sum over the folds of ln L - ln L_without on the fold, both fitted on the others
+//! ```
+//!
+//! Spikes are told from stars that are noisier than others: every star has its own
+//! level there, from the median of its squares.
+//!
+//! Source: Wilks 1938; Liang & Zeger 1986; Satorra & Bentler 1994 (scaled ratio).
+
+use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
+
+use super::rows::Row;
+use super::variance::{
+    Fit, LEVEL, MAGNITUDE, Model, PARAMETERS, RATE, SHARE, SIZE, Vector, logit, sigmoid,
+};
+use crate::folds::Folds;
+use crate::selection::FAMILY_ALPHA;
+
+/// Effects that are tried.
+const TRIED: f64 = 3.0;
+/// Fewest stars and spread of magnitudes that show a slope.
+const MIN_STARS: usize = 4;
+const MIN_SPREAD_MAG: f64 = 0.02;
+/// A slope this near to the declared one is as declared: photon and read noise together
+/// follow a power of the flux only roughly, and their slope changes by this within half a magnitude.
+const SLOPE_AS_DECLARED: f64 = 0.1;
+/// Least relative spread of the squared rate.
+const MIN_SPREAD_RATE: f64 = 0.2;
+/// Largest slope, and noise of a rate in arcsec/(deg/s), that nature makes.
+const CREDIBLE_SLOPE: f64 = 4.0;
+const CREDIBLE_RATE: f64 = 1000.0;
+/// Rows of a star from which it has a level of its own.
+const MIN_ROWS: usize = 50;
+/// Fewest spikes that are a rate.
+const MIN_SPIKES: f64 = 3.0;
+/// Rounds of rows (whose rotation is weighed by the noise) and fit.
+const ROUNDS: usize = 2;
+
+/// Makes the rows under a belief: the variance of a row, and how likely it is no spike.
+pub(super) type Make<'a> = dyn Fn(&dyn Fn(&Row) -> [f64; 2]) -> Vec<Row> + 'a;
+
+type Free = [bool; PARAMETERS];
+
+/// One effect beside the others.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Judged {
+    pub(super) gain: f64,
+    pub(super) p_value: f64,
+    pub(super) observable: bool,
+    pub(super) stands: bool,
+    /// Values with sigmas: slope; rate; share and size.
+    pub(super) values: [[f64; 2]; 2],
+}
+
+const UNSEEN: Judged = Judged {
+    gain: 0.0,
+    p_value: 1.0,
+    observable: false,
+    stands: false,
+    values: [[0.0; 2]; 2],
+};
+
+/// The three effects.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Verdicts {
+    pub(super) magnitude: Judged,
+    pub(super) rate: Judged,
+    pub(super) outliers: Judged,
+}
+
+/// Rows and what they are held against.
+struct Bench<'a> {
+    rows: Vec<Row>,
+    model: Model,
+    folds: &'a Folds,
+    stars: usize,
+}
+
+/// Judges. `make` gives the rows under a belief of variance and soundness; `moving`
+/// says whether rates are known; `declared` are declared outliers (share, size).
+pub(super) fn judge(
+    make: &Make<'_>,
+    folds: &Folds,
+    moving: bool,
+    declared: Option<[f64; 2]>,
+) -> Option<Verdicts> {
+    let mut rows = make(&|row: &Row| [row.declared, 1.0]);
+    let mut free = [false; PARAMETERS];
+    let mut model = Model::new(&rows, declared);
+    for _ in 0..ROUNDS {
+        if rows.iter().filter(|r| !r.marked).count() < 10 * MIN_ROWS {
+            return None;
+        }
+        free = observable(&rows, moving);
+        let full = climb(&model, &rows, free)?;
+        rows = make(&|row: &Row| model.belief(&full.at, row));
+        model = Model::new(&rows, declared);
+    }
+    let stars = rows.iter().map(|r| r.star + 1).max()?;
+    let bench = Bench {
+        rows,
+        model,
+        folds,
+        stars,
+    };
+    let full = climb(&bench.model, &bench.rows, free)?;
+    let outliers = bench.spikes(&full);
+    let [mut magnitude, mut rate] = [MAGNITUDE, RATE].map(|k| bench.one(k, &full));
+    if magnitude.observable && rate.observable && magnitude.stands != rate.stands {
+        // the one that stands, without the freedom of the other
+        let (alone, other) = if magnitude.stands {
+            (MAGNITUDE, RATE)
+        } else {
+            (RATE, MAGNITUDE)
+        };
+        let fit = bench.without(&full, other);
+        let again = bench.one(alone, &fit);
+        if again.stands {
+            *(if alone == MAGNITUDE {
+                &mut magnitude
+            } else {
+                &mut rate
+            }) = again;
+        }
+    } else if magnitude.observable && rate.observable && !magnitude.stands {
+        // they may hide behind each other
+        let alone = bench.one(MAGNITUDE, &bench.without(&full, RATE));
+        let other = bench.one(RATE, &bench.without(&full, MAGNITUDE));
+        if alone.stands && (!other.stands || alone.gain >= other.gain) {
+            magnitude = alone;
+        } else if other.stands {
+            rate = other;
+        }
+    }
+    Some(Verdicts {
+        magnitude,
+        rate,
+        outliers,
+    })
+}
+
+/// What the rows can show.
+fn observable(rows: &[Row], moving: bool) -> Free {
+    let spread = |f: &dyn Fn(&Row) -> f64| {
+        let n = rows.len().max(1) as f64;
+        let mean = rows.iter().map(f).sum::<f64>() / n;
+        let square = rows.iter().map(|r| (f(r) - mean).powi(2)).sum::<f64>() / n;
+        (mean, square.sqrt())
+    };
+    let mut stars: Vec<usize> = rows.iter().map(|r| r.star).collect();
+    stars.sort_unstable();
+    stars.dedup();
+    let mut free = [false; PARAMETERS];
+    free[LEVEL] = true;
+    free[SHARE] = true;
+    free[SIZE] = true;
+    free[MAGNITUDE] = stars.len() >= MIN_STARS && spread(&|r| r.mag).1 > MIN_SPREAD_MAG;
+    let (mean, rate) = spread(&|r| r.rate);
+    free[RATE] = moving && rate > MIN_SPREAD_RATE * mean;
+    free
+}
+
+/// The best of several starts: spikes are a second maximum.
+fn climb(model: &Model, rows: &[Row], free: Free) -> Option<Fit> {
+    let plain = model.plain(rows);
+    let all = |_: &Row| true;
+    let starts: &[[f64; 2]] = if free[SHARE] {
+        &[[1e-3, 100.0], [1e-2, 25.0]]
+    } else {
+        &[[0.0, 0.0]]
+    };
+    starts
+        .iter()
+        .map(|&[share, size]| {
+            let mut at = plain;
+            if free[SHARE] {
+                at[SHARE] = logit(share);
+                at[SIZE] += (size / 100.0).ln();
+            }
+            model.fit(rows, &at, free, &all)
+        })
+        .filter(|fit| fit.loglik.is_finite())
+        .max_by(|a, b| a.loglik.total_cmp(&b.loglik))
+}
+
+impl Bench<'_> {
+    /// `fit` without parameter `k`.
+    fn without(&self, fit: &Fit, k: usize) -> Fit {
+        self.with(fit, k, 0.0)
+    }
+
+    /// `fit` with parameter `k` held at `value`.
+    fn with(&self, fit: &Fit, k: usize, value: f64) -> Fit {
+        let mut free = fit.free;
+        free[k] = false;
+        let mut at = fit.at;
+        at[k] = value;
+        self.model.fit(&self.rows, &at, free, &|_| true)
+    }
+
+    /// Slope or rate beside all else that is free in `full`.
+    fn one(&self, k: usize, full: &Fit) -> Judged {
+        if !full.free[k] {
+            return UNSEEN;
+        }
+        let without = self.without(full, k);
+        let value = full.at[k];
+        let blocks = self.model.covariance(full, &self.rows, |r| r.block);
+        let stars = self.model.covariance(full, &self.rows, |r| r.star);
+        let cells = self
+            .model
+            .covariance(full, &self.rows, |r| r.block * self.stars + r.star);
+        let variance = |c: &Option<(super::variance::Matrix, usize)>| {
+            c.as_ref().map_or(0.0, |(m, _)| m[(k, k)])
+        };
+        let widened = self.model.widening(&full.at, &self.rows);
+        // what has to be shown is more than what passes for nothing
+        let least = if k == MAGNITUDE {
+            value.clamp(-SLOPE_AS_DECLARED, SLOPE_AS_DECLARED)
+        } else {
+            0.0
+        };
+        let ratio = 2.0 * (full.loglik - self.with(full, k, least).loglik) / widened;
+        let mut p = likely(ratio, 1.0);
+        let beyond = value - least;
+        p = p.max(wald(
+            beyond,
+            variance(&blocks),
+            blocks.map_or(0, |c| c.1),
+            1,
+        ));
+        let mut sigma2 =
+            variance(&self.model.covariance(full, &self.rows, |r| r.block)).max(variance(&cells));
+        if k == MAGNITUDE {
+            p = p.max(wald(
+                beyond,
+                variance(&stars),
+                stars.as_ref().map_or(0, |c| c.1),
+                2,
+            ));
+            sigma2 = sigma2.max(variance(&stars));
+        }
+        let gain = self.gain(&self.rows, full, &without);
+        let values = if k == MAGNITUDE {
+            [value, sigma2.sqrt()]
+        } else {
+            let root = value.max(0.0).sqrt();
+            let sigma = if root > 0.0 {
+                0.5 * sigma2.sqrt() / root
+            } else {
+                0.0
+            };
+            [root, sigma]
+        };
+        let credible = match k {
+            MAGNITUDE => value.abs() <= CREDIBLE_SLOPE,
+            _ => values[0] <= CREDIBLE_RATE,
+        };
+        let p_value = (TRIED * p).min(1.0);
+        Judged {
+            gain,
+            p_value,
+            observable: true,
+            stands: credible && gain > 0.0 && p_value < FAMILY_ALPHA,
+            values: [values, [0.0; 2]],
+        }
+    }
+
+    /// Spikes, every star at its own level.
+    fn spikes(&self, full: &Fit) -> Judged {
+        let mut squares = vec![Vec::new(); self.stars];
+        for row in self.rows.iter().filter(|r| !r.marked) {
+            let [v, _] = self.model.belief(&full.at, row);
+            squares[row.star].push(row.square / v);
+        }
+        let level: Vec<f64> = squares
+            .iter_mut()
+            .map(|s| {
+                let enough = s.len() >= MIN_ROWS;
+                let median = spectra::robust::median(s).filter(|_| enough);
+                median.map_or(1.0, |m| m / (2.0 * std::f64::consts::LN_2))
+            })
+            .collect();
+        let rows: Vec<Row> = self
+            .rows
+            .iter()
+            .map(|row| {
+                let slope = 10_f64.powf(0.4 * full.at[MAGNITUDE] * row.mag);
+                Row {
+                    declared: row.declared * slope * level[row.star],
+                    ..*row
+                }
+            })
+            .collect();
+        let mut free = full.free;
+        free[MAGNITUDE] = false;
+        let Some(with) = climb(&self.model, &rows, free) else {
+            return UNSEEN;
+        };
+        free[SHARE] = false;
+        free[SIZE] = false;
+        let mut start = with.at;
+        start[SHARE] = logit(1e-9);
+        let without = self.model.fit(&rows, &start, free, &|_| true);
+        let widened = self.model.widening(&with.at, &rows);
+        let ratio = 2.0 * (with.loglik - without.loglik) / widened;
+        let gain = self.gain(&rows, &with, &without);
+        let share = sigmoid(with.at[SHARE]);
+        let size = (0.5 * with.at[SIZE]).exp();
+        let sigma = |k: usize| -> f64 {
+            let of =
+                |c: Option<(super::variance::Matrix, usize)>| c.map_or(0.0, |(m, _)| m[(k, k)]);
+            of(self.model.covariance(&with, &rows, |r| r.block))
+                .max(of(self
+                    .model
+                    .covariance(&with, &rows, |r| r.block * self.stars + r.star)))
+                .sqrt()
+        };
+        let enough = share * rows.len() as f64 >= MIN_SPIKES;
+        let p_value = (TRIED * likely(ratio, 2.0)).min(1.0);
+        Judged {
+            gain,
+            p_value,
+            observable: true,
+            stands: enough && gain > 0.0 && p_value < FAMILY_ALPHA,
+            values: [
+                [share, sigma(SHARE) * share * (1.0 - share)],
+                [size, 0.5 * sigma(SIZE) * size],
+            ],
+        }
+    }
+
+    /// Gain of `with` over `without` on folds that took no part in the fit.
+    fn gain(&self, rows: &[Row], with: &Fit, without: &Fit) -> f64 {
+        let fold = |r: &Row| self.folds.fold_of_block[r.block];
+        (0..self.folds.count)
+            .map(|f| {
+                let train = |r: &Row| fold(r) != f;
+                let held = |at: &Vector| self.model.loglik(at, rows, |r| fold(r) == f);
+                let refit = |fit: &Fit| self.model.fit(rows, &fit.at, fit.free, &train).at;
+                held(&refit(with)) - held(&refit(without))
+            })
+            .sum()
+    }
+}
+
+/// Tail of the likelihood ratio.
+fn likely(ratio: f64, freedom: f64) -> f64 {
+    ChiSquared::new(freedom).map_or(1.0, |law| law.sf(ratio.max(0.0)))
+}
+
+/// Tail of an estimate with a variance from `clusters` sums, of which `spent` are spent.
+fn wald(value: f64, variance: f64, clusters: usize, spent: usize) -> f64 {
+    let freedom = clusters.saturating_sub(spent) as f64;
+    if variance <= 0.0 || freedom < 1.0 {
+        return 1.0;
+    }
+    FisherSnedecor::new(1.0, freedom).map_or(1.0, |law| law.sf(value * value / variance))
+}

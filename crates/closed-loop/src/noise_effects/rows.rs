@@ -1,0 +1,133 @@
+//! Squared residuals of single stars, free of what their frame shares.
+//!
+//! A rotation common to all stars of a frame is the reference's business, so it is
+//! taken off by least squares with the present weights. What is left of row i has
+//! less variance than its noise v (or more, if the row took no part), axis by axis
+//!
+//! ```text
+//! var_i = v_i - 2 w_i v_i h_i + h_i     h_i = a_i^T C a_i,  C = (sum w a a^T)^-1,  w = P(no spike)/v
+//! q_i = sum over the axes of r_i^2 v_i / var_i           so that q/v ~ chi2_2
+//! ```
+//!
+//! Source: leverage in linear regression (Hoaglin & Welsch 1978).
+
+use nalgebra::{Matrix3, Vector3};
+
+use crate::folds::Folds;
+use crate::star_data::StarData;
+use crate::star_design::rotation_row;
+
+/// Fewest stars of a frame that leave something beside its rotation.
+const MIN_STARS: usize = 3;
+/// A row whose rotation takes more than this share of its variance says too little.
+const MOST_LEVERAGE: f64 = 0.8;
+/// Rows beyond which frames are thinned evenly: variances are known to 1 % from half of them.
+const MOST_ROWS: usize = 100_000;
+
+/// What one row says about the noise.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Row {
+    /// Squared residual over two axes, arcsec^2.
+    pub(super) square: f64,
+    /// Declared variance per axis, arcsec^2.
+    pub(super) declared: f64,
+    /// Magnitude - 5; 0 where unknown.
+    pub(super) mag: f64,
+    /// Squared rate across the detector, (deg/s)^2.
+    pub(super) rate: f64,
+    pub(super) star: usize,
+    pub(super) block: usize,
+    /// Left out of the figures.
+    pub(super) marked: bool,
+}
+
+/// Where the rows come from.
+pub(super) struct Source<'a> {
+    pub(super) data: &'a StarData,
+    /// Residuals of every row per axis, arcsec.
+    pub(super) residual: &'a [Vec<f64>],
+    /// Declared variance per axis of every row, arcsec^2.
+    pub(super) declared: &'a [f64],
+    pub(super) folds: &'a Folds,
+}
+
+impl Source<'_> {
+    /// All rows under `belief`: the variance of a row and how likely it is no spike.
+    pub(super) fn rows(&self, belief: &dyn Fn(&Row) -> [f64; 2]) -> Vec<Row> {
+        let step = self.data.t_s.len().div_ceil(MOST_ROWS).max(1);
+        let mut out = Vec::new();
+        for (block, frames) in self.folds.blocks.iter().enumerate() {
+            for frame in frames.clone().step_by(step) {
+                self.frame(frame, block, belief, &mut out);
+            }
+        }
+        out
+    }
+
+    fn frame(
+        &self,
+        frame: usize,
+        block: usize,
+        belief: &dyn Fn(&Row) -> [f64; 2],
+        out: &mut Vec<Row>,
+    ) {
+        let data = self.data;
+        let scale = data.camera.arcsec_per_px();
+        let members: Vec<(usize, Row, [f64; 2])> = data
+            .frames
+            .rows_of(frame)
+            .filter(|&r| self.residual.iter().all(|axis| axis[r].is_finite()))
+            .map(|r| {
+                let rate: f64 = (0..2)
+                    .map(|a| (data.velocity[a][r] * scale[a] / 3600.0).powi(2))
+                    .sum();
+                let mag = data.mag[r] - 5.0;
+                let row = Row {
+                    square: self.residual[0][r].powi(2) + self.residual[1][r].powi(2),
+                    declared: self.declared[r],
+                    mag: if mag.is_finite() { mag } else { 0.0 },
+                    rate,
+                    star: data.star[r],
+                    block,
+                    marked: data.outlier[r],
+                };
+                let [variance, sound] = belief(&row);
+                let sound = if row.marked { 0.0 } else { sound };
+                (r, row, [variance, sound / variance])
+            })
+            .collect();
+        if members.iter().filter(|m| !m.1.marked).count() < MIN_STARS {
+            return;
+        }
+        let (mut normal, mut moment) = (Matrix3::zeros(), Vector3::zeros());
+        for (r, _, [_, weight]) in &members {
+            let jacobian = rotation_row(data, *r);
+            for axis in 0..2 {
+                let a = Vector3::from(jacobian[axis]);
+                normal += a * a.transpose() * *weight;
+                moment += a * (self.residual[axis][*r] * weight);
+            }
+        }
+        let Some(covariance) = normal.try_inverse() else {
+            return;
+        };
+        let theta = covariance * moment;
+        for (r, mut row, [variance, weight]) in members {
+            let jacobian = rotation_row(data, r);
+            let mut square = 0.0;
+            let mut least = f64::INFINITY;
+            for axis in 0..2 {
+                let a = Vector3::from(jacobian[axis]);
+                let leverage = a.dot(&(covariance * a));
+                let share = 1.0 - 2.0 * weight * leverage + leverage / variance;
+                let left = self.residual[axis][r] - a.dot(&theta);
+                square += left * left / share;
+                least = least.min(share);
+            }
+            if least > 1.0 - MOST_LEVERAGE {
+                row.square = square;
+                out.push(row);
+            }
+        }
+    }
+}
