@@ -1,4 +1,4 @@
-//! `blind-trials [--seeds N] [--jobs J] [--only NAME]... [--check] WORLDS PAGE`: closes the loop on every world
+//! `blind-trials [--seeds N] [--jobs J] [--only NAME]... [--each] [--check] WORLDS PAGE`: closes the loop on every world
 //! and writes the page; with `--only` it prints the page of these worlds instead.
 //!
 //! Exit status 1 if, with `--check`, a first seed is not what the page says.
@@ -14,14 +14,17 @@ use std::io::IsTerminal as _;
 use std::path::Path;
 use std::process::ExitCode;
 
-use blind_trials::{BlindError, Plan, Tally, Trial, bounds, differences, nulls, page, run, worlds};
+use blind_trials::{
+    BlindError, Plan, Tally, Trial, bounds, differences, first, nulls, page, run, worlds,
+};
 
 /// Seeds of a trial where nobody says.
 const SEEDS: u64 = 16;
-const USAGE: &str = "usage: blind-trials [--seeds N] [--jobs J] [--only NAME]... [--check] WORLDS PAGE\n\n  \
+const USAGE: &str = "usage: blind-trials [--seeds N] [--jobs J] [--only NAME]... [--each] [--check] WORLDS PAGE\n\n  \
     --seeds N    bundles of each world, 16 where left out; a quarter of them where windows are sent\n  \
     --jobs J     threads; all that there are where left out\n  \
     --only NAME  this world alone; its page is printed, none is written\n  \
+    --each       prints what every single report says, too\n  \
     --check      the first seed of each world alone, against the page";
 
 #[derive(Debug, Default)]
@@ -30,6 +33,7 @@ struct Arguments {
     jobs: Option<usize>,
     only: Vec<String>,
     check: bool,
+    each: bool,
     places: Vec<String>,
 }
 
@@ -42,6 +46,7 @@ impl Arguments {
                 "--seeds" => out.seeds = Some(words.next()?.parse().ok().filter(|n| *n > 0)?),
                 "--jobs" => out.jobs = Some(words.next()?.parse().ok().filter(|n| *n > 0)?),
                 "--only" => out.only.push(words.next()?),
+                "--each" => out.each = true,
                 "--check" => out.check = true,
                 _ if word.starts_with('-') => return None,
                 _ => out.places.push(word),
@@ -93,6 +98,13 @@ fn go(arguments: &Arguments) -> Result<bool, String> {
     let done = run(&trials, plan, &progress).map_err(said)?;
     if terminal {
         eprintln!();
+    }
+    if arguments.each {
+        for (trial, scores) in trials.iter().zip(&done) {
+            for score in scores {
+                print!("{}", first(trial, score));
+            }
+        }
     }
     if arguments.check {
         let old = fs::read_to_string(file).map_err(|e| format!("{file}: {e}"))?;

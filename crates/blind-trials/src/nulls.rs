@@ -98,7 +98,7 @@ pub fn nulls() -> Result<Vec<Trial>, BlindError> {
             let name = format!("model_{motion}_{case}");
             let scenario = Scenario::parse(&format!("{TRACKER}{reference}{text}"), &name)?;
             let mut model = scenario.model_without_effects();
-            for sigma in &mut model.noise.temporal_arcsec {
+            if let Some(sigma) = &mut model.noise.temporal_arcsec {
                 *sigma *= declared;
             }
             let wander = Acting {

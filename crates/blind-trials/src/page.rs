@@ -218,7 +218,9 @@ fn summary(pixel: &Rows<'_>, model: &Rows<'_>, known: &Rows<'_>, outside: &Rows<
     text
 }
 
-fn first(trial: &Trial, score: &Score) -> String {
+/// What one report says, as a row of the table of first seeds.
+#[must_use]
+pub fn first(trial: &Trial, score: &Score) -> String {
     let claims: Vec<String> = score
         .claims
         .iter()

@@ -78,7 +78,7 @@ pub(crate) fn silent(instrument: &Instrument) -> Instrument {
     // steps of the converter far below an electron, the level of no charge and the range as they were
     detector.gain_e_per_dn = 1e-4;
     detector.bits = 32;
-    for reference in &mut silent.reference {
+    if let Some(reference) = &mut silent.reference {
         reference.white_arcsec = [0.0; 3];
         reference.wander_arcsec = [0.0; 3];
     }

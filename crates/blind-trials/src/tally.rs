@@ -84,7 +84,7 @@ impl Tally {
             tally.with_extra += usize::from(extra > 0);
             tally.exact += usize::from(extra == 0 && score.all_found());
             tally.verdicts[place(score.verdict)] += 1;
-            for variable in &score.leftover {
+            if let Some(variable) = &score.leftover {
                 *tally.leftover.entry(variable.clone()).or_default() += 1;
             }
             if score.floor.is_finite() {

@@ -33,17 +33,16 @@ pub struct Trial {
 
 /// How the bundles are made.
 #[derive(Clone, Debug)]
-#[expect(clippy::large_enum_variant, reason = "there are some dozens of them")]
-pub enum Made {
+pub(crate) enum Made {
     /// Rendered.
-    Pixels(World),
+    Pixels(Box<World>),
     /// Simulated by the physics-based model.
     Model(Box<Scenario>),
 }
 
 /// What is rendered.
 #[derive(Clone, Debug)]
-pub struct World {
+pub(crate) struct World {
     pub(crate) instrument: Instrument,
     course: Course,
     sky: Arc<Catalogue>,
@@ -115,11 +114,11 @@ impl Trial {
             name: name.to_owned(),
             truth,
             model,
-            made: Made::Pixels(World {
+            made: Made::Pixels(Box::new(World {
                 instrument,
                 course,
                 sky: Arc::new(hipparcos(year)?),
-            }),
+            })),
         })
     }
 
