@@ -235,7 +235,7 @@ mod tests {
             })
             .collect();
         let wide: Vec<[f64; 2]> = column.iter().flat_map(|c| [*c, [0.0; 2]]).collect();
-        let bound = least(&two, &[wide.clone()], &variance, Some([0.0; 3]))[0].unwrap();
+        let bound = least(&two, std::slice::from_ref(&wide), &variance, Some([0.0; 3]))[0].unwrap();
         assert!((bound - 2.0 * 0.5 / 10.0).abs() < 1e-9, "{bound}");
         let half_px = 0.5 / f * focal_plane::ARCSEC_PER_RAD;
         let bound = least(&two, &[wide], &variance, Some([half_px; 3]))[0].unwrap();

@@ -24,7 +24,7 @@ pub enum BlindError {
         /// Which world.
         world: String,
         /// Why.
-        source: imager::ImagerError,
+        source: Box<imager::ImagerError>,
     },
     /// A scenario, or the motion of a world, is wrong.
     #[error(transparent)]
@@ -40,7 +40,7 @@ pub enum BlindError {
         /// Which seed, from 0.
         seed: u64,
         /// Why.
-        source: closed_loop::CloseError,
+        source: Box<closed_loop::CloseError>,
     },
     /// No trial has such a name.
     #[error("no world is called {name}; there are {known}")]

@@ -91,7 +91,7 @@ fn go(arguments: &Arguments) -> Result<bool, String> {
     let progress = |done: usize, of: usize| {
         if terminal {
             eprint!("\r{done} of {of} ");
-        } else if done % 50 == 0 || done == of {
+        } else if done.is_multiple_of(50) || done == of {
             eprintln!("{done} of {of}");
         }
     };

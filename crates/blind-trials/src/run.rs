@@ -95,7 +95,7 @@ fn one(trial: &Trial, seed: u64) -> Result<Score, BlindError> {
     let closed = closed.map_err(|source| BlindError::Close {
         world: trial.name.clone(),
         seed,
-        source,
+        source: Box::new(source),
     })?;
     let mut floor = None;
     if let (Some(world), Some(figures)) = (trial.world(), &closed.stars) {

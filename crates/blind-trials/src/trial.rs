@@ -71,6 +71,7 @@ impl World {
 
     fn failed(&self, source: ImagerError) -> BlindError {
         let world = self.course.run.title.clone().unwrap_or_default();
+        let source = Box::new(source);
         BlindError::Imager { world, source }
     }
 }
@@ -100,7 +101,7 @@ impl Trial {
     pub fn parse(text: &str, name: &str, file: &str, folder: &Path) -> Result<Self, BlindError> {
         let failed = |source| BlindError::Imager {
             world: name.to_owned(),
-            source,
+            source: Box::new(source),
         };
         let instrument = Instrument::parse(text, file, &Course::TABLES).map_err(failed)?;
         let course = Course::parse(text, file, folder)?;

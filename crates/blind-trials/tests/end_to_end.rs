@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use blind_trials::{Plan, Tally, Trial, bounds, run};
+use blind_trials::{BlindError, Plan, Tally, Trial, bounds, run};
 
 /// One minute and a half of slews with frames that are stamped 20 ms late: some hundred sigma.
 const WORLD: &str = r#"
@@ -37,21 +37,21 @@ rate_hz = 2.0
 seed = 9
 "#;
 
-fn world() -> Trial {
+fn world() -> Result<Trial, BlindError> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fixtures/worlds");
-    Trial::parse(WORLD, "late", "late.toml", &folder).unwrap()
+    Trial::parse(WORLD, "late", "late.toml", &folder)
 }
 
 /// The effect is found in every seed, its value within 5 sigma; knowing it removes what perfect knowledge
 /// removes; and the number of threads changes no number.
 #[test]
-fn a_late_clock_is_found_and_scored() {
-    let trials = [world()];
+fn a_late_clock_is_found_and_scored() -> Result<(), BlindError> {
+    let trials = [world()?];
     let plan = |jobs| Plan { seeds: 2, jobs };
-    let done = run(&trials, plan(2), &|_, _| ()).unwrap();
-    assert_eq!(done, run(&trials, plan(1), &|_, _| ()).unwrap());
+    let done = run(&trials, plan(2), &|_, _| ())?;
+    assert_eq!(done, run(&trials, plan(1), &|_, _| ())?);
     assert_ne!(done[0][0], done[0][1]);
-    let tally = Tally::of(&trials[0], &done[0], &bounds(&trials[0]).unwrap());
+    let tally = Tally::of(&trials[0], &done[0], &bounds(&trials[0])?);
     assert_eq!(
         (tally.runs, tally.first, tally.all, tally.off),
         (2, 2, 2, 0)
@@ -69,6 +69,7 @@ fn a_late_clock_is_found_and_scored() {
         (row.name.as_str(), row.unit.as_str(), row.count),
         ("time_tag_offset offset_s", "s", 2)
     );
+    Ok(())
 }
 
 /// The bound of an offset is what its definition says: centroids of the noise of each star, moved by the rate
@@ -77,9 +78,9 @@ fn a_late_clock_is_found_and_scored() {
 /// read noise 15 e in 7 x 7 pixels moves the first moment of a star of N electrons by
 /// 15 sqrt(sum x^2) / N = 15 x 14 / N px, N = 5e5 10^(-0.4 m) in 0.1 s: 0.0134 at magnitude 4.
 #[test]
-fn the_bound_is_of_the_size_that_rate_and_noise_give() {
-    let trial = world();
-    let bound: BTreeMap<_, _> = bounds(&trial).unwrap();
+fn the_bound_is_of_the_size_that_rate_and_noise_give() -> Result<(), BlindError> {
+    let trial = world()?;
+    let bound: BTreeMap<_, _> = bounds(&trial)?;
     let sigma = bound[&(0, "offset_s".to_owned())];
     // slews of 1.3 deg in 30 s: 4.4 px/s at most, two thirds of the time; 180 x 8 rows
     let rough = 0.0134 / (180.0_f64 * 8.0 * 0.6 * 3.0 * 3.0).sqrt();
@@ -87,4 +88,5 @@ fn the_bound_is_of_the_size_that_rate_and_noise_give() {
         sigma > 0.7 * rough && sigma < 4.0 * rough,
         "{sigma} and {rough}"
     );
+    Ok(())
 }
