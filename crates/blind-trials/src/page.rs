@@ -158,7 +158,7 @@ fn summary(pixel: &Rows<'_>, model: &Rows<'_>, known: &Rows<'_>, outside: &Rows<
     let alarms = |rows: &Rows<'_>| {
         let (k, n) = (sum(rows, &|t| t.with_extra), sum(rows, &|t| t.runs));
         let chance = at_least(k, n, DESIGN);
-        format!("{k} of {n} (chance of as many at 1 %: {})", fixed(chance))
+        format!("{k} of {n} (chance of as many at 1 %: {})", number(chance))
     };
     if !pixel.is_empty() {
         line("false alarms, rendered nulls", alarms(pixel));
@@ -407,7 +407,7 @@ mod tests {
         assert!(old.contains("Made by `make it`."), "{old}");
         assert!(
             old.contains(
-                "| false alarms, simulated nulls | 1 of 3 (chance of as many at 1 %: 0.03) |"
+                "| false alarms, simulated nulls | 1 of 3 (chance of as many at 1 %: 0.0297) |"
             ),
             "{old}"
         );

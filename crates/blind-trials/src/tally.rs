@@ -139,12 +139,15 @@ fn place(verdict: Verdict) -> usize {
 /// Chance of at least `k` of `n` where each comes with probability `p`.
 pub(crate) fn at_least(k: usize, n: usize, p: f64) -> f64 {
     let mut term = (1.0 - p).powf(n as f64);
-    let mut below = 0.0;
-    for i in 0..k {
-        below += term;
+    let mut sum = 0.0;
+    // the tail itself: it may be far below the rounding of 1
+    for i in 0..=n {
+        if i >= k {
+            sum += term;
+        }
         term *= (n - i) as f64 / (i as f64 + 1.0) * p / (1.0 - p);
     }
-    (1.0_f64 - below).clamp(0.0, 1.0)
+    f64::min(sum, 1.0)
 }
 
 #[cfg(test)]
@@ -224,5 +227,6 @@ mod tests {
         assert!((at_least(0, 2, 0.1) - 1.0).abs() < 1e-12);
         assert!((at_least(1, 2, 0.1) - 0.19).abs() < 1e-12);
         assert!((at_least(2, 2, 0.1) - 0.01).abs() < 1e-12);
+        assert!((at_least(9, 9, 0.01) / 1e-18 - 1.0).abs() < 1e-9);
     }
 }
