@@ -14,19 +14,28 @@ pub(crate) struct Step {
 
 /// Runs every step, also after one has failed, and names those that did.
 pub(crate) fn run_all(root: &Path, steps: &[Step]) -> Result<(), String> {
-    run_each(steps, |step| {
-        println!("== {}: cargo {}", step.name, step.args.join(" "));
-        let status = Command::new(cargo())
-            .args(step.args)
-            .envs(step.env.iter().copied())
-            .current_dir(root)
-            .status();
-        match status {
-            Ok(status) if status.success() => Ok(()),
-            Ok(status) => Err(status.to_string()),
-            Err(error) => Err(error.to_string()),
-        }
-    })
+    run_each(steps, |step| run_one(root, step, &[]))
+}
+
+/// Runs one step with more words after its own.
+pub(crate) fn run_with(root: &Path, step: &Step, more: &[String]) -> Result<(), String> {
+    run_one(root, step, more).map_err(|why| format!("failed: {} ({why})", step.name))
+}
+
+fn run_one(root: &Path, step: &Step, more: &[String]) -> Result<(), String> {
+    let words = step.args.iter().copied();
+    let words: Vec<&str> = words.chain(more.iter().map(String::as_str)).collect();
+    println!("== {}: cargo {}", step.name, words.join(" "));
+    let status = Command::new(cargo())
+        .args(words)
+        .envs(step.env.iter().copied())
+        .current_dir(root)
+        .status();
+    match status {
+        Ok(status) if status.success() => Ok(()),
+        Ok(status) => Err(status.to_string()),
+        Err(error) => Err(error.to_string()),
+    }
 }
 
 fn run_each(
@@ -82,5 +91,8 @@ mod tests {
     #[test]
     fn cargo_is_launched() {
         assert_eq!(run_all(Path::new("."), &[step("version")]), Ok(()));
+        let more = ["--no-such-word".to_owned()];
+        let result = run_with(Path::new("."), &step("version"), &more);
+        assert!(result.unwrap_err().starts_with("failed: version ("));
     }
 }

@@ -16,50 +16,62 @@ use std::env;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use launch::{Step, run_all};
+use launch::{Step, run_all, run_with};
 
 /// One word after `cargo xtask`.
 struct Task {
     name: &'static str,
     what: &'static str,
-    run: fn(&Path) -> Result<(), String>,
+    run: Run,
+}
+
+/// What a task does.
+enum Run {
+    Alone(fn(&Path) -> Result<(), String>),
+    /// With the words after its name.
+    With(fn(&Path, &[String]) -> Result<(), String>),
 }
 
 const TASKS: &[Task] = &[
     Task {
         name: "ci",
         what: "check, then test: all that must hold before a change goes in",
-        run: ci,
+        run: Run::Alone(ci),
     },
     Task {
         name: "check",
         what: "format, lints, documentation and tidy",
-        run: check,
+        run: Run::Alone(check),
     },
     Task {
         name: "test",
         what: "cargo test --workspace",
-        run: test,
+        run: Run::Alone(test),
     },
     Task {
         name: "tidy",
         what: "what the compiler cannot see: layers, sources, provenance, the tables in docs/",
-        run: tidy,
+        run: Run::Alone(tidy),
     },
     Task {
         name: "fixtures",
         what: "make the project's own fixtures again",
-        run: fixtures,
+        run: Run::Alone(fixtures),
     },
     Task {
         name: "paper",
         what: "compute the papers' claims, write docs/paper-regression.md",
-        run: paper,
+        run: Run::Alone(paper),
     },
     Task {
         name: "paper --check",
         what: "the same, and fail if the page is not current",
-        run: paper_check,
+        run: Run::Alone(paper_check),
+    },
+    Task {
+        name: "blind",
+        what: "worlds through the closed loop, scored: docs/blind.md; [--seeds N] [--jobs J] [--only NAME]... [--each] [--check]",
+        run: Run::With(blind),
     },
 ];
 
@@ -135,6 +147,21 @@ const PAPER_CHECK: Step = Step {
     env: &[],
 };
 
+const BLIND: Step = Step {
+    name: "blind",
+    args: &[
+        "run",
+        "--release",
+        "--quiet",
+        "--package",
+        "blind-trials",
+        "--",
+        "fixtures/worlds",
+        "docs/blind.md",
+    ],
+    env: &[],
+};
+
 fn ci(root: &Path) -> Result<(), String> {
     // Tests last: the output then ends with cargo's own account of them. A
     // failing check does not keep them from running.
@@ -179,6 +206,10 @@ fn paper_check(root: &Path) -> Result<(), String> {
     run_all(root, &[PAPER_CHECK])
 }
 
+fn blind(root: &Path, words: &[String]) -> Result<(), String> {
+    run_with(root, &BLIND, words)
+}
+
 /// The workspace: the folder above this crate.
 fn root() -> PathBuf {
     let here = env::var_os("CARGO_MANIFEST_DIR")
@@ -186,10 +217,14 @@ fn root() -> PathBuf {
     here.parent().map_or(here.clone(), Path::to_path_buf)
 }
 
-/// The task that the arguments ask for; anything but the words of one task is none.
+/// The task that the arguments ask for; anything but the words of one task is none, but for a task that
+/// takes more words.
 fn task(args: &[String]) -> Option<&'static Task> {
     let words = args.join(" ");
-    TASKS.iter().find(|task| task.name == words)
+    TASKS.iter().find(|task| match task.run {
+        Run::Alone(_) => task.name == words,
+        Run::With(_) => args.first().is_some_and(|word| word == task.name),
+    })
 }
 
 fn usage() -> String {
@@ -209,7 +244,11 @@ fn main() -> ExitCode {
         eprint!("{}", usage());
         return ExitCode::from(2);
     };
-    match (task.run)(&root()) {
+    let done = match task.run {
+        Run::Alone(run) => run(&root()),
+        Run::With(run) => run(&root(), &args[1..]),
+    };
+    match done {
         Ok(()) => ExitCode::SUCCESS,
         Err(message) => {
             eprintln!("error: {message}");
@@ -231,7 +270,17 @@ mod tests {
         for name in ["tidy", "paper", "paper --check"] {
             assert_eq!(task(&words(name)).map(|t| t.name), Some(name));
         }
-        for wrong in ["", "tidi", "tidy now", "tidy --check", "--check", "--help"] {
+        let blind = task(&words("blind --seeds 4")).map(|t| t.name);
+        assert_eq!(blind, Some("blind"));
+        for wrong in [
+            "",
+            "tidi",
+            "tidy now",
+            "tidy --check",
+            "--check",
+            "--help",
+            "blindly",
+        ] {
             assert!(task(&words(wrong)).is_none(), "`{wrong}`");
         }
     }
