@@ -67,7 +67,7 @@ pub(crate) struct Simulate {
     /// Scenario file, a model with [motion], [sky] and [run]; or a world file
     #[arg(value_name = "SCENARIO.toml", required_unless_present_any = ["preset", "print_preset"])]
     pub(crate) scenario: Option<PathBuf>,
-    /// A scenario of the paper: iht, iht-distance, ict1, ict2, pitt, st2-iht, st2-iht-distance, st2-ict1, st2-ict2
+    /// A scenario of the paper: iht, iht-distance, ict1, ict2, pitt, st2-iht, st2-iht-distance, st2-ict1, st2-ict2, image, eo1
     #[arg(long, value_name = "NAME", conflicts_with = "scenario")]
     pub(crate) preset: Option<String>,
     /// Print the file of a preset, to be edited, and do nothing else
