@@ -207,7 +207,9 @@ fn by_rotator(
         ));
     }
     if !start.spinning {
-        notes.push("the attitude does not turn once: a constant rate stands in for the truth".into());
+        notes.push(
+            "the attitude does not turn once: a constant rate stands in for the truth".into(),
+        );
     } else if !start.ratio_seen {
         notes.push("no nutation shows: nothing can be said of the moments of inertia".into());
     }
@@ -336,7 +338,9 @@ impl Found {
         let any = |x: [f64; 3]| x.iter().any(|x| x.is_finite()).then_some(x);
         let plateaus = || axes.iter().filter_map(|a| a.plateau);
         let from = plateaus().map(|p| p.span_s[0]).fold(0.0, f64::max);
-        let to = plateaus().map(|p| p.span_s[1]).fold(f64::INFINITY, f64::min);
+        let to = plateaus()
+            .map(|p| p.span_s[1])
+            .fold(f64::INFINITY, f64::min);
         let report = AssessReport {
             format: ASSESS_FORMAT.into(),
             total_arcsec: Some(total),
@@ -378,7 +382,10 @@ impl Found {
 
 /// Says whether the ways to the noise agree.
 fn judge(axis: &str, noise: &AxisNoise, notes: &mut Vec<String>) {
-    let rivals = [("Allan deviation", noise.allan), ("spectral floor", noise.floor)];
+    let rivals = [
+        ("Allan deviation", noise.allan),
+        ("spectral floor", noise.floor),
+    ];
     match noise.plateau {
         None => notes.push(format!(
             "{axis}: no plateau, the noise grows with the span from the shortest on; the white noise is not known"

@@ -25,8 +25,8 @@ use crate::model::{Fit, Fitter, Free, Oscillation, Rotating, TimeTagStep};
 use crate::start::Start;
 use crate::{AssessError, Observed};
 
-pub(crate) use folds::{FOLDS, fold_of};
 use folds::out_of_fold;
+pub(crate) use folds::{FOLDS, fold_of};
 use lines::strongest_line;
 
 /// Chance below which a term is believed.
@@ -172,7 +172,15 @@ pub fn close(
     let aligned = plain.fit(&axisymmetric.model, &free, "misalignment")?;
     let before = out_of_fold(&axisymmetric, observed)?;
     let n_eff = effective(&aligned.residual_arcsec);
-    added.push(entry(Term::Misalignment, 0, &axisymmetric, &aligned, observed, 1.0, &n_eff)?);
+    added.push(entry(
+        Term::Misalignment,
+        0,
+        &axisymmetric,
+        &aligned,
+        observed,
+        1.0,
+        &n_eff,
+    )?);
     let weighted = plain.weighted(noise_arcsec);
     let first = weighted.fit(&aligned.model, &free, "misalignment, weighed")?;
     let path = path(&weighted, first, start, tell)?;
@@ -303,7 +311,15 @@ fn keep(
     let n_eff = effective(&last.residual_arcsec);
     let mut before = first;
     for step in steps {
-        let entry = entry(step.term, step.index, &before, &step.fit, observed, step.trials, &n_eff)?;
+        let entry = entry(
+            step.term,
+            step.index,
+            &before,
+            &step.fit,
+            observed,
+            step.trials,
+            &n_eff,
+        )?;
         added.push(entry);
         before = step.fit;
     }
@@ -482,7 +498,10 @@ fn entry(
     trials: f64,
     n_eff: &[f64; 3],
 ) -> Result<Added, AssessError> {
-    let (before, after) = (out_of_fold(without, observed)?, out_of_fold(with, observed)?);
+    let (before, after) = (
+        out_of_fold(without, observed)?,
+        out_of_fold(with, observed)?,
+    );
     let inside = gain(&without.residual_arcsec, &with.residual_arcsec, n_eff);
     let parameters = with.free.len() - without.free.len();
     Ok(Added {
@@ -503,7 +522,8 @@ fn gain(before: &[Vec<f64>; 3], after: &[Vec<f64>; 3], n_eff: &[f64; 3]) -> f64 
 
 /// Twice the gain against chi-squared; the search multiplies the chance.
 fn chance(gain: f64, parameters: f64, trials: f64) -> f64 {
-    let chance = ChiSquared::new(parameters.max(1.0)).map_or(1.0, |chi2| chi2.sf(2.0 * gain.max(0.0)));
+    let chance =
+        ChiSquared::new(parameters.max(1.0)).map_or(1.0, |chi2| chi2.sf(2.0 * gain.max(0.0)));
     (chance * trials * Term::CANDIDATES.len() as f64).min(1.0)
 }
 
@@ -515,7 +535,7 @@ pub(crate) fn rms(x: &[Vec<f64>; 3]) -> [f64; 3] {
     std::array::from_fn(|axis| (rss(&x[axis]) / x[axis].len() as f64).sqrt())
 }
 
-fn lag_one(x: &[f64]) -> f64 {
+pub(crate) fn lag_one(x: &[f64]) -> f64 {
     let lag: f64 = x.windows(2).map(|w| w[0] * w[1]).sum();
     lag / rss(x)
 }

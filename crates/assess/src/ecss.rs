@@ -104,7 +104,8 @@ fn sliding_means(t_s: &[f64], e: &[f64], step_s: f64, window_s: f64) -> Vec<Opti
     let (first, last) = (t_s[0], t_s[t_s.len() - 1]);
     (0..e.len())
         .map(|k| {
-            let inside = t_s[k] - half >= first - 0.5 * step_s && t_s[k] + half <= last + 0.5 * step_s;
+            let inside =
+                t_s[k] - half >= first - 0.5 * step_s && t_s[k] + half <= last + 0.5 * step_s;
             let from = t_s.partition_point(|t| *t < t_s[k] - half - 1e-6 * step_s);
             let to = t_s.partition_point(|t| *t <= t_s[k] + half + 1e-6 * step_s);
             let n = to - from;
@@ -161,7 +162,13 @@ mod tests {
     /// hundred, the relative error is the wave.
     #[test]
     fn what_is_fast_is_relative() {
-        let (t, e) = series(|t| if (t + 0.05).rem_euclid(2.0) < 1.0 { 3.0 } else { -3.0 });
+        let (t, e) = series(|t| {
+            if (t + 0.05).rem_euclid(2.0) < 1.0 {
+                3.0
+            } else {
+                -3.0
+            }
+        });
         let got = ecss(&t, &e, 0.1, 10.0, 50.0);
         assert!(got.mpe_arcsec[1][0] < 0.07 && (got.rpe_arcsec[0][0] - 3.0).abs() < 0.07);
         assert!(got.pde_arcsec.unwrap()[1][0] < 0.07);

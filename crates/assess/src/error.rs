@@ -37,7 +37,9 @@ pub enum AssessError {
         turn_deg: f64,
     },
     /// Moments of inertia that no body has.
-    #[error("moments of inertia {0:?} must be positive, and none larger than the sum of the others")]
+    #[error(
+        "moments of inertia {0:?} must be positive, and none larger than the sum of the others"
+    )]
     Inertia([f64; 3]),
     /// A matrix that is no rotation.
     #[error("the alignment is no rotation: its rows are off orthonormal by {off:.1e}")]

@@ -266,7 +266,8 @@ fn weighted(rows: &[Row], stretches: usize, noise: &[f64; 3], walk: f64) -> Opti
         let mut z = Seven::zeros();
         z.set_column(0, &row.y);
         z.fixed_view_mut::<3, 3>(0, 1).copy_from(&row.b);
-        z.fixed_view_mut::<3, 3>(0, 4).copy_from(&Matrix3::identity());
+        z.fixed_view_mut::<3, 3>(0, 4)
+            .copy_from(&Matrix3::identity());
         let turn = row.q.inverse().to_rotation_matrix();
         let r = turn.matrix() * own * turn.matrix().transpose();
         let s = p + r;

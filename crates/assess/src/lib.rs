@@ -3,6 +3,7 @@
 
 mod assess;
 mod closing;
+mod document;
 mod ecss;
 mod error;
 mod gyro;
@@ -15,13 +16,15 @@ mod start;
 
 pub use assess::{Assessment, Options, RequirementCheck, RotatorFindings, SPIN_LIMITS_RPM, assess};
 pub use closing::{Added, Closing, Considered, Term, close};
+pub use document::{Document, GyroDocument, NamedEstimate, RotatorDocument};
 pub use ecss::{Ecss, Index, SHARES, ecss};
 pub use error::AssessError;
 pub use gyro::{GyroSolution, gyro_solution};
 pub use model::{Fit, Fitter, Free, Oscillation, Rotating, TimeTagStep};
 pub use noise::{
-    AxisNoise, FlatInterval, Plateau, Rival, SpanNoise, Windows, allan_white, axis_noise, find_plateau,
-    flat_intervals, local_maxima, noise_at_span, pooled_sigma, spans_s, spectral_floor,
+    AxisNoise, FlatInterval, Plateau, Rival, SpanNoise, Windows, allan_white, axis_noise,
+    find_plateau, flat_intervals, local_maxima, noise_at_span, pooled_sigma, spans_s,
+    spectral_floor,
 };
 pub use observed::{Counts, Observed};
 pub use rotator::{Body, Inertia, NutationRates, axisymmetric, nutation_rates};

@@ -322,9 +322,7 @@ impl Around<'_, '_> {
         let turn = |of: fn(usize) -> Free| {
             Vector3::from_fn(|axis, _| {
                 let at = self.free.iter().position(|free| *free == of(axis));
-                at.map_or(0.0, |at| {
-                    p[at] * of(axis).scale(self.fitter, self.start)
-                })
+                at.map_or(0.0, |at| p[at] * of(axis).scale(self.fitter, self.start))
             })
         };
         let attitude = rotation_from_vector(&turn(Free::Attitude));

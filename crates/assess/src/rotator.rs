@@ -72,17 +72,7 @@ impl Inertia {
     #[must_use]
     pub fn tensor(&self) -> Matrix3<f64> {
         let [a, b] = self.triaxial;
-        Matrix3::new(
-            1.0 + a,
-            b,
-            0.0,
-            b,
-            1.0 - a,
-            0.0,
-            0.0,
-            0.0,
-            self.axial_ratio,
-        )
+        Matrix3::new(1.0 + a, b, 0.0, b, 1.0 - a, 0.0, 0.0, 0.0, self.axial_ratio)
     }
 
     fn inverse(&self) -> Matrix3<f64> {

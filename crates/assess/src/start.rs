@@ -13,7 +13,7 @@
 //!
 //! Source: [A01], start values of the six-parameter fit; the body nutation rate below its Eq. 3.
 
-use focal_plane::{Angle, ARCSEC_PER_RAD};
+use focal_plane::{ARCSEC_PER_RAD, Angle};
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
 use crate::model::{Fitter, Free, Rotating};
@@ -38,7 +38,9 @@ pub fn alignment(rows: [[f64; 3]; 3]) -> Result<UnitQuaternion<f64>, AssessError
     if !(off <= 1e-3 && m.determinant() > 0.0) {
         return Err(AssessError::Alignment { off });
     }
-    Ok(UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix(&m)))
+    Ok(UnitQuaternion::from_rotation_matrix(
+        &Rotation3::from_matrix(&m),
+    ))
 }
 
 /// Angles phi and theta, rad, of the misalignment `M = R3(0) R2(theta) R1(phi)` for which
@@ -172,8 +174,9 @@ pub fn start(
 
 /// The shortest turn of a direction to +z.
 fn to_z(axis: &Vector3<f64>) -> UnitQuaternion<f64> {
-    UnitQuaternion::rotation_between(axis, &Vector3::z())
-        .unwrap_or_else(|| UnitQuaternion::from_axis_angle(&Vector3::x_axis(), core::f64::consts::PI))
+    UnitQuaternion::rotation_between(axis, &Vector3::z()).unwrap_or_else(|| {
+        UnitQuaternion::from_axis_angle(&Vector3::x_axis(), core::f64::consts::PI)
+    })
 }
 
 /// Six parameters, over a tenth of the frames around the epoch, then more, then all.
@@ -246,7 +249,8 @@ fn nutation_ratio(fitter: &Fitter<'_>, uniform: &Rotating) -> Result<Option<f64>
         k += 1.0;
     }
     let arcsec = best.max(0.0).sqrt() / (n as f64).sqrt();
-    let seen = best > NUTATION_SHARE * variance && Angle::from_arcsec(arcsec).rad() > 1.0 / ARCSEC_PER_RAD;
+    let seen =
+        best > NUTATION_SHARE * variance && Angle::from_arcsec(arcsec).rad() > 1.0 / ARCSEC_PER_RAD;
     // in the body the momentum goes round at (r - 1) w3, and so does the error of a uniform turn
     Ok(seen.then_some(1.0 + at / spin))
 }

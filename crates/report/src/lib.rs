@@ -3,6 +3,8 @@
 //! Nothing is computed here: the crate can be deleted without changing a number.
 #![forbid(unsafe_code)]
 
+mod assess_figures;
+mod assess_text;
 mod compare_figures;
 mod compare_tables;
 mod compare_text;
@@ -10,6 +12,8 @@ mod fit_text;
 mod scene_figures;
 mod text;
 
+pub use assess_figures::assess_figures;
+pub use assess_text::assess_summary;
 pub use compare_figures::compare_figures;
 pub use compare_tables::compare_tables;
 pub use compare_text::compare_summary;

@@ -16,10 +16,11 @@ pub(crate) const FOLDS: usize = 5;
     clippy::cast_sign_loss,
     reason = "clamped to the number of blocks"
 )]
-pub(crate) fn fold_of(observed: &Observed, t_s: f64) -> usize {
-    let (first, last) = (observed.t_s[0], observed.t_s[observed.len() - 1]);
+pub(crate) fn fold_of([first, last]: [f64; 2], t_s: f64) -> usize {
     let share = (t_s - first) / (last - first).max(f64::MIN_POSITIVE);
-    (share * FOLDS as f64).floor().clamp(0.0, (FOLDS - 1) as f64) as usize
+    (share * FOLDS as f64)
+        .floor()
+        .clamp(0.0, (FOLDS - 1) as f64) as usize
 }
 
 /// Residual about the tracker's axes, arcsec, each block predicted with parameters of the others.
@@ -27,7 +28,8 @@ pub(crate) fn out_of_fold(fit: &Fit, observed: &Observed) -> Result<[Vec<f64>; 3
     let (j, r) = (&fit.minimum.jacobian, &fit.minimum.residuals);
     let n = j.ncols();
     let frames = observed.len();
-    let folds: Vec<usize> = observed.t_s.iter().map(|t| fold_of(observed, *t)).collect();
+    let ends = [observed.t_s[0], observed.t_s[frames - 1]];
+    let folds: Vec<usize> = observed.t_s.iter().map(|t| fold_of(ends, *t)).collect();
     let mut gram = vec![DMatrix::zeros(n, n); FOLDS];
     let mut right = vec![DVector::zeros(n); FOLDS];
     let mut from = 0;
@@ -45,7 +47,9 @@ pub(crate) fn out_of_fold(fit: &Fit, observed: &Observed) -> Result<[Vec<f64>; 3
     let mut change = Vec::with_capacity(FOLDS);
     for fold in 0..FOLDS {
         let others = &all - &gram[fold];
-        let solved = others.cholesky().map(|c| c.solve(&(&right[fold] - &all_right)));
+        let solved = others
+            .cholesky()
+            .map(|c| c.solve(&(&right[fold] - &all_right)));
         change.push(solved.ok_or_else(|| AssessError::Fit {
             what: "four of five blocks",
             reason: "they do not determine all parameters".into(),

@@ -80,7 +80,9 @@ pub fn noise_at_span(
         let end = start + t_s[start..].partition_point(|t| *t < from_s + span_s - 1e-6 * step_s);
         let n = end - start;
         let whole = n as f64 * step_s > 0.7 * span_s;
-        let gap = t_s[start..end].windows(2).any(|t| t[1] - t[0] > GAP_STEPS * step_s);
+        let gap = t_s[start..end]
+            .windows(2)
+            .any(|t| t[1] - t[0] > GAP_STEPS * step_s);
         if n >= FEWEST
             && whole
             && !gap
@@ -160,13 +162,7 @@ fn without_parabola(t_s: &[f64], x: &[f64]) -> Option<f64> {
 /// Times of the highest local maxima of the series' running mean over `smooth_s`, at most `count`, at
 /// least `apart_s` from each other and from the ends.
 #[must_use]
-pub fn local_maxima(
-    t_s: &[f64],
-    x: &[f64],
-    smooth_s: f64,
-    apart_s: f64,
-    count: usize,
-) -> Vec<f64> {
+pub fn local_maxima(t_s: &[f64], x: &[f64], smooth_s: f64, apart_s: f64, count: usize) -> Vec<f64> {
     let n = t_s.len();
     let mut sum = vec![0.0; n + 1];
     for k in 0..n {
@@ -179,7 +175,8 @@ pub fn local_maxima(
             (sum[to] - sum[from]) / (to - from) as f64
         })
         .collect();
-    let inside = |k: &usize| t_s[*k] - t_s[0] >= 0.5 * apart_s && t_s[n - 1] - t_s[*k] >= 0.5 * apart_s;
+    let inside =
+        |k: &usize| t_s[*k] - t_s[0] >= 0.5 * apart_s && t_s[n - 1] - t_s[*k] >= 0.5 * apart_s;
     let mut order: Vec<usize> = (0..n).filter(inside).collect();
     order.sort_by(|a, b| smooth[*b].total_cmp(&smooth[*a]));
     let mut out: Vec<f64> = Vec::new();

@@ -73,7 +73,8 @@ pub fn find_plateau(spans: &[SpanNoise]) -> Option<Plateau> {
             ));
         }
     }
-    let sum = |f: &dyn Fn(&(f64, f64, f64, f64)) -> f64| rows.iter().map(|r| f(r) / r.3).sum::<f64>();
+    let sum =
+        |f: &dyn Fn(&(f64, f64, f64, f64)) -> f64| rows.iter().map(|r| f(r) / r.3).sum::<f64>();
     let (aa, ab, bb) = (
         sum(&|r| r.0 * r.0),
         sum(&|r| r.0 * r.1),
@@ -81,7 +82,11 @@ pub fn find_plateau(spans: &[SpanNoise]) -> Option<Plateau> {
     );
     let (ay, by) = (sum(&|r| r.0 * r.2), sum(&|r| r.1 * r.2));
     let det = aa * bb - ab * ab;
-    let slope = if det > 0.0 { (aa * by - ab * ay) / det } else { 0.0 };
+    let slope = if det > 0.0 {
+        (aa * by - ab * ay) / det
+    } else {
+        0.0
+    };
     let (level, error) = if slope > 0.0 {
         ((bb * ay - ab * by) / det, (bb / det).sqrt())
     } else {

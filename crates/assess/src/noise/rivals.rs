@@ -66,7 +66,12 @@ pub fn allan_white(t_s: &[f64], x: &[f64], step_s: f64) -> Result<Option<Rival>,
     let (mut gram, mut right) = (Matrix3::zeros(), Vector3::zeros());
     for (k, factor) in factors.iter().enumerate() {
         let m = *factor as f64;
-        let weight = allan_edf(PowerLaw::WhiteAngle, AllanKind::Overlapping, *factor, angles);
+        let weight = allan_edf(
+            PowerLaw::WhiteAngle,
+            AllanKind::Overlapping,
+            *factor,
+            angles,
+        );
         let row = Vector3::new(6.0, 2.0 * m, m.powi(4));
         gram += row * row.transpose() * weight;
         right += row * (square[k] * weight);
@@ -101,7 +106,10 @@ pub fn spectral_floor(t_s: &[f64], x: &[f64], step_s: f64) -> Result<Option<Riva
     if segment < 32 {
         return Ok(None);
     }
-    let runs: Vec<_> = runs.into_iter().filter(|run| run.len() >= segment).collect();
+    let runs: Vec<_> = runs
+        .into_iter()
+        .filter(|run| run.len() >= segment)
+        .collect();
     let fs_hz = 1.0 / step_s;
     let mut settings = WelchSettings::half_overlap(segment, fs_hz);
     settings.detrend = Detrend::Linear;

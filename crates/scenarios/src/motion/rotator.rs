@@ -258,10 +258,8 @@ mod tests {
         };
         let span = [-5.0, 60.0];
         let (a, b) = (shaken.truth(span).unwrap(), still.truth(span).unwrap());
-        let turn = focal_plane::rotation_vector(
-            &a.attitude(25.0).unwrap(),
-            &b.attitude(25.0).unwrap(),
-        );
+        let turn =
+            focal_plane::rotation_vector(&a.attitude(25.0).unwrap(), &b.attitude(25.0).unwrap());
         let expected = Vector3::x() * Angle::from_arcsec(80.0).rad();
         assert!((turn - expected).norm() < 1e-12);
     }
