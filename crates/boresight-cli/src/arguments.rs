@@ -47,6 +47,11 @@ pub(crate) enum Command {
         after_help = "Examples:\n  boresight fit telemetry/\n  boresight fit telemetry/ --out hem.toml --exclude-hz 0.03,0.04"
     )]
     Fit(Fit),
+    /// On-orbit noise without a model: total and inherent 1 sigma of each axis
+    #[command(
+        after_help = "Examples:\n  boresight assess telemetry/\n  boresight assess telemetry/ --inertia 14710.5,14688.8,29041.9 --requirement 360 --out results/"
+    )]
+    Assess(Assess),
 }
 
 #[derive(Debug, Args)]
@@ -67,7 +72,7 @@ pub(crate) struct Simulate {
     /// Scenario file, a model with [motion], [sky] and [run]; or a world file
     #[arg(value_name = "SCENARIO.toml", required_unless_present_any = ["preset", "print_preset"])]
     pub(crate) scenario: Option<PathBuf>,
-    /// A scenario of the paper: iht, iht-distance, ict1, ict2, pitt, st2-iht, st2-iht-distance, st2-ict1, st2-ict2
+    /// A scenario of the paper: iht, iht-distance, ict1, ict2, pitt, st2-iht, st2-iht-distance, st2-ict1, st2-ict2, image, eo1
     #[arg(long, value_name = "NAME", conflicts_with = "scenario")]
     pub(crate) preset: Option<String>,
     /// Print the file of a preset, to be edited, and do nothing else
@@ -125,6 +130,45 @@ pub(crate) struct Fit {
     pub(crate) exclude_hz: Vec<[f64; 2]>,
 }
 
+#[derive(Debug, Args)]
+pub(crate) struct Assess {
+    /// What was measured: a bundle folder with an attitude
+    #[arg(value_name = "BUNDLE")]
+    pub(crate) bundle: PathBuf,
+    /// What stands in for the truth [default: the gyro, else the reference, else a rigid body]
+    #[arg(long, value_enum)]
+    pub(crate) method: Option<Method>,
+    /// Moments of inertia about body x, y, z, any unit [default: ratios are estimated]
+    #[arg(long, value_name = "X,Y,Z", value_parser = numbers::<3>)]
+    pub(crate) inertia: Option<[f64; 3]>,
+    /// Matrix from tracker to body, row by row [default: the spin axis is body z]
+    #[arg(long, value_name = "NINE NUMBERS", value_parser = numbers::<9>, allow_hyphen_values = true)]
+    pub(crate) alignment: Option<[f64; 9]>,
+    /// Attitude accuracy that is required, arcsec
+    #[arg(long, value_name = "ARCSEC")]
+    pub(crate) requirement: Option<f64>,
+    /// Angle random walk of the gyro, arcsec/sqrt(s) [default: estimated]
+    #[arg(long, value_name = "ARCSEC")]
+    pub(crate) gyro_walk: Option<f64>,
+    /// Window of the ECSS indices, s [default: a hundredth of the record]
+    #[arg(long, value_name = "SECONDS")]
+    pub(crate) window: Option<f64>,
+    /// Folder for assess.json, summary.txt, pictures and residuals; nothing is written without it
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+#[value(rename_all = "snake_case")]
+pub(crate) enum Method {
+    /// A rigid body without torque
+    RigidRotator,
+    /// Propagated gyro rates
+    Gyro,
+    /// The table `reference`
+    Reference,
+}
+
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub(crate) enum Fidelity {
     /// By the formulas of the model and its effects
@@ -170,4 +214,12 @@ fn threads(text: &str) -> Result<usize, String> {
         Ok(0) | Err(_) => Err("a whole number of at least 1 is needed".to_owned()),
         Ok(n) => Ok(n),
     }
+}
+
+fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
+    let parsed: Result<Vec<f64>, _> = text.split(',').map(|part| part.trim().parse()).collect();
+    let wrong = || format!("{N} finite numbers with commas between them are needed");
+    let numbers = parsed.map_err(|_| wrong())?;
+    let finite = numbers.iter().all(|x: &f64| x.is_finite());
+    numbers.try_into().ok().filter(|_| finite).ok_or_else(wrong)
 }

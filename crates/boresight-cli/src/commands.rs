@@ -1,5 +1,6 @@
 //! One module a command.
 
+pub(crate) mod assess;
 pub(crate) mod close;
 pub(crate) mod compare;
 pub(crate) mod fit;

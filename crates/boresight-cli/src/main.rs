@@ -30,6 +30,7 @@ fn main() -> ExitCode {
             .build_global();
     }
     let done = match &arguments.command {
+        Command::Assess(options) => commands::assess::run(options, &console),
         Command::Close(options) => commands::close::run(options, &console),
         Command::Compare(options) => commands::compare::run(options, &console),
         Command::Fit(options) => commands::fit::run(options, &console),

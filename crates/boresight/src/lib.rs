@@ -16,6 +16,7 @@
 //! | [`telemetry`] | bundles, models and results on disk |
 //! | [`scenarios`] | motions and skies: bundles simulated from a scenario |
 //! | [`imager`] | pixels: what the detector sees and the tracker reads out, an independent truth |
+//! | [`assess`] | on-orbit noise from quaternions alone: rigid rotator, gyro, plateau |
 //! | [`closed_loop`] | residual, cause, better model |
 //! | [`comparison`] | residual, spectrum, fitted process and ensemble of a model beside a bundle |
 //! | [`figures`] | plots as SVG text from plain numbers |
@@ -67,7 +68,7 @@
 
 #[doc(inline)]
 pub use {
-    centroid, closed_loop, comparison, distortion, effects, figures, focal_plane, fogm_fit, imager,
+    assess, centroid, closed_loop, comparison, distortion, effects, figures, focal_plane, fogm_fit, imager,
     quest, report, scenarios, spectra, star_tracker, telemetry,
 };
 

@@ -3,6 +3,8 @@
 //! Nothing is computed here that is not drawn: the crate can be deleted without changing a number.
 #![forbid(unsafe_code)]
 
+mod assess_figures;
+mod assess_text;
 mod compare_figures;
 mod compare_tables;
 mod compare_text;
@@ -12,6 +14,8 @@ mod number;
 mod scene_figures;
 mod text;
 
+pub use assess_figures::assess_figures;
+pub use assess_text::assess_summary;
 pub use compare_figures::compare_figures;
 pub use compare_tables::compare_tables;
 pub use compare_text::compare_summary;

@@ -19,7 +19,8 @@ pub use course::Course;
 pub use error::ScenarioError;
 pub use housekeeping::{Channel, Housekeeping, OrbitVelocity, SinusoidChannel, Thermostat};
 pub use motion::{
-    ClosedLoop, Hold, Motion, PhasePlane, Pointing, Recorded, RecordedTable, Sinusoid, Slew, Slews,
+    ClosedLoop, Hold, Motion, PhasePlane, Pointing, Recorded, RecordedTable, Rotator, Sinusoid,
+    Slew, Slews,
 };
 pub use preset::{PRESETS, Preset, preset};
 pub use reference::{Gyro, Reference};

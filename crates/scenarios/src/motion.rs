@@ -17,6 +17,7 @@ mod integrate;
 mod jitter;
 pub(crate) mod phase_plane;
 mod recorded;
+mod rotator;
 mod slews;
 
 use std::path::Path;
@@ -32,6 +33,7 @@ pub use hold::Hold;
 pub use jitter::{ClosedLoop, Sinusoid};
 pub use phase_plane::PhasePlane;
 pub use recorded::{Recorded, RecordedTable};
+pub use rotator::Rotator;
 pub use slews::{Slew, Slews};
 
 /// Longest step of the integration, s.
@@ -48,6 +50,8 @@ pub enum Motion {
     Slews(Slews),
     /// `phase_plane`: the limit cycle of a thruster controller.
     PhasePlane(PhasePlane),
+    /// `rotator`: a rigid body that spins without torque.
+    Rotator(Rotator),
     /// `recorded`: the attitude of another bundle.
     Recorded(Recorded),
 }
@@ -70,6 +74,7 @@ impl Motion {
             Self::Hold(hold) => hold.truth(span_s, rng),
             Self::Slews(slews) => slews.truth(span_s, rng),
             Self::PhasePlane(cycle) => cycle.truth(span_s, rng),
+            Self::Rotator(rotator) => rotator.truth(span_s),
             Self::Recorded(recorded) => recorded.truth(folder),
         }
     }

@@ -35,6 +35,8 @@ pub const PRESETS: &[Preset] = presets![
     "ict1": "PSP IMU Calibration Test of 17 August 2020, tracker 1",
     "ict2": "PSP IMU Calibration Test of 5 December 2020, tracker 1",
     "pitt": "DART Pre-Impact Terminal Test",
+    "image": "IMAGE, spinning, of 21 July 2000 ([A01]): 30 min of quaternions",
+    "eo1": "EO-1, nadir pointing, of 23 November 2000 ([A01]): quaternions and gyro",
     "st2-iht": "PSP Inertial Hold Test, tracker 2",
     "st2-iht-distance": "the same with the printed distances (erratum E10)",
     "st2-ict1": "PSP IMU Calibration Test of 17 August 2020, tracker 2",

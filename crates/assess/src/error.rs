@@ -1,0 +1,88 @@
+//! What can keep an assessment from being made.
+
+use focal_plane::AttitudeError;
+use spectra::SpectraError;
+
+/// Errors of this crate.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum AssessError {
+    /// The bundle holds no attitude.
+    #[error("the bundle has no table `attitude`: an assessment is made of quaternions")]
+    NoAttitude,
+    /// A method that needs a table which is not there.
+    #[error("method {method} needs the table `{table}`, which the bundle does not have")]
+    NoTable {
+        /// The method.
+        method: &'static str,
+        /// The table.
+        table: &'static str,
+    },
+    /// Too few frames.
+    #[error("{got} frames that can be used, at least {need} are needed{why}")]
+    TooFew {
+        /// There are.
+        got: usize,
+        /// There must be.
+        need: usize,
+        /// For what, or nothing.
+        why: &'static str,
+    },
+    /// The tracker turns so far between frames that its direction of turning is not known.
+    #[error(
+        "the attitude turns by {turn_deg:.0} deg between frames: beyond 120 deg the spin cannot be told from its alias"
+    )]
+    Aliased {
+        /// Median turn, deg.
+        turn_deg: f64,
+    },
+    /// Moments of inertia that no body has.
+    #[error(
+        "moments of inertia {0:?} must be positive, and none larger than the sum of the others"
+    )]
+    Inertia([f64; 3]),
+    /// A matrix that is no rotation.
+    #[error("the alignment is no rotation: its rows are off orthonormal by {off:.1e}")]
+    Alignment {
+        /// Largest deviation of `N N^T` from one.
+        off: f64,
+    },
+    /// A number outside its range.
+    #[error("{name} = {value} must be {expected}")]
+    OutOfRange {
+        /// Which.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+        /// Its range.
+        expected: &'static str,
+    },
+    /// A fit that does not settle, or whose parameters the data do not determine.
+    #[error("the fit of {what} does not converge: {reason}")]
+    Fit {
+        /// What was fitted.
+        what: &'static str,
+        /// Why it stopped.
+        reason: String,
+    },
+    /// An attitude.
+    #[error(transparent)]
+    Attitude(#[from] AttitudeError),
+    /// A spectrum.
+    #[error(transparent)]
+    Spectra(#[from] SpectraError),
+}
+
+impl AssessError {
+    pub(crate) fn positive(name: &'static str, value: f64) -> Result<(), Self> {
+        if value.is_finite() && value > 0.0 {
+            return Ok(());
+        }
+        let expected = "finite and positive";
+        Err(Self::OutOfRange {
+            name,
+            value,
+            expected,
+        })
+    }
+}

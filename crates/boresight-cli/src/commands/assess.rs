@@ -1,0 +1,57 @@
+//! `boresight assess`: on-orbit noise without a model.
+
+use std::io::Write as _;
+
+use anyhow::Context as _;
+use boresight::assess::{Assessment, Options, assess};
+use boresight::report::{assess_figures, assess_summary};
+use boresight::telemetry::report::AssessMethod;
+use boresight::telemetry::{Bundle, Output};
+
+use crate::arguments::{Assess, Method};
+use crate::console::Console;
+
+pub(crate) fn run(options: &Assess, console: &Console) -> anyhow::Result<()> {
+    console.progress("reading");
+    let bundle = Bundle::read(&options.bundle)?;
+    let settings = Options {
+        method: options.method.map(|method| match method {
+            Method::RigidRotator => AssessMethod::RigidRotator,
+            Method::Gyro => AssessMethod::Gyro,
+            Method::Reference => AssessMethod::Reference,
+        }),
+        inertia: options.inertia,
+        alignment: options
+            .alignment
+            .map(|[a, b, c, d, e, f, g, h, i]| [[a, b, c], [d, e, f], [g, h, i]]),
+        requirement_arcsec: options.requirement,
+        gyro_walk_arcsec_rt_s: options.gyro_walk,
+        window_s: options.window,
+    };
+    let name = options.bundle.display().to_string();
+    let found =
+        assess(&bundle, &settings, &|what| console.progress(what)).with_context(|| name.clone())?;
+    let text = assess_summary(&found);
+    let json = serde_json::to_string_pretty(&found.document()).context("the assessment as JSON")?;
+    if let Some(dir) = &options.out {
+        console.progress("writing results");
+        let output = Output::new(dir)?;
+        write(&found, &text, &json, &output)?;
+        output.commit()?;
+    }
+    console.say(&format!("Input     {name}\n{text}"));
+    console.machine(&json);
+    Ok(())
+}
+
+fn write(found: &Assessment, text: &str, json: &str, output: &Output) -> anyhow::Result<()> {
+    output.write("assess.json", |to| writeln!(to, "{json}"))?;
+    output.write("summary.txt", |to| to.write_all(text.as_bytes()))?;
+    for (name, svg) in assess_figures(found) {
+        output.write(&name, |to| to.write_all(svg.as_bytes()))?;
+    }
+    if let Some(residuals) = found.residuals() {
+        residuals.write(output)?;
+    }
+    Ok(())
+}
