@@ -68,8 +68,8 @@
 
 #[doc(inline)]
 pub use {
-    assess, centroid, closed_loop, comparison, distortion, effects, figures, focal_plane, fogm_fit, imager,
-    quest, report, scenarios, spectra, star_tracker, telemetry,
+    assess, centroid, closed_loop, comparison, distortion, effects, figures, focal_plane, fogm_fit,
+    imager, quest, report, scenarios, spectra, star_tracker, telemetry,
 };
 
 /// The names that almost every program needs.

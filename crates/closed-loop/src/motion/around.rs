@@ -1,8 +1,8 @@
 //! The motion around each frame as the *other* samples tell it.
 //!
-//! A residual against a reference holds that reference's error e_k at the frame's
+//! A residual against a reference holds that reference's error `e_k` at the frame's
 //! time. A path through the sample itself holds it too: its acceleration is
-//! -2 e_k/h^2 and more, and a smear "explains" the reference's white noise. So
+//! `-2 e_k/h^2` and more, and a smear "explains" the reference's white noise. So
 //! around a frame the path is the polynomial through the neighbours alone, three
 //! on each side that lie at least one step away, or two with their measured rates:
 //!
