@@ -34,6 +34,9 @@ use crate::star_design::{rotation_inverse, rotation_row};
 /// Whiter than this over the centroids' own noise and the reference has white noise.
 const WHITE_EXCESS: f64 = 1.03;
 
+/// Half the relative difference of two noises that serve a fit alike.
+const ALIKE: f64 = 0.02;
+
 /// What the residuals of stars against a reference are made of.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct CommonNoise {
@@ -196,9 +199,13 @@ impl Rotations {
 }
 
 impl CommonNoise {
-    /// Whether the reference adds anything that is worth a filter.
-    pub(crate) fn is_plain(&self) -> bool {
-        self.reference.iter().all(|r| r.slow <= 0.0)
+    /// Alike within what makes no difference to a fit.
+    pub(crate) fn is_like(&self, other: &Self) -> bool {
+        let close = |a: f64, b: f64| (a - b).abs() <= ALIKE * (a + b);
+        self.reference
+            .iter()
+            .zip(&other.reference)
+            .all(|(a, b)| close(a.slow, b.slow) && (a.slow <= 0.0 || close(a.tau_s, b.tau_s)))
     }
 }
 

@@ -77,7 +77,7 @@ pub(crate) fn run<'a>(
     } else {
         declared_noise(white, folds)?
     };
-    let Some(start) = start.filter(|noise| !noise.is_plain()) else {
+    let Some(start) = start else {
         return Ok(Searched {
             found: search(white, folds, candidates, eligible)?,
             evidence: None,
@@ -87,13 +87,19 @@ pub(crate) fn run<'a>(
     coloured(white, folds, candidates, eligible, start)
 }
 
-/// Noise of the declared model's residual.
+/// Noise of the declared model's residual, where it holds a slow error beyond doubt:
+/// less of it imitates no effect, and would only hide one.
 fn declared_noise(
     white: &StarEvidence<'_>,
     folds: &Folds,
 ) -> Result<Option<CommonNoise>, CloseError> {
     let fitted = fit(white, folds, &[])?;
-    Ok(rotations(white, folds, &fitted, &[], None).map(|r| r.noise(None)))
+    Ok(rotations(white, folds, &fitted, &[], None).and_then(|r| {
+        let noise = r.noise(None);
+        significant(&r.slow_ratio(&noise))
+            .contains(&true)
+            .then_some(noise)
+    }))
 }
 
 /// Rotations of what the fit leaves, in sample.
@@ -181,8 +187,9 @@ impl Trial<'_, '_> {
             let set = columns_of(&fitted.groups, &all);
             let estimate = fitted.fits.estimate(&set)?;
             let rotations = rotations(self.white, self.folds, &fitted, list, Some(&estimate))?;
-            if round < ALTERNATIONS {
-                noise = rotations.noise(Some(&noise));
+            let better = rotations.noise(Some(&noise));
+            if round < ALTERNATIONS && !better.is_like(&noise) {
+                noise = better;
                 continue;
             }
             let mut first = 0;
