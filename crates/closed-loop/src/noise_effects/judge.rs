@@ -12,7 +12,8 @@
 //! ```
 //!
 //! Spikes are told from stars that are noisier than others: every star has its own
-//! level there, from the median of its squares.
+//! level there, from the median of its squares. And they are told from noise that merely
+//! has tails: spikes must be likelier than Student's t with the freedom that suits best.
 //!
 //! Source: Wilks 1938; Liang & Zeger 1986; Satorra & Bentler 1994 (scaled ratio).
 
@@ -42,6 +43,8 @@ const CREDIBLE_RATE: f64 = 1000.0;
 const MIN_ROWS: usize = 50;
 /// Fewest spikes that are a rate.
 const MIN_SPIKES: f64 = 3.0;
+/// Nats by which spikes must beat noise with tails.
+const BEYOND_TAILS: f64 = 5.0;
 /// Rounds of rows (whose rotation is weighed by the noise) and fit.
 const ROUNDS: usize = 2;
 
@@ -325,7 +328,8 @@ impl Bench<'_> {
                     .covariance(&with, &rows, |r| r.block * self.stars + r.star)))
                 .sqrt()
         };
-        let enough = share * rows.len() as f64 >= MIN_SPIKES;
+        let enough = share * rows.len() as f64 >= MIN_SPIKES
+            && with.loglik > self.model.loglik_of_tails(&with.at, &rows) + BEYOND_TAILS;
         let p_value = (TRIED * likely(ratio, 2.0)).min(1.0);
         Judged {
             gain,

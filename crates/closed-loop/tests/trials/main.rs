@@ -3,5 +3,6 @@
 mod inputs;
 mod invariances;
 mod kit;
+mod noise;
 mod nulls;
 mod power;
