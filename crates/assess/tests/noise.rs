@@ -17,7 +17,11 @@ fn series(n: u32, sigma: f64, fogm: [f64; 2], quantum: f64, seed: u64) -> (Vec<f
     let x = t.iter().map(|t| {
         state = a * state + (1.0 - a * a).sqrt() * normal();
         let x = fogm[0] * state + sigma * normal() + 0.01 * t;
-        if quantum > 0.0 { (x / quantum).round() * quantum } else { x }
+        if quantum > 0.0 {
+            (x / quantum).round() * quantum
+        } else {
+            x
+        }
     });
     let x = x.collect();
     (t, x)
@@ -52,7 +56,10 @@ fn the_plateau_is_the_white_noise() {
             far += usize::from(z.abs() > 5.0);
         }
         println!("{name}: mean {sum:.2}, rms {:.2}", square.sqrt());
-        assert!(square.sqrt() < 1.45 && sum.abs() < 0.7 && far == 0, "{name}");
+        assert!(
+            square.sqrt() < 1.45 && sum.abs() < 0.7 && far == 0,
+            "{name}"
+        );
     }
 }
 

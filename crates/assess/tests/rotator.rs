@@ -1,7 +1,7 @@
 //! The rotating body: closed form against integration, conservation, and an independent program.
 
 use assess::{Body, Fitter, Free, Inertia, Observed, Rotating, axisymmetric, nutation_rates};
-use focal_plane::{ARCSEC_PER_RAD, AttitudeSource, rotation_from_vector, rotation_vector};
+use focal_plane::{AttitudeSource, rotation_from_vector, rotation_vector};
 use nalgebra::{Matrix4, Quaternion, UnitQuaternion, Vector3, Vector4};
 
 const IMAGE: [f64; 3] = [14710.5, 14688.8, 29041.9];
@@ -57,7 +57,7 @@ fn the_printed_solution_is_this_one() {
 }
 
 /// Steps of 0.1 rad, sixth order: the error of a step is below (0.1)^7 / 2016000 (Gauss, three stages)
-/// times the nutation's part of the rate, 0.1; over 1000 steps 1e-13 rad. Rounding adds 1e-16 a step.
+/// or 5e-14 rad; over 1900 steps 9e-11, which is the accuracy that is declared.
 #[test]
 fn integration_meets_the_closed_form() {
     let inertia = Inertia::principal(IMAGE).unwrap().axisymmetric();
@@ -65,13 +65,14 @@ fn integration_meets_the_closed_form() {
     let motion = body.motion([-1800.0, 1800.0]).unwrap();
     for (k, t) in motion.t_s().iter().enumerate() {
         let off = rotation_vector(&motion.quaternions()[k], &axisymmetric(&body, *t)).norm();
-        assert!(off < 1e-11, "{t}: {off:.1e}");
+        assert!(off < 1e-10, "{t}: {off:.1e}");
     }
     // between the steps: the cubic, (0.1)^4 / 384 of the nutation's turn, 0.09 rad
-    let off = |t: f64| {
-        rotation_vector(&motion.attitude(t).unwrap(), &axisymmetric(&body, t)).norm()
-    };
-    let worst = (0..3000).map(|k| off(-1700.0 + 1.13 * f64::from(k))).fold(0.0, f64::max);
+    let off =
+        |t: f64| rotation_vector(&motion.attitude(t).unwrap(), &axisymmetric(&body, t)).norm();
+    let worst = (0..3000)
+        .map(|k| off(-1700.0 + 1.13 * f64::from(k)))
+        .fold(0.0, f64::max);
     assert!(worst < 1e-7, "{worst:.1e}");
 }
 
@@ -122,45 +123,55 @@ fn triaxial_motion_is_that_of_an_independent_program() {
             // the cubic between steps: (0.1)^4 / 384 of the nutation, up to a rad here
             assert!(off < 4e-7, "{}: {off:.1e}", row[3]);
             let w = Vector3::new(row[4], row[5], row[6]);
-            assert!((motion.rate_rad_s(row[3]).unwrap() - w).norm() < 4e-7 * w.norm());
+            // its slope: (0.1)^3 / 216 times four, of the nutation
+            assert!((motion.rate_rad_s(row[3]).unwrap() - w).norm() < 2e-5 * w.norm());
         }
     }
 }
 
-/// What the axisymmetric fit leaves of a triaxial body, rms over the transverse axes, arcsec.
-fn leftover(nutation_deg: f64) -> f64 {
+/// What an axisymmetric fit with this `I3/IT` leaves of a triaxial body about body x and y, rms, arcsec.
+fn leftover(nutation_deg: f64, axial_ratio: f64) -> [f64; 2] {
     let truth = body(Inertia::principal(IMAGE).unwrap(), nutation_deg);
     let motion = truth.motion([-900.0, 900.0]).unwrap();
     let t_s: Vec<f64> = (0..=1800).map(|k| f64::from(k) - 900.0).collect();
     let q: Vec<_> = t_s.iter().map(|t| motion.attitude(*t).unwrap()).collect();
     let observed = Observed::new(&t_s, &q).unwrap();
+    let inertia = Inertia {
+        axial_ratio,
+        triaxial: [0.0; 2],
+    };
     let start = Rotating {
-        body: Body {
-            inertia: truth.inertia.axisymmetric(),
-            ..truth
-        },
+        body: Body { inertia, ..truth },
         to_body: UnitQuaternion::identity(),
         oscillations: vec![],
         steps: vec![],
     };
     let mut free = Free::SIX.to_vec();
     free.extend([Free::Misalignment(0), Free::Misalignment(1)]);
-    let fit = Fitter::new(&observed, 0.0).fit(&start, &free, "all").unwrap();
+    let fit = Fitter::new(&observed, 0.0)
+        .fit(&start, &free, "all")
+        .unwrap();
     let [x, y, _] = fit.residual_body_arcsec();
-    let n = (x.len() + y.len()) as f64;
-    (x.iter().chain(&y).map(|e| e * e).sum::<f64>() / n).sqrt()
+    [x, y].map(|e| (e.iter().map(|e| e * e).sum::<f64>() / e.len() as f64).sqrt())
 }
 
-/// Erratum E20: 0.5, 2.6 and 7.8 arcsec at 0.12, 0.62 and 1.9 deg of nutation; the printed digits, and a
-/// tenth for the phase of the nutation, which is not told. It would take 15 deg to leave 61 arcsec.
+/// Erratum E20. With IT = 14700 as [A01] rounds it, 0.5, 2.6 and 7.8 arcsec are left about body x at 0.12,
+/// 0.62 and 1.9 deg of nutation, to the printed digits and 5 percent for the phase of the nutation, which
+/// is not told. Most of that is the rounding: with the mean of both moments, 14699.65, the asymmetry
+/// leaves 0.14, 0.72 and 2.2 arcsec. Either way it would take more than 10 deg to leave a minute of arc.
 #[test]
 fn triaxiality_cannot_leave_a_minute_of_arc() {
-    for (nutation_deg, expected) in [(0.12, 0.5), (0.62, 2.6), (1.9, 7.8)] {
-        let got = leftover(nutation_deg);
-        assert!((got / expected - 1.0).abs() < 0.15, "{nutation_deg}: {got}");
+    let mean = Inertia::principal(IMAGE).unwrap().axial_ratio;
+    for (nutation_deg, rounded, exact) in [(0.12, 0.5, 0.14), (0.62, 2.6, 0.72), (1.9, 7.8, 2.2)] {
+        let [x, _] = leftover(nutation_deg, IMAGE[2] / 14700.0);
+        assert!((x / rounded - 1.0).abs() < 0.05, "{nutation_deg}: {x}");
+        for e in leftover(nutation_deg, mean) {
+            assert!((e / exact - 1.0).abs() < 0.05, "{nutation_deg}: {e}");
+        }
     }
-    let needed = 61.0 / leftover(1.0);
-    assert!(needed > 10.0, "{needed} deg");
+    let [x, y] = leftover(10.0, mean);
+    assert!(x.max(y) < 20.0, "{x} {y}");
+    assert!(leftover(10.0, IMAGE[2] / 14700.0)[0] < 50.0);
 }
 
 /// Erratum E18: 2 (14710.5 - 14688.8) / (14710.5 + 14688.8) = 0.148 percent, and not 7.
@@ -170,5 +181,4 @@ fn transverse_moments_agree_to_a_seventh_of_a_percent() {
     assert!((200.0 * image.triaxial[0] - 0.148).abs() < 0.001);
     assert!(Inertia::principal([1.0, 1.0, 2.5]).is_err());
     assert!(Inertia::principal([1.0, -1.0, 1.0]).is_err());
-    let _ = ARCSEC_PER_RAD;
 }

@@ -100,9 +100,8 @@ fn line(
             rows.push((0.0, pair[0].span_s - pair[1].span_s, rise, spread));
         }
     }
-    let sum = |f: &dyn Fn(&(f64, f64, f64, f64)) -> f64| {
-        rows.iter().map(|r| f(r) / r.3).sum::<f64>()
-    };
+    let sum =
+        |f: &dyn Fn(&(f64, f64, f64, f64)) -> f64| rows.iter().map(|r| f(r) / r.3).sum::<f64>();
     let (aa, ab, bb) = (
         sum(&|r| r.0 * r.0),
         sum(&|r| r.0 * r.1),
@@ -110,7 +109,11 @@ fn line(
     );
     let (ay, by) = (sum(&|r| r.0 * r.2), sum(&|r| r.1 * r.2));
     let det = aa * bb - ab * ab;
-    let slope = if det > 0.0 { (aa * by - ab * ay) / det } else { 0.0 };
+    let slope = if det > 0.0 {
+        (aa * by - ab * ay) / det
+    } else {
+        0.0
+    };
     Some(if slope > 0.0 {
         [(bb * ay - ab * by) / det, (bb / det).sqrt(), slope]
     } else {
