@@ -26,6 +26,9 @@ use crate::{AssessError, Observed};
 /// Random walks that are tried, arcsec per root second.
 const WALKS: [f64; 2] = [1e-4, 10.0];
 
+/// Rounds of the bias: the remainder falls by the angle it makes, a hundredth of a radian at most.
+const ROUNDS: usize = 4;
+
 /// What the gyro route found.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GyroSolution {
@@ -81,15 +84,23 @@ pub fn gyro_solution(
             expected: "finite and not negative",
         });
     }
-    let rows = propagate(observed, rates);
-    const NEED: usize = 30;
-    if rows.len() < NEED {
-        return Err(AssessError::TooFew {
-            got: rows.len(),
-            need: NEED,
-            why: " inside the span of the gyro",
-        });
+    // the path itself turns with the bias: 1 arcsec/s is two degrees in two hours. Each round takes it off
+    let mut bias = Vector3::zeros();
+    for _ in 0..ROUNDS {
+        let rows = propagate(observed, rates, &bias);
+        const NEED: usize = 30;
+        if rows.len() < NEED {
+            return Err(AssessError::TooFew {
+                got: rows.len(),
+                need: NEED,
+                why: " inside the span of the gyro",
+            });
+        }
+        let stretches = rows.last().map_or(0, |row| row.stretch + 1);
+        let change = ordinary(&rows, stretches)?;
+        bias += change.fixed_rows::<3>(0);
     }
+    let rows = propagate(observed, rates, &bias);
     let stretches = rows.last().map_or(0, |row| row.stretch + 1);
     let unweighted = ordinary(&rows, stretches)?;
     let mut residual_arcsec: [Vec<f64>; 3] = Default::default();
@@ -114,7 +125,7 @@ pub fn gyro_solution(
         * covariance.fixed_view::<3, 3>(3, 3).into_owned()
         * turn.matrix().transpose();
     Ok(GyroSolution {
-        bias_arcsec_s: [0, 1, 2].map(|i| p[i] * ARCSEC_PER_RAD),
+        bias_arcsec_s: [0, 1, 2].map(|i| (bias[i] + p[i]) * ARCSEC_PER_RAD),
         bias_sigma_arcsec_s: [0, 1, 2].map(|i| covariance[(i, i)].sqrt() * ARCSEC_PER_RAD),
         epoch,
         epoch_sigma_arcsec: [0, 1, 2].map(|i| at_epoch[(i, i)].sqrt() * ARCSEC_PER_RAD),
@@ -134,8 +145,9 @@ fn undetermined(what: &'static str) -> AssessError {
 }
 
 /// Gyro attitude at each frame inside the gyro's span, and what goes with it.
-fn propagate(observed: &Observed, rates: &RateTable) -> Vec<Row> {
-    let (t, w) = (&rates.t_s, &rates.w);
+fn propagate(observed: &Observed, rates: &RateTable, bias: &Vector3<f64>) -> Vec<Row> {
+    let t = &rates.t_s;
+    let w: Vec<Vector3<f64>> = rates.w.iter().map(|w| w - bias).collect();
     let mut steps: Vec<f64> = t.windows(2).map(|t| t[1] - t[0]).collect();
     let step_s = median(&mut steps);
     let mut rows = Vec::new();

@@ -3,10 +3,10 @@
 //! ```text
 //! w_k = -log(q_{k+1} q_k^-1) / dt                    rate, tracker axes
 //! r_k = log(q_k (exp(-w (t_k - t_m)) q_m)^-1)        against the median rate w
-//! outlier: |r_k - median of its neighbours| beyond 8 robust sigma, on any axis
+//! outlier: |r_k - median over j = 1, 2, 3 of (r_{k-j} + r_{k+j}) / 2| beyond 8 robust sigma, any axis
 //! ```
 //!
-//! A neighbourhood is seven frames around the frame, whose median follows any slope. Signs of
+//! Means of two frames at one distance follow any slope, and one outlier spoils one of three. Signs of
 //! quaternions are made continuous; a step of more than one and a half times the median one is a gap.
 //! Nothing is filled, and everything left out is counted.
 //!
@@ -19,7 +19,7 @@ use crate::AssessError;
 
 /// Robust sigmas beyond which a frame is an outlier.
 const OUTLIER_SIGMAS: f64 = 8.0;
-/// Frames on either side of a neighbourhood.
+/// Frames on either side that say where a frame should be.
 const REACH: usize = 3;
 /// Turn between frames beyond which its direction is not safe, rad.
 const ALIAS_RAD: f64 = 2.0 * core::f64::consts::FRAC_PI_3;
@@ -90,7 +90,7 @@ impl Observed {
             counts.longest_gap_s = counts.longest_gap_s.max(*step);
         }
         let rate_rad_s = median_rate(t_s, &q, step_s)?;
-        let keep = without_outliers(t_s, &q, &rate_rad_s);
+        let keep = without_outliers(t_s, &q, &rate_rad_s, step_s);
         let row: Vec<usize> = (0..t_s.len()).filter(|k| keep[*k]).collect();
         counts.used = row.len();
         counts.outliers = t_s.len() - row.len();
@@ -193,7 +193,12 @@ fn median_rate(
 }
 
 /// Which frames stay.
-fn without_outliers(t_s: &[f64], q: &[UnitQuaternion<f64>], rate: &Vector3<f64>) -> Vec<bool> {
+fn without_outliers(
+    t_s: &[f64],
+    q: &[UnitQuaternion<f64>],
+    rate: &Vector3<f64>,
+    step_s: f64,
+) -> Vec<bool> {
     let n = t_s.len();
     let middle = n / 2;
     let coarse = |k: usize| {
@@ -212,14 +217,39 @@ fn without_outliers(t_s: &[f64], q: &[UnitQuaternion<f64>], rate: &Vector3<f64>)
             }
         }
     }
+    // frames since the last gap, and up to the next
+    let joined = |k: &usize| t_s[*k] - t_s[*k - 1] <= 1.5 * step_s;
+    let (mut since, mut until) = (vec![0; n], vec![0; n]);
+    for k in (1..n).filter(joined) {
+        since[k] = since[k - 1] + 1;
+    }
+    for k in (1..n).rev().filter(joined) {
+        until[k - 1] = until[k] + 1;
+    }
     let mut keep = vec![true; n];
     for axis in 0..3 {
         let deviation: Vec<f64> = (0..n)
             .map(|k| {
-                // at the ends the neighbourhood shrinks, so that it stays around its frame
-                let reach = REACH.min(k).min(n - 1 - k);
-                let mut near: Vec<f64> = (k - reach..=k + reach).map(|j| path[j][axis]).collect();
-                path[k][axis] - median(&mut near)
+                let (back, on) = (since[k].min(REACH), until[k].min(REACH));
+                let x = |j: usize| path[j][axis];
+                let both = back.min(on);
+                let mut said: Vec<f64> = (1..=both).map(|j| 0.5 * (x(k - j) + x(k + j))).collect();
+                // at the ends the line through two on one side
+                for (near, far) in [(1, 2), (1, 3), (2, 3)] {
+                    let (p, q) = (near as f64, far as f64);
+                    let line = |a: f64, b: f64| (q * a - p * b) / (q - p);
+                    if both < REACH && far <= back {
+                        said.push(line(x(k - near), x(k - far)));
+                    }
+                    if both < REACH && far <= on {
+                        said.push(line(x(k + near), x(k + far)));
+                    }
+                }
+                if said.is_empty() {
+                    0.0
+                } else {
+                    x(k) - median(&mut said)
+                }
             })
             .collect();
         let sigma = robust_sigma(&deviation);

@@ -22,6 +22,8 @@ use super::SpanNoise;
 const RISE_SIGMAS: f64 = 3.0;
 /// And the part of it: a smaller rise is that of a slow process, and the intercept takes it off.
 const RISE_PART: f64 = 0.08;
+/// Sigmas by which the last span may stand above the line.
+const JUMP_SIGMAS: f64 = 2.5;
 /// Longest over shortest span of a plateau, at least.
 const LEAST_RATIO: f64 = 1.99;
 
@@ -56,21 +58,46 @@ pub fn find_plateau(spans: &[SpanNoise]) -> Option<Plateau> {
         }
         on.push(span);
     }
-    let last = on[on.len() - 1];
-    if last.span_s / first.span_s < LEAST_RATIO {
-        return None;
+    // what rises at once, at the longest span, is no slow process: the line must hold there as well
+    loop {
+        let last = *on.last()?;
+        if last.span_s / first.span_s < LEAST_RATIO {
+            return None;
+        }
+        let [level, error, slope] = line(&on, &square, &variance)?;
+        let before = on[on.len() - 2];
+        let spread = (variance(before) - variance(last)).max(1e-3 * variance(last));
+        let jump = square(last) - square(before) - slope * (last.span_s - before.span_s);
+        if on.len() > 2 && jump > JUMP_SIGMAS * spread.sqrt() {
+            on.pop();
+            continue;
+        }
+        if level <= 0.0 {
+            return None;
+        }
+        let sigma = level.sqrt();
+        return Some(Plateau {
+            span_s: [first.span_s, last.span_s],
+            sigma,
+            error: error / (2.0 * sigma),
+        });
     }
+}
+
+/// `sigma^2`, its error, and `c`.
+fn line(
+    on: &[&SpanNoise],
+    square: &impl Fn(&SpanNoise) -> f64,
+    variance: &impl Fn(&SpanNoise) -> f64,
+) -> Option<[f64; 3]> {
+    let last = on.last()?;
     // independent rows: the last value, and each step down to it
     let mut rows = vec![(1.0, last.span_s, square(last), variance(last))];
     for pair in on.windows(2) {
         let spread = variance(pair[0]) - variance(pair[1]);
         if spread > 0.0 {
-            rows.push((
-                0.0,
-                pair[0].span_s - pair[1].span_s,
-                square(pair[0]) - square(pair[1]),
-                spread,
-            ));
+            let rise = square(pair[0]) - square(pair[1]);
+            rows.push((0.0, pair[0].span_s - pair[1].span_s, rise, spread));
         }
     }
     let sum =
@@ -87,19 +114,10 @@ pub fn find_plateau(spans: &[SpanNoise]) -> Option<Plateau> {
     } else {
         0.0
     };
-    let (level, error) = if slope > 0.0 {
-        ((bb * ay - ab * by) / det, (bb / det).sqrt())
+    Some(if slope > 0.0 {
+        [(bb * ay - ab * by) / det, (bb / det).sqrt(), slope]
     } else {
         // white noise cannot fall with the span: the constant, by its most efficient estimate
-        (square(last), variance(last).sqrt())
-    };
-    if level <= 0.0 {
-        return None;
-    }
-    let sigma = level.sqrt();
-    Some(Plateau {
-        span_s: [first.span_s, last.span_s],
-        sigma,
-        error: error / (2.0 * sigma),
+        [square(last), variance(last).sqrt(), 0.0]
     })
 }
