@@ -255,23 +255,29 @@ mod tests {
         }
     }
 
+    fn nearest(t: f64) -> usize {
+        (0..4000)
+            .min_by(|&a, &b| {
+                let off = |k: u32| (t - STEP * f64::from(k)).abs();
+                off(a).total_cmp(&off(b))
+            })
+            .unwrap_or_default() as usize
+    }
+
     /// White noise of the samples: acceleration and own error are uncorrelated
     /// here (5/sqrt(n)), and strongly correlated for a path through the sample.
     #[test]
     fn the_own_error_stays_out() {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(9);
         let noise: Vec<f64> = (0..4000).map(|_| StandardNormal.sample(&mut rng)).collect();
-        let motion = series(
-            |t| Vector3::y() * 1e-6 * noise[(t / STEP).round() as usize],
-            4000,
-        );
+        let motion = series(|t| Vector3::y() * 1e-6 * noise[nearest(t)], 4000);
         let t_s: Vec<f64> = (10..3990).map(|k| STEP * f64::from(k)).collect();
         let around = Around::new(&motion, &t_s);
         let correlation = |motion: &dyn AttitudeSource| {
             let (mut ae, mut aa, mut ee) = (0.0, 0.0, 0.0);
             for &t in &t_s {
                 let a = acceleration(motion, t).y;
-                let e = noise[(t / STEP).round() as usize];
+                let e = noise[nearest(t)];
                 ae += a * e;
                 aa += a * a;
                 ee += e * e;
