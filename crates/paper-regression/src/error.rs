@@ -19,6 +19,9 @@ pub enum PaperError {
     /// A distortion field cannot be drawn.
     #[error(transparent)]
     Distortion(#[from] distortion::DistortionError),
+    /// An assessment cannot be made.
+    #[error(transparent)]
+    Assess(#[from] assess::AssessError),
     /// A frame has no attitude.
     #[error("frame {frame} of {name} has no attitude")]
     NoAttitude {

@@ -1,9 +1,10 @@
 //! What the papers claim, beside what this workspace computes.
 //!
-//! [`m23::groups`] computes every row from [`Inputs`]; [`page`] writes them down. Another paper is
-//! another module beside `m23`, one file for each group of its claims.
+//! [`m23::groups`] computes the rows of one paper from [`Inputs`], [`a01::groups`] those of the other from its
+//! presets; [`page`] writes them down. One module a paper, one file for each group of its claims.
 #![forbid(unsafe_code)]
 
+pub mod a01;
 mod error;
 mod inputs;
 pub mod m23;

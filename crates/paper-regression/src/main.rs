@@ -12,7 +12,7 @@
 use std::fs;
 use std::process::ExitCode;
 
-use paper_regression::{Inputs, m23, page, same};
+use paper_regression::{Inputs, a01, m23, page, same};
 
 fn main() -> ExitCode {
     let words: Vec<String> = std::env::args().skip(1).collect();
@@ -37,7 +37,8 @@ fn main() -> ExitCode {
 
 fn run(check: bool, file: &str) -> Result<bool, String> {
     let inputs = Inputs::default();
-    let groups = m23::groups(&inputs).map_err(|e| e.to_string())?;
+    let mut groups = m23::groups(&inputs).map_err(|e| e.to_string())?;
+    groups.extend(a01::groups().map_err(|e| e.to_string())?);
     let text = page(&groups);
     let mut holds = true;
     for row in groups.iter().flat_map(|group| &group.rows) {

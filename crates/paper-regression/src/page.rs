@@ -24,7 +24,7 @@ pub fn page(groups: &[Group]) -> String {
          simulated flight with effects that the model under test lacks, and the row says which. Ranges in \
          brackets run over what is not printed, the least to the greatest. The same seeds give the same \
          page, whatever the number of threads; times, which vary, are printed by the command and are not \
-         on this page. E1 to E20 are in [errata.md](errata.md).\n\n",
+         on this page. E1 to E21 are in [errata.md](errata.md).\n\n",
     );
     for verdict in [
         Verdict::Reproduced,

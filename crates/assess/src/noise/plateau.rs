@@ -90,6 +90,8 @@ fn line(
     square: &impl Fn(&SpanNoise) -> f64,
     variance: &impl Fn(&SpanNoise) -> f64,
 ) -> Option<[f64; 3]> {
+    /// Of 1 and of the span how much, the value, and its variance.
+    type Row = (f64, f64, f64, f64);
     let last = on.last()?;
     // independent rows: the last value, and each step down to it
     let mut rows = vec![(1.0, last.span_s, square(last), variance(last))];
@@ -100,8 +102,7 @@ fn line(
             rows.push((0.0, pair[0].span_s - pair[1].span_s, rise, spread));
         }
     }
-    let sum =
-        |f: &dyn Fn(&(f64, f64, f64, f64)) -> f64| rows.iter().map(|r| f(r) / r.3).sum::<f64>();
+    let sum = |f: &dyn Fn(&Row) -> f64| rows.iter().map(|r| f(r) / r.3).sum::<f64>();
     let (aa, ab, bb) = (
         sum(&|r| r.0 * r.0),
         sum(&|r| r.0 * r.1),
