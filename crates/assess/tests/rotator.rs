@@ -1,5 +1,7 @@
 //! The rotating body: closed form against integration, conservation, and an independent program.
 
+#![expect(clippy::unwrap_used, reason = "helpers of tests")]
+
 use assess::{Body, Fitter, Free, Inertia, Observed, Rotating, axisymmetric, nutation_rates};
 use focal_plane::{AttitudeSource, rotation_from_vector, rotation_vector};
 use nalgebra::{Matrix4, Quaternion, UnitQuaternion, Vector3, Vector4};
@@ -18,7 +20,7 @@ fn body(inertia: Inertia, nutation_deg: f64) -> Body {
     }
 }
 
-/// The printed form: q_mod = [matrix of q'] q0, quaternions conjugate to those here. Rounding over a few
+/// The printed form: `q_mod = [matrix of q'] q0`, quaternions conjugate to those here. Rounding over a few
 /// products of numbers near one: 1e-14; the angles reach 200 rad, whose sine is right to 200 eps.
 #[test]
 fn the_printed_solution_is_this_one() {
