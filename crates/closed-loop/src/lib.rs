@@ -42,16 +42,13 @@ pub use close::{Closed, Rival, close};
 pub use error::CloseError;
 
 /// Seeds of a trial of alarms and the most of them that may raise one: `seeds` and
-/// `most`, or as many as `BORESIGHT_SEEDS` says and 5 sigma above `rate`.
+/// `most`, or as many as `BORESIGHT_SEEDS` says and 5 sigma above one in `rarity`.
 #[cfg(test)]
-fn many_seeds(seeds: u64, most: usize, rate: f64) -> (u64, usize) {
+fn many_seeds(seeds: u64, most: usize, rarity: usize) -> (u64, usize) {
     match option_env!("BORESIGHT_SEEDS").map(str::parse::<u32>) {
         Some(Ok(n)) => {
-            let mean = rate * f64::from(n);
-            (
-                u64::from(n),
-                most + (mean + 5.0 * mean.sqrt()).ceil() as usize,
-            )
+            let mean = (n as usize).div_ceil(rarity);
+            (u64::from(n), mean + 5 * (mean.isqrt() + 1))
         }
         _ => (seeds, most),
     }

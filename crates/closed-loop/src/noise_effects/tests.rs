@@ -85,7 +85,7 @@ fn claims(seeds: std::ops::Range<u64>, frames: usize, truth: Truth) -> [usize; 3
 /// `BORESIGHT_SEEDS` takes more; then 5 sigma of a Poisson count are allowed.
 #[test]
 fn noise_as_declared_raises_no_alarm() {
-    let (seeds, most) = crate::many_seeds(60, 2, 1.0 / 300.0);
+    let (seeds, most) = crate::many_seeds(60, 2, 300);
     for (what, truth) in [
         ("Gaussian", Truth::default()),
         // neither star, nor rate, nor spikes
