@@ -125,3 +125,69 @@ fn continued(gram: &DMatrix<f64>, carried: &DMatrix<f64>) -> DMatrix<f64> {
     let whole = gram.view((width, width), (states, states)) * carried;
     own + &cross + cross.transpose() + carried.transpose() * whole
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two columns through `e = y - m`, `m' = a (m + g e)`.
+    struct Filtered {
+        rows: usize,
+    }
+
+    impl Filtered {
+        fn value(row: usize, column: usize) -> f64 {
+            let at = row as f64 + 1.0;
+            (at * (0.7 + column as f64)).sin() + 0.01 * at
+        }
+    }
+
+    impl Design for Filtered {
+        fn width(&self) -> usize {
+            2
+        }
+        fn states(&self) -> usize {
+            1
+        }
+        fn fill(&self, frames: Range<usize>, out: &mut DMatrix<f64>) -> usize {
+            self.fill_from(frames, &mut DMatrix::zeros(1, 3), out)
+        }
+        fn fill_from(
+            &self,
+            frames: Range<usize>,
+            state: &mut DMatrix<f64>,
+            out: &mut DMatrix<f64>,
+        ) -> usize {
+            *out = DMatrix::zeros(frames.len(), 3);
+            for (at, row) in frames.enumerate() {
+                for column in 0..3 {
+                    let y = if column < 2 {
+                        Self::value(row, column)
+                    } else {
+                        0.0
+                    };
+                    let e = y - state[(0, column)];
+                    out[(at, column)] = e;
+                    state[(0, column)] = 0.95 * (state[(0, column)] + 0.2 * e);
+                }
+            }
+            out.nrows()
+        }
+    }
+
+    /// Blocks filtered apart and joined afterwards equal one filter over everything,
+    /// to the rounding of some thousand sums.
+    #[test]
+    fn a_filter_goes_on_across_blocks() {
+        let design = Filtered { rows: 1000 };
+        let folds = Folds::cut(design.rows);
+        assert!(folds.blocks.len() > 10);
+        let (whole, scalars) = BlockGrams::accumulate(&design, &folds).sum(|_| true);
+        let mut rows = DMatrix::zeros(0, 3);
+        let mut state = DMatrix::zeros(1, 3);
+        design.fill_from(0..design.rows, &mut state, &mut rows);
+        let direct = rows.columns(0, 2).transpose() * rows.columns(0, 2);
+        assert!((whole - &direct).norm() < 1e-11 * direct.norm());
+        assert!((scalars - 1000.0).abs() < 0.5);
+    }
+}

@@ -151,7 +151,7 @@ pub(crate) fn run(
         list.extend(leftover_terms(situation, &data));
         list
     };
-    let searched = star_search::run(level, &folds, candidates(), &|c| c.id() != EMPIRICAL)?;
+    let searched = star_search::run(level, &folds, &candidates, &|c| c.id() != EMPIRICAL)?;
     progress("figures");
     finish(&Finish {
         situation,

@@ -39,10 +39,10 @@ const ALTERNATIONS: usize = 2;
 pub(crate) const WIDENING: f64 = 1.3;
 /// An effect that leaves no slow error behind explains the residual in its place:
 /// it has to be this many times likelier (natural logarithm).
-const INSTEAD: f64 = 4.0;
+const INSTEAD: f64 = 6.0;
 /// ... and beyond doubt under white noise: a wandering reference looks like a step
 /// or a heater at 1e-3 in one of three runs of ten minutes, at 1e-5 in one of thirty.
-const INSTEAD_ALPHA: f64 = 1e-5;
+const INSTEAD_ALPHA: f64 = 1e-7;
 /// Most effects that are added.
 const MOST: usize = 8;
 
@@ -68,7 +68,7 @@ pub(crate) struct Searched<'a> {
 pub(crate) fn run<'a>(
     white: &StarEvidence<'a>,
     folds: &Folds,
-    candidates: Vec<Box<dyn Candidate>>,
+    candidates: &dyn Fn() -> Vec<Box<dyn Candidate>>,
     eligible: &dyn Fn(&dyn Candidate) -> bool,
 ) -> Result<Searched<'a>, CloseError> {
     let alone = white.data.free_attitude || white.residuals.len() != 1;
@@ -77,29 +77,34 @@ pub(crate) fn run<'a>(
     } else {
         declared_noise(white, folds)?
     };
-    let Some(start) = start else {
-        return Ok(Searched {
-            found: search(white, folds, candidates, eligible)?,
-            evidence: None,
-            wander: None,
-        });
-    };
-    coloured(white, folds, candidates, eligible, start)
+    if let Some(start) = start {
+        let searched = coloured(white, folds, candidates(), eligible, start)?;
+        // Less than that imitates no effect, and would only hide one.
+        if searched
+            .wander
+            .as_ref()
+            .is_some_and(|w| w.axes().contains(&true))
+        {
+            return Ok(searched);
+        }
+    }
+    Ok(Searched {
+        found: search(white, folds, candidates(), eligible)?,
+        evidence: None,
+        wander: None,
+    })
 }
 
-/// Noise of the declared model's residual, where it holds a slow error beyond doubt:
-/// less of it imitates no effect, and would only hide one.
+/// Noise of the declared model's residual, where it may hold a slow error. How much
+/// of one shows only later: what is fitted here (a distortion under drifting stars)
+/// takes some of it along.
 fn declared_noise(
     white: &StarEvidence<'_>,
     folds: &Folds,
 ) -> Result<Option<CommonNoise>, CloseError> {
     let fitted = fit(white, folds, &[])?;
-    Ok(rotations(white, folds, &fitted, &[], None).and_then(|r| {
-        let noise = r.noise(None);
-        significant(&r.slow_ratio(&noise))
-            .contains(&true)
-            .then_some(noise)
-    }))
+    let noise = rotations(white, folds, &fitted, &[], None).map(|r| r.noise(None));
+    Ok(noise.filter(|n| n.reference.iter().any(|r| r.slow > 0.0)))
 }
 
 /// Rotations of what the fit leaves, in sample.

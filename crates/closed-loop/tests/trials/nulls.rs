@@ -23,3 +23,31 @@ fn nothing_is_found_where_nothing_acts() {
         }
     }
 }
+
+/// A reference that wanders by 0.5 arcsec is named as that, alone, with its size. White evidence takes
+/// each of these for steps or heaters. A sigma over ten correlation times is known to some 25 %. About
+/// one wander in thirty does look like a step, beyond what its own noise allows: none of these does.
+#[test]
+fn a_wandering_reference_is_an_error_of_its_own() {
+    for seed in [0, 1, 3] {
+        let report = Case::new(Path::Drift, 1000 + seed)
+            .reference("wander_arcsec = [0.5, 0.5, 0.5]")
+            .close()
+            .report;
+        let ids: Vec<&str> = report.effects.iter().map(|e| e.id.as_str()).collect();
+        assert_eq!(
+            ids,
+            ["reference_error"],
+            "seed {seed}: {:?}",
+            report.effects
+        );
+        for (name, estimate) in &report.effects[0].parameters {
+            let sigma = estimate.sigma.unwrap_or(f64::INFINITY);
+            let off = (estimate.value - 0.5) / sigma;
+            assert!(
+                !name.starts_with("sigma") || off.abs() < 4.0,
+                "seed {seed}: {name} = {estimate:?}"
+            );
+        }
+    }
+}
