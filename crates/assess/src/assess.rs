@@ -319,11 +319,14 @@ impl Found {
             if noise.plateau.is_none()
                 && let Some(whiter) = &self.whiter
             {
-                noise = axis_noise(&self.t_s, &whiter[axis], step_s)?;
-                let name = ["X", "Y", "Z"][axis];
-                self.notes.push(format!(
-                    "{name}: no plateau in what the axisymmetric body leaves; that of the last model is taken"
-                ));
+                let other = axis_noise(&self.t_s, &whiter[axis], step_s)?;
+                if other.plateau.is_some() {
+                    noise = other;
+                    let name = ["X", "Y", "Z"][axis];
+                    self.notes.push(format!(
+                        "{name}: no plateau in what the axisymmetric body leaves; that of the last model is taken"
+                    ));
+                }
             }
             axes.push(noise);
         }
