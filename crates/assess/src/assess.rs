@@ -169,13 +169,16 @@ struct Found {
 
 /// White noise by second differences, for weights: `x[i+2] - 2 x[i+1] + x[i]` has 6 sigma^2.
 fn quick_noise(residual: &[Vec<f64>; 3]) -> [f64; 3] {
-    std::array::from_fn(|axis| {
+    let noise: [f64; 3] = std::array::from_fn(|axis| {
         let d: Vec<f64> = residual[axis]
             .windows(3)
             .map(|w| w[2] - 2.0 * w[1] + w[0])
             .collect();
-        (crate::observed::robust_sigma(&d) / 6.0_f64.sqrt()).max(1e-6)
-    })
+        crate::observed::robust_sigma(&d) / 6.0_f64.sqrt()
+    });
+    // an axis without noise must not outweigh the others beyond what a fit can bear
+    let most = noise.iter().fold(1e-3, |most: f64, n| most.max(*n));
+    noise.map(|n| n.max(1e-2 * most))
 }
 
 fn by_rotator(
@@ -316,11 +319,14 @@ impl Found {
             if noise.plateau.is_none()
                 && let Some(whiter) = &self.whiter
             {
-                noise = axis_noise(&self.t_s, &whiter[axis], step_s)?;
-                let name = ["X", "Y", "Z"][axis];
-                self.notes.push(format!(
-                    "{name}: no plateau in what the axisymmetric body leaves; that of the last model is taken"
-                ));
+                let other = axis_noise(&self.t_s, &whiter[axis], step_s)?;
+                if other.plateau.is_some() {
+                    noise = other;
+                    let name = ["X", "Y", "Z"][axis];
+                    self.notes.push(format!(
+                        "{name}: no plateau in what the axisymmetric body leaves; that of the last model is taken"
+                    ));
+                }
             }
             axes.push(noise);
         }

@@ -182,9 +182,11 @@ pub fn close(
         &n_eff,
     )?);
     let weighted = plain.weighted(noise_arcsec);
-    let first = weighted.fit(&aligned.model, &free, "misalignment, weighed")?;
-    let path = path(&weighted, first, start, tell)?;
-    let (last, mut considered) = keep(path, &mut added, observed)?;
+    let (last, mut considered) = match weighted.fit(&aligned.model, &free, "weighed") {
+        Ok(first) => keep(path(&weighted, first, start, tell)?, &mut added, observed)?,
+        // the aligned body stands; nothing more can be asked of such a record
+        Err(_) => (aligned.clone(), vec![]),
+    };
     considered.retain(|c| !added.iter().any(|a| a.term == c.term));
     let after_arcsec = out_of_fold(&last, observed)?;
     Ok(Closing {

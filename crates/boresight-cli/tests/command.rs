@@ -273,3 +273,132 @@ fn a_preset_is_printed_edited_and_simulated() -> Done {
     assert!(String::from_utf8(wrong.stderr)?.contains("`iht`"));
     Ok(())
 }
+
+/// Nothing but quaternions, whatever the source calls their columns.
+#[test]
+fn assess_reads_quaternions_under_any_name() -> Done {
+    let dir = tempfile::tempdir()?;
+    let bundle = dir.path().join("bundle");
+    fs::create_dir(&bundle)?;
+    fs::write(
+        bundle.join("bundle.toml"),
+        "format = \"boresight-bundle/1\"\n[columns.attitude]\nt_s = \"TIME\"\nqx = \"Q1\"\nqy = \"Q2\"\nqz = \"Q3\"\nqw = \"Q4\"\n",
+    )?;
+    // a turn of 3 deg/s about z, and an error of 10 arcsec that changes sign from frame to frame
+    let mut table = "TIME,Q1,Q2,Q3,Q4\n".to_owned();
+    for k in 0..600_i32 {
+        let t = 0.5 * f64::from(k);
+        let error = if (k * k) % 7 < 3 { 10.0 } else { -10.0 };
+        let half = 0.5 * (-3.0 * t + error / 3600.0).to_radians();
+        table.push_str(&format!("{t},0,0,{:.12},{:.12}\n", half.sin(), half.cos()));
+    }
+    fs::write(bundle.join("attitude.csv"), table)?;
+    let done = boresight()
+        .args(["assess", "--json"])
+        .arg(&bundle)
+        .output()?;
+    assert!(
+        done.status.success(),
+        "{}",
+        String::from_utf8_lossy(&done.stderr)
+    );
+    let got: serde_json::Value = serde_json::from_slice(&done.stdout)?;
+    assert_eq!(got["format"], "boresight-assess/1");
+    assert_eq!(got["method"], "rigid_rotator");
+    let total = got["total_arcsec"][2].as_f64().ok_or("total")?;
+    // +10 in five of seven frames: 10 sqrt(1 - (3/7)^2), less the rate that the fit takes off
+    assert!((total - 9.035).abs() < 0.05, "{total}");
+    let rpm = got["rotator"]["spin_rpm"].as_f64().ok_or("rpm")?;
+    assert!((rpm - 0.5).abs() < 1e-4, "{rpm}");
+    Ok(())
+}
+
+/// The page's example: IMAGE simulated and assessed, with everything that is written.
+#[test]
+fn the_assessment_of_the_page_is_that_of_the_command() -> Done {
+    let page =
+        fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/assess.md"))?;
+    let dir = tempfile::tempdir()?;
+    let lines = page.lines().filter(|l| l.starts_with("boresight "));
+    let mut commands = 0;
+    for line in lines {
+        let words = line.split_whitespace().skip(1);
+        let done = boresight().args(words).current_dir(dir.path()).output()?;
+        assert!(
+            done.status.success(),
+            "{line}: {}",
+            String::from_utf8_lossy(&done.stderr)
+        );
+        commands += 1;
+    }
+    assert_eq!(commands, 2);
+    let results = dir.path().join("results");
+    for file in [
+        "assess.json",
+        "summary.txt",
+        "noise.svg",
+        "residual.svg",
+        "residuals_attitude.parquet",
+    ] {
+        assert!(fs::metadata(results.join(file))?.len() > 0, "{file}");
+    }
+    let got: serde_json::Value = serde_json::from_slice(&fs::read(results.join("assess.json"))?)?;
+    let text = page
+        .split("```json")
+        .nth(1)
+        .and_then(|t| t.split("```").next())
+        .ok_or("json")?;
+    let shown: serde_json::Value = serde_json::from_str(text)?;
+    for (key, value) in shown.as_object().ok_or("object")? {
+        let Some(values) = value.as_array() else {
+            assert_eq!(&got[key], value, "{key}");
+            continue;
+        };
+        for (k, value) in values.iter().enumerate() {
+            let (a, b) = (
+                got[key][k].as_f64().ok_or("got")?,
+                value.as_f64().ok_or("shown")?,
+            );
+            // the printed digits: three, or two of an uncertainty
+            assert!(
+                (a - b).abs() <= 0.02 * b.abs().max(0.05) + 0.005,
+                "{key}: {a} {b}"
+            );
+        }
+    }
+    Ok(())
+}
+
+/// Recorded quaternions of two cameras, where the data are.
+#[test]
+fn assess_takes_the_recorded_cameras() -> Done {
+    let Some(data) = std::env::var_os("BORESIGHT_DATA") else {
+        return Ok(());
+    };
+    let bundle = Path::new(&data).join("tess-s1-cam1-vs-cam4");
+    let done = boresight()
+        .args(["assess", "--json"])
+        .arg(&bundle)
+        .output()?;
+    assert!(
+        done.status.success(),
+        "{}",
+        String::from_utf8_lossy(&done.stderr)
+    );
+    let got: serde_json::Value = serde_json::from_slice(&done.stdout)?;
+    assert_eq!(got["method"], "reference");
+    assert_eq!(got["frames"]["frames"], 19227);
+    for axis in 0..3 {
+        let of = |key: &str| got[key][axis].as_f64().ok_or(key.to_owned());
+        assert!(of("inherent_arcsec")? <= of("total_arcsec")?);
+        assert!(of("total_arcsec")? < 2.0);
+    }
+    // a method whose table is missing: one message, exit 2
+    let refused = boresight()
+        .args(["assess", "--method", "gyro"])
+        .arg(&bundle)
+        .output()?;
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(String::from_utf8(refused.stderr)?.contains("`rates`"));
+    Ok(())
+}

@@ -47,9 +47,18 @@ pub(crate) fn out_of_fold(fit: &Fit, observed: &Observed) -> Result<[Vec<f64>; 3
     let mut change = Vec::with_capacity(FOLDS);
     for fold in 0..FOLDS {
         let others = &all - &gram[fold];
-        let solved = others
+        // columns of one length, and a ridge: what four blocks do not determine stays as it is
+        let scale = others
+            .diagonal()
+            .map(|d| if d > 0.0 { d.sqrt().recip() } else { 0.0 });
+        let unit = DMatrix::from_fn(n, n, |i, k| {
+            let ridge = if i == k { 1e-9 } else { 0.0 };
+            others[(i, k)] * scale[i] * scale[k] + ridge
+        });
+        let wanted = (&right[fold] - &all_right).component_mul(&scale);
+        let solved = unit
             .cholesky()
-            .map(|c| c.solve(&(&right[fold] - &all_right)));
+            .map(|c| c.solve(&wanted).component_mul(&scale));
         change.push(solved.ok_or_else(|| AssessError::Fit {
             what: "four of five blocks",
             reason: "they do not determine all parameters".into(),
