@@ -30,6 +30,10 @@ pub(super) const ALIGNMENT: [[f64; 3]; 3] = [
 ];
 const SPIN_RAD_S: f64 = core::f64::consts::TAU / 120.0;
 const NUTATION_DEG: f64 = 0.7;
+/// Of the Earth.
+const MU_M3_S2: f64 = 3.986e14;
+/// Gravity gradient on IMAGE at 7400 km from the centre, its perigee, at its most.
+const PERIGEE_N_M: f64 = 0.021;
 
 pub(super) fn group() -> Result<Group, PaperError> {
     let mut rows = vec![transverse()?];
@@ -279,13 +283,21 @@ fn causes() -> Result<Vec<Row>, PaperError> {
     turned.torque_rad_s2 = across * (1e-3 / INERTIA[0]);
     let slow = motion(turned)?;
     let left = leftover(|t| at(&slow, t), ratio)?;
+    // the gravity gradient at its most: 3/2 mu / r^3 times the difference of the moments
+    let needed_n_m = 1e-3 * 61.0 / left[0].max(left[1]);
+    let radius_km = (1.5 * MU_M3_S2 * (INERTIA[2] - INERTIA[0]) / needed_n_m).cbrt() / 1000.0;
     add(
         "cause: slow torque",
         "1e-3 N m across the momentum, in inertial space",
         left,
-        "an environmental torque on IMAGE is smaller away from perigee: it cannot by itself",
-        reach(left),
-        false,
+        &format!(
+            "it can, with the spin's frequency and nothing about Z: {}e-3 N m would do, which the gravity gradient \
+             gives within {} km of the centre of the Earth; where IMAGE was is not printed",
+            digits(1e3 * needed_n_m),
+            digits(radius_km)
+        ),
+        needed_n_m < PERIGEE_N_M,
+        true,
     );
     let left = leftover(
         |t| {
