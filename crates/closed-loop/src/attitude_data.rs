@@ -16,11 +16,11 @@ use focal_plane::{ARCSEC_PER_RAD, AttitudeResidual, AttitudeSeries, AttitudeSour
 use nalgebra::{DMatrix, UnitQuaternion};
 use star_tracker::Disturbance;
 
-use crate::bins::Bins;
+use crate::bins::{Bins, MOST};
 use crate::coloured::Coloured;
 use crate::evidence::{Amplitudes, Evidence, Residuals};
 use crate::folds::Folds;
-use crate::gram::Design;
+use crate::gram::{BlockGrams, Design};
 
 /// Rows of attitude residuals, structure of arrays.
 #[derive(Clone, Debug)]
@@ -52,7 +52,7 @@ impl AttitudeData {
             theta: Default::default(),
             rate: Default::default(),
             outlier: Default::default(),
-            bins: Bins::cut(&[], &Folds::cut(0)),
+            bins: Bins::cut(&[], &Folds::cut(0), MOST),
             count: Default::default(),
             outside_reference: 0,
         };
@@ -87,7 +87,7 @@ impl AttitudeData {
 
     /// Cuts the bins and counts what counts in them.
     pub(crate) fn rebin(&mut self, folds: &Folds) {
-        self.bins = Bins::cut(&self.t_s, folds);
+        self.bins = Bins::cut(&self.t_s, folds, MOST);
         self.count = std::array::from_fn(|axis| {
             let kept =
                 |rows: &Range<usize>| rows.clone().filter(|&k| !self.outlier[axis][k]).count();
@@ -288,8 +288,8 @@ impl Evidence for AttitudeEvidence<'_> {
         1.0
     }
 
-    fn design<'a>(&'a self, candidates: &'a [&'a dyn Candidate]) -> Box<dyn Design + 'a> {
-        self.whitened(&self.binned(candidates))
+    fn grams(&self, folds: &Folds, candidates: &[&dyn Candidate]) -> BlockGrams {
+        BlockGrams::accumulate(self.whitened(&self.binned(candidates)).as_ref(), folds)
     }
 
     /// The constants of the figures are plain means over the other folds: those

@@ -13,8 +13,8 @@ use std::ops::Range;
 use crate::folds::Folds;
 use crate::star_data::median_step;
 
-/// About as many bins as a series is cut into at most.
-const MOST: usize = 2400;
+/// About as many bins as an attitude series is cut into at most.
+pub(crate) const MOST: usize = 2400;
 /// A longer step than this many medians is a gap.
 const GAP_STEPS: f64 = 1.9;
 
@@ -30,9 +30,9 @@ pub(crate) struct Bins {
 }
 
 impl Bins {
-    /// Cuts the rows at `t_s`, whose folds are `folds`.
-    pub(crate) fn cut(t_s: &[f64], folds: &Folds) -> Self {
-        let size = t_s.len().div_ceil(MOST).max(1);
+    /// Cuts the rows at `t_s`, whose folds are `folds`, into about `most` at most.
+    pub(crate) fn cut(t_s: &[f64], folds: &Folds, most: usize) -> Self {
+        let size = t_s.len().div_ceil(most).max(1);
         let gap = GAP_STEPS * median_step(t_s).unwrap_or(f64::INFINITY);
         let mut bins = Self {
             rows: Vec::new(),
@@ -71,7 +71,7 @@ mod tests {
             .map(|k| f64::from(k) + if k >= 5003 { 99.0 } else { 0.0 })
             .collect();
         let folds = Folds::cut(t_s.len());
-        let bins = Bins::cut(&t_s, &folds);
+        let bins = Bins::cut(&t_s, &folds, MOST);
         assert_eq!(bins.rows[0].start, 0);
         assert_eq!(bins.rows.last().unwrap().end, t_s.len());
         assert!(bins.rows.windows(2).all(|w| w[0].end == w[1].start));

@@ -23,13 +23,11 @@
 //! Source: Brown & Hwang 2012, ch. 4 and 5 (Gauss-Markov process, Kalman filter);
 //! statistics.md of the design notes, point 9.
 
+use std::ops::Range;
+
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
-use crate::bins::Bins;
 use crate::coloured::Coloured;
-use crate::folds::Folds;
-use crate::star_data::StarData;
-use crate::star_design::{rotation_inverse, rotation_row};
 
 /// Whiter than this over the centroids' own noise and the reference has white noise.
 const WHITE_EXCESS: f64 = 1.03;
@@ -49,68 +47,32 @@ pub(crate) struct CommonNoise {
 /// The frames' rotations as three series, and the noise of the centroids.
 #[derive(Clone, Debug)]
 pub(crate) struct Rotations {
-    bins: Bins,
+    /// Mean time of each bin, s.
+    t_s: Vec<f64>,
     /// Mean rotation of each bin per axis, arcsec.
     mean: [Vec<f64>; 3],
     /// Stars' worth of each bin: the centroid variance over it is the mean's.
     count: [Vec<f64>; 3],
     centroid: f64,
+    frames_per_bin: f64,
 }
 
 impl Rotations {
-    /// Of residuals (arcsec, per axis over all rows). `freedom` is what was fitted.
-    /// `None` where hardly any frame has an attitude of its own.
-    pub(crate) fn of(
-        data: &StarData,
-        residual: &[Vec<f64>],
-        folds: &Folds,
-        freedom: usize,
-    ) -> Option<Self> {
-        let frames = data.frames.frames();
-        let mut theta = vec![None; frames];
-        let (mut sse, mut rest) = (0.0, 0);
-        for (frame, place) in theta.iter_mut().enumerate() {
-            let Some(inverse) = rotation_inverse(data, frame) else {
-                continue;
-            };
-            let (mut moment, mut square, mut used) = (Vector3::zeros(), 0.0, 0);
-            for row in data.frames.rows_of(frame).filter(|&r| !data.outlier[r]) {
-                let jacobian = rotation_row(data, row);
-                for axis in 0..2 {
-                    moment += Vector3::from(jacobian[axis]) * residual[axis][row];
-                    square += residual[axis][row].powi(2);
-                    used += 1;
-                }
-            }
-            let rotation = inverse * moment;
-            sse += square - rotation.dot(&moment);
-            rest += used - 3;
-            *place = Some((rotation, inverse.diagonal()));
+    /// Means at `t_s`, each of as many frames as `frames_per_bin` on average.
+    pub(crate) fn new(
+        t_s: Vec<f64>,
+        mean: [Vec<f64>; 3],
+        count: [Vec<f64>; 3],
+        centroid: f64,
+        frames_per_bin: f64,
+    ) -> Self {
+        Self {
+            t_s,
+            mean,
+            count,
+            centroid,
+            frames_per_bin,
         }
-        if rest <= freedom {
-            return None;
-        }
-        let bins = Bins::cut(&data.frames.t_s, folds);
-        let series = |axis: usize| -> (Vec<f64>, Vec<f64>) {
-            bins.rows
-                .iter()
-                .map(|rows| {
-                    let (mut sum, mut count) = (0.0, 0.0);
-                    for (rotation, variance) in theta[rows.clone()].iter().flatten() {
-                        sum += rotation[axis] / variance[axis];
-                        count += 1.0 / variance[axis];
-                    }
-                    (if count > 0.0 { sum / count } else { 0.0 }, count)
-                })
-                .unzip()
-        };
-        let [x, y, z] = std::array::from_fn(series);
-        Some(Self {
-            mean: [x.0, y.0, z.0],
-            count: [x.1, y.1, z.1],
-            bins,
-            centroid: (sse / (rest - freedom) as f64).sqrt(),
-        })
     }
 
     /// The noise of greatest likelihood; started from `near` where there is one.
@@ -122,8 +84,8 @@ impl Rotations {
                     white: self.total_white(axis, known.white),
                     ..known
                 }
-                .refit(&self.bins.t_s, y, count),
-                _ => Coloured::fit(&self.bins.t_s, y, count),
+                .refit(&self.t_s, y, count),
+                _ => Coloured::fit(&self.t_s, y, count),
             };
             self.beside_centroids(axis, fitted)
         });
@@ -150,7 +112,7 @@ impl Rotations {
                 slow: 0.0,
                 tau_s: 1.0,
             };
-            let t_s = &self.bins.t_s;
+            let t_s = &self.t_s;
             2.0 * (with.log_likelihood(t_s, y, count) - without.log_likelihood(t_s, y, count))
         })
     }
@@ -162,7 +124,7 @@ impl Rotations {
             white: self.total_white(axis, known.white),
             ..known
         }
-        .relative_sigma(&self.bins.t_s, &self.mean[axis], &self.count[axis])
+        .relative_sigma(&self.t_s, &self.mean[axis], &self.count[axis])
     }
 
     /// White noise of a rotation in the unit of a centroid.
@@ -187,14 +149,7 @@ impl Rotations {
     fn usual_count(&self, axis: usize) -> f64 {
         let kept = self.count[axis].iter().filter(|c| **c > 0.0).count().max(1);
         // a bin averages the reference's white noise as it does the centroids'
-        let rows = self
-            .bins
-            .rows
-            .iter()
-            .map(ExactSizeIterator::len)
-            .sum::<usize>();
-        self.count[axis].iter().sum::<f64>() / kept as f64 * self.bins.rows.len() as f64
-            / rows.max(1) as f64
+        self.count[axis].iter().sum::<f64>() / (kept as f64 * self.frames_per_bin)
     }
 }
 
@@ -209,32 +164,32 @@ impl CommonNoise {
     }
 }
 
-/// One frame of the filter.
+/// One bin of the filter.
 #[derive(Clone, Debug)]
 struct Step {
     decay: Vector3<f64>,
     gain: Matrix3<f64>,
-    /// L^-1 with F = L L^T.
-    whitening: Matrix3<f64>,
-    inverse: Matrix3<f64>,
-    /// The frame has an attitude.
-    solved: bool,
+    /// L^-1 with F = L L^T; `None`: the bin has no attitude.
+    whitening: Option<Matrix3<f64>>,
 }
 
 /// The filter with its gains: they depend on times and stars alone.
 #[derive(Clone, Debug)]
-pub(crate) struct Whitener {
+pub(crate) struct Filter {
     steps: Vec<Step>,
-    pub(crate) centroid: f64,
-    /// What the log-likelihood of the whitened scalars lacks, nats.
+    /// What the log-likelihood of the innovations lacks, nats.
     pub(crate) log_scale: f64,
 }
 
-/// States that the filter carries.
-pub(crate) const STATES: usize = 3;
-
-impl Whitener {
-    pub(crate) fn new(data: &StarData, noise: &CommonNoise) -> Self {
+impl Filter {
+    /// For bins at `t_s` of so many `frames`, with the inverse normal matrix of each
+    /// bin's rotation.
+    pub(crate) fn new(
+        noise: &CommonNoise,
+        t_s: &[f64],
+        frames: &[usize],
+        inverse: &[Option<Matrix3<f64>>],
+    ) -> Self {
         let per_axis =
             |f: fn(&Coloured) -> f64| Vector3::from_iterator(noise.reference.iter().map(f));
         let slow = per_axis(|r| r.slow * r.slow);
@@ -242,12 +197,12 @@ impl Whitener {
         let variance = noise.centroid * noise.centroid;
         let mut covariance = Matrix3::from_diagonal(&slow);
         let mut log_scale = 0.0;
-        let mut steps = Vec::with_capacity(data.frames.frames());
-        for frame in 0..data.frames.frames() {
-            let decay = if frame == 0 {
+        let mut steps = Vec::with_capacity(t_s.len());
+        for (bin, inverse) in inverse.iter().enumerate() {
+            let decay = if bin == 0 {
                 Vector3::zeros()
             } else {
-                let step = data.frames.t_s[frame] - data.frames.t_s[frame - 1];
+                let step = t_s[bin] - t_s[bin - 1];
                 per_axis(|r| r.tau_s).map(|tau| (-step / tau).exp())
             };
             let d = Matrix3::from_diagonal(&decay);
@@ -256,105 +211,49 @@ impl Whitener {
             let mut step = Step {
                 decay,
                 gain: Matrix3::zeros(),
-                whitening: Matrix3::zeros(),
-                inverse: Matrix3::zeros(),
-                solved: false,
+                whitening: None,
             };
-            if let Some(inverse) = rotation_inverse(data, frame)
-                && let Some(factor) = (covariance + inverse * variance + white).cholesky()
+            if let Some(inverse) = inverse
+                && let Some(factor) =
+                    (covariance + inverse * variance + white / frames[bin] as f64).cholesky()
                 && let Some(whitening) = factor.l().try_inverse()
             {
-                let gain = covariance * factor.inverse();
-                covariance -= gain * covariance;
+                step.gain = covariance * factor.inverse();
+                covariance -= step.gain * covariance;
                 covariance = 0.5 * (covariance + covariance.transpose());
-                let used = data
-                    .frames
-                    .rows_of(frame)
-                    .filter(|&r| !data.outlier[r])
-                    .count();
-                log_scale += whitening.determinant().ln() + 0.5 * inverse.determinant().ln()
-                    - (2 * used - STATES) as f64 * noise.centroid.ln();
-                step = Step {
-                    gain,
-                    whitening,
-                    inverse,
-                    solved: true,
-                    ..step
-                };
+                log_scale += whitening.determinant().ln() + 0.5 * inverse.determinant().ln();
+                step.whitening = Some(whitening);
             }
             steps.push(step);
         }
-        Self {
-            steps,
-            centroid: noise.centroid,
-            log_scale,
-        }
+        Self { steps, log_scale }
     }
 
-    /// Whitens the rows of `frames` (x of every row, then y; outliers zero), with
-    /// columns for the states behind them: `state` is what the filter predicts for
-    /// each column, and for unit starts of each state. Writes the rest of every row
-    /// and then three innovations a frame; returns the scalars that count.
-    pub(crate) fn apply(
+    /// Whitened innovations of `columns` of `theta` (three rows a bin) at `steps`;
+    /// `state` is what the filter predicts for each column, and goes on.
+    pub(crate) fn innovations(
         &self,
-        data: &StarData,
-        frames: std::ops::Range<usize>,
-        raw: &DMatrix<f64>,
-        state: &mut DMatrix<f64>,
-        out: &mut DMatrix<f64>,
-    ) -> usize {
-        let (n, width) = (raw.nrows() / 2, raw.ncols());
-        let height = 2 * n + STATES * frames.len();
-        if out.shape() != (height, width + STATES) {
-            *out = DMatrix::zeros(height, width + STATES);
-        }
-        out.fill(0.0);
-        let first = data.frames.first_row[frames.start];
-        let mut scalars = 0;
-        let mut jacobian = Vec::new();
-        for (at, frame) in frames.enumerate() {
-            let step = &self.steps[frame];
-            let rows = data.frames.rows_of(frame);
-            jacobian.clear();
-            jacobian.extend(
-                rows.clone()
-                    .filter(|&r| !data.outlier[r])
-                    .map(|r| (r - first, rotation_row(data, r))),
-            );
-            for column in 0..width + STATES {
-                let mut mean = Vector3::from_fn(|k, _| step.decay[k] * state[(k, column)]);
-                if step.solved {
-                    let mut theta = Vector3::zeros();
-                    if column < width {
-                        let mut moment = Vector3::zeros();
-                        for (i, [x, y]) in &jacobian {
-                            moment += Vector3::from(*x) * raw[(*i, column)]
-                                + Vector3::from(*y) * raw[(n + i, column)];
-                        }
-                        theta = step.inverse * moment;
-                        for (i, [x, y]) in &jacobian {
-                            for (row, a) in [(*i, x), (n + i, y)] {
-                                out[(row, column)] = (raw[(row, column)]
-                                    - Vector3::from(*a).dot(&theta))
-                                    / self.centroid;
-                            }
-                        }
-                    }
-                    let innovation = theta - mean;
-                    let white = step.whitening * innovation;
-                    for k in 0..STATES {
-                        out[(2 * n + STATES * at + k, column)] = white[k];
-                    }
+        steps: Range<usize>,
+        theta: &DMatrix<f64>,
+        columns: &[usize],
+        state: &mut [Vector3<f64>],
+    ) -> DMatrix<f64> {
+        let mut out = DMatrix::zeros(theta.nrows(), columns.len());
+        for ((&column, state), mut out) in
+            columns.iter().zip(state).zip(out.column_iter_mut())
+        {
+            let theta = theta.column(column);
+            for (bin, step) in self.steps[steps.clone()].iter().enumerate() {
+                let mut mean = state.component_mul(&step.decay);
+                if let Some(whitening) = &step.whitening {
+                    let innovation = theta.fixed_rows::<3>(3 * bin) - mean;
+                    out.fixed_rows_mut::<3>(3 * bin)
+                        .copy_from(&(whitening * innovation));
                     mean += step.gain * innovation;
                 }
-                for k in 0..STATES {
-                    state[(k, column)] = mean[k];
-                }
-            }
-            if step.solved {
-                scalars += 2 * jacobian.len();
+                *state = mean;
             }
         }
-        scalars
+        out
     }
 }

@@ -10,7 +10,7 @@ use effects::Candidate;
 use nalgebra::DVector;
 
 use crate::folds::Folds;
-use crate::gram::Design;
+use crate::gram::BlockGrams;
 
 /// Amplitudes to predict with: of each fold from the others.
 #[derive(Clone, Debug)]
@@ -38,13 +38,8 @@ pub(crate) trait Evidence: Sync {
     fn residual_columns(&self) -> usize;
     /// First guess of the noise variance of a scalar of the design.
     fn variance_guess(&self) -> f64;
-    /// What the log-likelihood of the design's scalars lacks to that of the
-    /// measurements in arcsec, nats.
-    fn log_scale(&self) -> f64 {
-        0.0
-    }
-    /// The columns with `candidates` in them.
-    fn design<'a>(&'a self, candidates: &'a [&'a dyn Candidate]) -> Box<dyn Design + 'a>;
+    /// The normal equations with `candidates` in them, block by block.
+    fn grams(&self, folds: &Folds, candidates: &[&dyn Candidate]) -> BlockGrams;
     /// Out-of-fold residuals of every row, outliers included.
     fn residuals(
         &self,

@@ -276,6 +276,26 @@ impl Fits {
         })
     }
 
+    /// As [`new`](Self::new), on all data alone: for what asks nothing of the folds.
+    pub(crate) fn whole(grams: &BlockGrams, layout: &Layout, variance: f64) -> Option<Self> {
+        let all = Eliminated::new(grams, layout, variance, None, |_| true, |_| false)?;
+        Some(Self {
+            folds: Vec::new(),
+            all,
+            blocks: grams.gram.len(),
+        })
+    }
+
+    /// Amplitudes of nuisance and candidate columns `set`, from all data.
+    pub(crate) fn solution(&self, set: &[usize]) -> Option<DVector<f64>> {
+        let (beta, _) = self.all.amplitudes(set)?;
+        let nuisance = self.nuisance(None, set, &beta);
+        Some(DVector::from_iterator(
+            nuisance.len() + beta.len(),
+            nuisance.iter().chain(beta.iter()).copied(),
+        ))
+    }
+
     /// Out-of-fold error of the candidate columns `set`; `None` if they cannot
     /// be told apart in some fold.
     pub(crate) fn out_of_fold(&self, set: &[usize]) -> Option<OutOfFold> {

@@ -33,7 +33,7 @@ use crate::images::{DARK_MAP, DARK_MAP_FILE, EFFECTIVE_PSF, Formed};
 use crate::search::{amplitudes, borrowed, fit};
 use crate::selection::{FAMILY_ALPHA, columns_of};
 use crate::star_data::StarData;
-use crate::star_design::StarEvidence;
+use crate::star_evidence::StarEvidence;
 
 /// Centroids formed with or without a map.
 pub(crate) struct Side<'a> {

@@ -24,12 +24,12 @@ use nalgebra::{DMatrix, DVector, Vector3};
 use spectra::{LombScargle, LombScargleSettings, robust};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use crate::bins::Bins;
+use crate::bins::{self, Bins};
 use crate::coloured::Coloured;
 use crate::folds::Folds;
 use crate::selection::FAMILY_ALPHA;
 use crate::star_data::{StarData, median_step};
-use crate::star_design::{rotation_inverse, rotation_row};
+use crate::frame_rotation::{rotation_inverse, rotation_row};
 use crate::star_search::WIDENING;
 use telemetry::report::Unattributed;
 
@@ -193,7 +193,7 @@ impl Track {
         if size == 1 {
             rows.extend((0..self.t_s.len()).map(|k| k..k + 1));
         } else {
-            rows = Bins::cut(&self.t_s, &folds).rows;
+            rows = Bins::cut(&self.t_s, &folds, bins::MOST).rows;
         }
         let mut out = Self {
             t_s: Vec::new(),

@@ -22,6 +22,7 @@ mod evidence;
 mod figures;
 mod fit;
 mod folds;
+mod frame_rotation;
 mod gram;
 mod image_level;
 mod images;
@@ -34,7 +35,9 @@ mod search;
 mod selection;
 mod situation;
 mod star_data;
-mod star_design;
+mod star_columns;
+mod star_evidence;
+mod star_moments;
 mod star_loop;
 mod star_search;
 

@@ -35,7 +35,7 @@ use crate::search::{Found, borrowed};
 use crate::selection::columns_of;
 use crate::situation::Situation;
 use crate::star_data::StarData;
-use crate::star_design::StarEvidence;
+use crate::star_evidence::StarEvidence;
 use judge::{Judged, judge};
 use rows::{Row, Source};
 

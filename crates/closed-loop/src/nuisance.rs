@@ -14,11 +14,14 @@
 //!
 //! Source: [M23] Eq. 5-8 and Section 2.3.
 
+use std::ops::Range;
+
 use distortion::{DistortionField, monomial_moment};
 use focal_plane::Pixel;
 use nalgebra::Vector3;
 use telemetry::Model;
 
+use crate::star_columns::Filled;
 use crate::star_data::StarData;
 
 /// 99 % point of the ratio between the spread of one draw's coefficients and
@@ -85,63 +88,55 @@ impl StarNuisance {
         precision
     }
 
-    /// How many columns there are.
-    pub(crate) fn columns(&self) -> usize {
-        3 * usize::from(self.misalignment.is_some())
-            + self.distortion.map_or(0, |_| 2 * (self.moments.len() - 1))
-            + 2 * self.directions
+    /// Columns of the misalignment, polynomials of an axis, columns of the directions.
+    pub(crate) fn parts(&self) -> (usize, usize, usize) {
+        (
+            3 * usize::from(self.misalignment.is_some()),
+            self.distortion.map_or(0, |_| self.moments.len() - 1),
+            2 * self.directions,
+        )
     }
 
-    /// Calls `put(column, dx, dy)` for every non-zero entry of one row, in arcsec
-    /// per arcsec.
-    pub(crate) fn row(
-        &self,
-        data: &StarData,
-        frame: usize,
-        row: usize,
-        scratch: &mut Vec<f64>,
-        put: &mut impl FnMut(usize, f64, f64),
-    ) {
-        let at = Pixel {
-            x: data.modelled[0][row],
-            y: data.modelled[1][row],
-        };
+    /// Writes the entries of the rows of `frames`, arcsec per arcsec, into zeros.
+    pub(crate) fn fill(&self, data: &StarData, frames: Range<usize>, out: &mut Filled) {
+        let first = data.frames.first_row[frames.start];
         let scale = data.camera.arcsec_per_px();
         let per_rad = scale.map(|s| s / focal_plane::ARCSEC_PER_RAD);
-        let mut column = 0;
-        if self.misalignment.is_some() {
-            let jacobian = data.camera.rotation_jacobian(at);
-            for k in 0..3 {
-                put(
-                    column,
-                    jacobian[0][k] * per_rad[0],
-                    jacobian[1][k] * per_rad[1],
-                );
-                column += 1;
-            }
-        }
-        if let Some((order, _)) = self.distortion {
-            let n = data.camera.normalised(at);
-            scratch.resize((order + 1) * (order + 1), 0.0);
-            DistortionField::basis_into(order, n, scratch);
-            for k in 1..self.moments.len() {
-                let value = scratch[k] - self.moments[k];
-                put(column, value, 0.0);
-                put(column + 1, 0.0, value);
-                column += 2;
-            }
-        }
-        if self.directions > 0 {
-            let u = data.stars[data.star[row]].direction;
-            let [east, north] = tangent_axes(&u);
-            let q = &data.attitude[frame];
-            let v = q * u;
-            for (k, axis) in [east, north].into_iter().enumerate() {
-                let d = q * axis;
-                // derivative of (X/Z, Y/Z)
-                let dx = (d.x - v.x / v.z * d.z) / v.z;
-                let dy = (d.y - v.y / v.z * d.z) / v.z;
-                put(column + 2 * data.star[row] + k, dx, dy);
+        let (misalignment, polynomials, _) = self.parts();
+        let mut basis = vec![0.0; self.moments.len()];
+        for frame in frames {
+            for row in data.frames.rows_of(frame) {
+                let i = row - first;
+                let at = Pixel {
+                    x: data.modelled[0][row],
+                    y: data.modelled[1][row],
+                };
+                if misalignment > 0 {
+                    let jacobian = data.camera.rotation_jacobian(at);
+                    for axis in 0..2 {
+                        for k in 0..3 {
+                            out.own[axis][(i, k)] = jacobian[axis][k] * per_rad[axis];
+                        }
+                    }
+                }
+                if let Some((order, _)) = self.distortion {
+                    DistortionField::basis_into(order, data.camera.normalised(at), &mut basis);
+                    for k in 0..polynomials {
+                        out.shared[(i, k)] = basis[k + 1] - self.moments[k + 1];
+                    }
+                }
+                if self.directions > 0 {
+                    let u = data.stars[data.star[row]].direction;
+                    let q = &data.attitude[frame];
+                    let v = q * u;
+                    for (k, across) in tangent_axes(&u).into_iter().enumerate() {
+                        let d = q * across;
+                        let column = misalignment + 2 * data.star[row] + k;
+                        // derivative of (X/Z, Y/Z)
+                        out.own[0][(i, column)] = (d.x - v.x / v.z * d.z) / v.z;
+                        out.own[1][(i, column)] = (d.y - v.y / v.z * d.z) / v.z;
+                    }
+                }
             }
         }
     }

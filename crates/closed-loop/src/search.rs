@@ -37,6 +37,9 @@ pub(crate) struct Fitted {
     pub(crate) groups: Vec<Group>,
     /// Independent scalars in the data.
     pub(crate) scalars: f64,
+    /// What the log-likelihood of the scalars lacks to that of the measurements in
+    /// arcsec, nats.
+    pub(crate) log_scale: f64,
 }
 
 /// Accumulates and eliminates; the noise variance that weighs the priors is
@@ -46,12 +49,7 @@ pub(crate) fn fit(
     folds: &Folds,
     candidates: &[&dyn Candidate],
 ) -> Result<Fitted, CloseError> {
-    fit_design(
-        evidence,
-        evidence.design(candidates).as_ref(),
-        folds,
-        candidates,
-    )
+    fit_grams(evidence, &evidence.grams(folds, candidates), folds, candidates)
 }
 
 /// As [`fit`], on columns that are there already.
@@ -62,6 +60,16 @@ pub(crate) fn fit_design(
     candidates: &[&dyn Candidate],
 ) -> Result<Fitted, CloseError> {
     let grams = BlockGrams::accumulate(design, folds);
+    fit_grams(evidence, &grams, folds, candidates)
+}
+
+/// As [`fit`], on normal equations that are there already.
+pub(crate) fn fit_grams(
+    evidence: &dyn Evidence,
+    grams: &BlockGrams,
+    folds: &Folds,
+    candidates: &[&dyn Candidate],
+) -> Result<Fitted, CloseError> {
     let layout = Layout {
         nuisance_precision: evidence.precision(),
         candidates: candidates.iter().map(|c| c.coefficients().len()).sum(),
@@ -70,7 +78,7 @@ pub(crate) fn fit_design(
     let mut variance = evidence.variance_guess();
     let mut fits = None;
     for _ in 0..2 {
-        let found = Fits::new(&grams, folds, &layout, variance).ok_or(CloseError::Singular)?;
+        let found = Fits::new(grams, folds, &layout, variance).ok_or(CloseError::Singular)?;
         variance = found
             .variance(&[])
             .unwrap_or(variance)
@@ -106,6 +114,7 @@ pub(crate) fn fit_design(
         fits,
         groups,
         scalars,
+        log_scale: grams.log_scale,
     })
 }
 
@@ -136,19 +145,18 @@ pub(crate) struct Found {
     pub(crate) selection: Selection,
 }
 
-/// Runs rounds of selection and polish. Candidates for which `eligible` is false
-/// are judged but never chosen.
+/// Runs rounds of selection and polish. Candidates that not `may` be chosen are
+/// judged.
 pub(crate) fn search(
     evidence: &dyn Evidence,
     folds: &Folds,
     mut candidates: Vec<Box<dyn Candidate>>,
-    eligible: &dyn Fn(&dyn Candidate) -> bool,
+    may: &[bool],
 ) -> Result<Found, CloseError> {
     let mut before: Vec<usize> = Vec::new();
     for round in 1.. {
         let fitted = fit(evidence, folds, &borrowed(&candidates))?;
-        let may: Vec<bool> = candidates.iter().map(|c| eligible(c.as_ref())).collect();
-        let selection = select(&fitted.fits, &fitted.groups, &may, fitted.scalars);
+        let selection = select(&fitted.fits, &fitted.groups, may, fitted.scalars);
         let settled = selection.chosen == before || round == ROUNDS;
         if selection.chosen.is_empty() || settled {
             return Ok(Found {

@@ -33,7 +33,8 @@ use crate::search::{Found, amplitudes, borrowed, fit};
 use crate::selection::columns_of;
 use crate::situation::Situation;
 use crate::star_data::{Inputs, Star, StarData, median_step};
-use crate::star_design::{StarEvidence, rotation_of};
+use crate::frame_rotation::rotation_of;
+use crate::star_evidence::StarEvidence;
 use crate::star_search::{self, Wander};
 use spectra::robust;
 
@@ -209,7 +210,7 @@ fn evidence<'a>(
         motion,
         // circular to per axis
         sigma_guess_arcsec: temporal.map_or(1.0, |s| s / std::f64::consts::SQRT_2),
-        whitener: None,
+        noise: None,
     }
 }
 
@@ -426,7 +427,7 @@ fn finish(f: &Finish<'_>) -> Result<Closed, CloseError> {
         .fitted
         .fits
         .out_of_fold(&set)
-        .map(|o| o.total_loglik() + f.level.log_scale());
+        .map(|o| o.total_loglik() + f.found.fitted.log_scale);
     let outliers = f.data.outlier.iter().filter(|o| **o).count();
     let report = Report {
         format: telemetry::report::REPORT_FORMAT.to_owned(),
@@ -498,7 +499,7 @@ fn finish(f: &Finish<'_>) -> Result<Closed, CloseError> {
 fn excess(f: &Finish<'_>, power: f64) -> f64 {
     let rows = f.data.outlier.iter().filter(|o| !**o).count() as f64;
     f.situation.model.noise.temporal_arcsec.map_or(0.0, |s| {
-        let unit = f.level.whitener.as_ref().map_or(1.0, |w| w.centroid);
+        let unit = f.level.noise.map_or(1.0, |n| n.centroid);
         (rows * power - 0.5 * s * s * f.found.fitted.scalars).max(0.0) / (unit * unit)
     })
 }

@@ -18,17 +18,20 @@
 //! Source: Wilks 1938 (likelihood ratio).
 
 use effects::Candidate;
-use nalgebra::DVector;
+use rayon::prelude::*;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use crate::common_noise::{CommonNoise, Rotations};
 use crate::error::CloseError;
-use crate::evidence::{Amplitudes, Evidence};
-use crate::fit::Estimate;
+use crate::evidence::Evidence;
+use crate::fit::{Estimate, Fits, Layout};
 use crate::folds::Folds;
-use crate::search::{Fitted, Found, borrowed, fit, polish, search};
-use crate::selection::{FAMILY_ALPHA, Judgement, Selection, columns_of, judged, price, ranked};
-use crate::star_design::StarEvidence;
+use crate::search::{Found, borrowed, fit_grams, polish, search};
+use crate::selection::{
+    FAMILY_ALPHA, Group, Judgement, Selection, columns_of, judged, price, ranked,
+};
+use crate::star_evidence::StarEvidence;
+use crate::star_moments::StarMoments;
 
 /// Candidates of each list that are scored.
 const SHORTLIST: usize = 3;
@@ -39,10 +42,12 @@ const ALTERNATIONS: usize = 2;
 pub(crate) const WIDENING: f64 = 1.3;
 /// An effect that leaves no slow error behind explains the residual in its place:
 /// it has to be this many times likelier (natural logarithm).
-const INSTEAD: f64 = 6.0;
-/// ... and beyond doubt under white noise: a wandering reference looks like a step
-/// or a heater at 1e-3 in one of three runs of ten minutes, at 1e-5 in one of thirty.
-const INSTEAD_ALPHA: f64 = 1e-7;
+const INSTEAD: f64 = 4.5;
+/// Chance under white noise below which a slow error is not even a suspicion.
+const SUSPICION: f64 = 0.3;
+/// What looks like a slow error of the reference has to be this far from chance
+/// where one is suspected.
+const SUSPECT_ALPHA: f64 = 1e-3;
 /// Most effects that are added.
 const MOST: usize = 8;
 
@@ -77,22 +82,36 @@ pub(crate) fn run<'a>(
     } else {
         declared_noise(white, folds)?
     };
+    let mut suspected = false;
     if let Some(start) = start {
         let searched = coloured(white, folds, candidates(), eligible, start)?;
         // Less than that imitates no effect, and would only hide one.
-        if searched
-            .wander
-            .as_ref()
-            .is_some_and(|w| w.axes().contains(&true))
-        {
-            return Ok(searched);
+        if let Some(wander) = &searched.wander {
+            if wander.axes().contains(&true) {
+                return Ok(searched);
+            }
+            suspected = chances(&wander.ratio).iter().any(|p| *p < SUSPICION);
         }
     }
-    Ok(Searched {
-        found: search(white, folds, candidates(), eligible)?,
-        evidence: None,
-        wander: None,
-    })
+    let mut list = candidates();
+    let mut may: Vec<bool> = list.iter().map(|c| eligible(c.as_ref())).collect();
+    loop {
+        let found = search(white, folds, list, &may)?;
+        let imitator = found.selection.chosen.iter().copied().find(|&g| {
+            suspected
+                && found.candidates[g].acts_on_attitude()
+                && found.selection.judged[g].p_value > SUSPECT_ALPHA
+        });
+        let Some(imitator) = imitator else {
+            return Ok(Searched {
+                found,
+                evidence: None,
+                wander: None,
+            });
+        };
+        may[imitator] = false;
+        list = candidates();
+    }
 }
 
 /// Noise of the declared model's residual, where it may hold a slow error. How much
@@ -102,35 +121,16 @@ fn declared_noise(
     white: &StarEvidence<'_>,
     folds: &Folds,
 ) -> Result<Option<CommonNoise>, CloseError> {
-    let fitted = fit(white, folds, &[])?;
-    let noise = rotations(white, folds, &fitted, &[], None).map(|r| r.noise(None));
-    Ok(noise.filter(|n| n.reference.iter().any(|r| r.slow > 0.0)))
-}
-
-/// Rotations of what the fit leaves, in sample.
-fn rotations(
-    white: &StarEvidence<'_>,
-    folds: &Folds,
-    fitted: &Fitted,
-    candidates: &[&dyn Candidate],
-    estimate: Option<&Estimate>,
-) -> Option<Rotations> {
-    let all: Vec<usize> = (0..fitted.groups.len()).collect();
-    let set = columns_of(&fitted.groups, &all);
-    let columns = candidates.iter().map(|c| c.coefficients().len()).sum();
-    let mut beta = DVector::zeros(columns);
-    let value = estimate.map_or_else(|| DVector::zeros(0), |e| e.value.clone());
-    for (i, &c) in set.iter().enumerate() {
-        beta[c] = value[i];
-    }
-    let amplitudes = Amplitudes {
-        nuisance: vec![fitted.fits.nuisance(None, &set, &value)],
-        candidates: vec![beta],
+    let moments = white.moments(folds, &[]);
+    let trial = Trial {
+        moments: &moments,
+        folds,
+        precision: white.precision(),
+        variance: white.variance_guess(),
+        groups: &[],
     };
-    let whole = Folds::whole(white.data.frames.frames());
-    let left = white.residuals(&whole, candidates, &amplitudes);
-    let freedom = white.nuisance.columns() + set.len();
-    Rotations::of(white.data, &left.axes, folds, freedom)
+    let noise = trial.taken_out(&trial.columns(&[]));
+    Ok(noise.filter(|n| n.reference.iter().any(|r| r.slow > 0.0)))
 }
 
 /// A hypothesis at its best noise.
@@ -147,78 +147,114 @@ struct Scored {
 
 impl Scored {
     /// Whether this hypothesis does without the slow error that `other` needs;
-    /// `white_p` is what white evidence says of what it adds.
-    fn stands_instead(&self, other: &Self, white_p: f64) -> bool {
+    /// `white` is what white evidence says of what it adds.
+    fn stands_instead(&self, other: &Self, white: &Judgement) -> bool {
         let slow = |s: &Self| significant(&s.rotations.slow_ratio(&s.noise)).contains(&true);
-        white_p < INSTEAD_ALPHA
-            && self.loglik > other.loglik + INSTEAD
-            && !slow(self)
-            && slow(other)
+        white.stands() && self.loglik > other.loglik + INSTEAD && !slow(self) && slow(other)
     }
 }
 
-/// The list of candidates, and what scores them.
-struct Trial<'a, 'd> {
-    white: &'a StarEvidence<'d>,
+/// What scores hypotheses: everything comes from one pass over the data.
+struct Trial<'a> {
+    moments: &'a StarMoments,
     folds: &'a Folds,
-    candidates: &'a [Box<dyn Candidate>],
+    /// Of the nuisance.
+    precision: Vec<f64>,
+    /// Of a scalar of white evidence.
+    variance: f64,
+    groups: &'a [Group],
 }
 
-impl Trial<'_, '_> {
+impl Trial<'_> {
+    /// Nuisance, the columns of `chosen`, and the residual.
+    fn columns(&self, chosen: &[usize]) -> Vec<usize> {
+        let n = self.precision.len();
+        (0..n)
+            .chain(columns_of(self.groups, chosen).into_iter().map(|c| n + c))
+            .chain([self.moments.width() - 1])
+            .collect()
+    }
+
+    fn layout(&self, columns: &[usize]) -> Layout {
+        Layout {
+            nuisance_precision: self.precision.clone(),
+            candidates: columns.len() - self.precision.len() - 1,
+            residuals: 1,
+        }
+    }
+
+    /// Noise of what is left once white evidence has fitted all of `columns`.
+    fn taken_out(&self, columns: &[usize]) -> Option<CommonNoise> {
+        let grams = self.moments.white_of(columns);
+        let layout = self.layout(columns);
+        let fits = Fits::whole(&grams, &layout, self.variance)?;
+        let all: Vec<usize> = (0..layout.candidates).collect();
+        let solution = fits.solution(&all)?;
+        let rotations = self
+            .moments
+            .rotations(columns, &solution, solution.len())?;
+        Some(rotations.noise(None))
+    }
+
     /// `chosen` at the better of two starts: all that fits taken out, or `noise`.
     fn score(&self, chosen: &[usize], noise: &CommonNoise) -> Option<Scored> {
-        let list: Vec<&dyn Candidate> = chosen
+        let columns = self.columns(chosen);
+        let (noise, rotations, loglik) = [self.taken_out(&columns), Some(*noise)]
+            .into_iter()
+            .flatten()
+            .filter_map(|start| self.climb(&columns, &start))
+            .max_by(|a, b| a.2.total_cmp(&b.2))?;
+        let layout = self.layout(&columns);
+        let grams = self.moments.under(&columns, &noise);
+        let fits = Fits::new(&grams, self.folds, &layout, 1.0)?;
+        let all: Vec<usize> = (0..layout.candidates).collect();
+        let estimate = fits.estimate(&all)?;
+        let mut first = 0;
+        let parts = chosen
             .iter()
-            .map(|&g| self.candidates[g].as_ref())
+            .map(|&g| {
+                let group = &self.groups[g];
+                let own = first..first + group.columns.len();
+                first = own.end;
+                let credible = own
+                    .clone()
+                    .zip(&group.bounds)
+                    .all(|(i, [low, high])| (*low..=*high).contains(&estimate.value[i]));
+                (own, credible)
+            })
             .collect();
-        let taken_out = {
-            let fitted = fit(self.white, self.folds, &list).ok()?;
-            let all: Vec<usize> = (0..list.len()).collect();
-            let estimate = fitted.fits.estimate(&columns_of(&fitted.groups, &all))?;
-            rotations(self.white, self.folds, &fitted, &list, Some(&estimate))?.noise(None)
-        };
-        [taken_out, *noise]
-            .iter()
-            .filter_map(|start| self.climb(&list, start))
-            .max_by(|a, b| a.loglik.total_cmp(&b.loglik))
+        Some(Scored {
+            noise,
+            rotations,
+            loglik,
+            out_of_fold: fits.out_of_fold(&all)?.total_loglik() + grams.log_scale,
+            estimate,
+            parts,
+        })
     }
 
-    fn climb(&self, list: &[&dyn Candidate], start: &CommonNoise) -> Option<Scored> {
+    /// Noise, rotations and log-likelihood of the fit of `columns`, from `start` uphill.
+    fn climb(
+        &self,
+        columns: &[usize],
+        start: &CommonNoise,
+    ) -> Option<(CommonNoise, Rotations, f64)> {
+        let layout = self.layout(columns);
+        let all: Vec<usize> = (0..layout.candidates).collect();
         let mut noise = *start;
         for round in 0..=ALTERNATIONS {
-            let evidence = self.white.with_noise(&noise);
-            let fitted = fit(&evidence, self.folds, list).ok()?;
-            let all: Vec<usize> = (0..list.len()).collect();
-            let set = columns_of(&fitted.groups, &all);
-            let estimate = fitted.fits.estimate(&set)?;
-            let rotations = rotations(self.white, self.folds, &fitted, list, Some(&estimate))?;
+            let grams = self.moments.under(columns, &noise);
+            let fits = Fits::whole(&grams, &layout, 1.0)?;
+            let solution = fits.solution(&all)?;
+            let rotations = self
+                .moments
+                .rotations(columns, &solution, solution.len())?;
             let better = rotations.noise(Some(&noise));
             if round < ALTERNATIONS && !better.is_like(&noise) {
                 noise = better;
                 continue;
             }
-            let mut first = 0;
-            let parts = fitted
-                .groups
-                .iter()
-                .map(|group| {
-                    let own = first..first + group.columns.len();
-                    first = own.end;
-                    let credible = own
-                        .clone()
-                        .zip(&group.bounds)
-                        .all(|(i, [low, high])| (*low..=*high).contains(&estimate.value[i]));
-                    (own, credible)
-                })
-                .collect();
-            return Some(Scored {
-                noise,
-                rotations,
-                loglik: fitted.fits.log_marginal(&set)? + evidence.log_scale(),
-                out_of_fold: fitted.fits.out_of_fold(&set)?.total_loglik() + evidence.log_scale(),
-                estimate,
-                parts,
-            });
+            return Some((noise, rotations, fits.log_marginal(&all)? + grams.log_scale));
         }
         None
     }
@@ -259,13 +295,26 @@ fn coloured<'a>(
     let mut banned = vec![false; candidates.len()];
     let mut chosen: Vec<usize> = Vec::new();
     let mut noise = start;
+    let mut moments = white.moments(folds, &borrowed(&candidates));
     loop {
-        let plain = fit(white, folds, &borrowed(&candidates))?;
-        let filtered = fit(&white.with_noise(&noise), folds, &borrowed(&candidates))?;
+        let all: Vec<usize> = (0..moments.width()).collect();
+        let under = |noise: &CommonNoise| {
+            fit_grams(
+                &white.with_noise(noise),
+                &moments.under(&all, noise),
+                folds,
+                &borrowed(&candidates),
+            )
+        };
+        let grams = moments.white_of(&all);
+        let plain = fit_grams(white, &grams, folds, &borrowed(&candidates))?;
+        let filtered = under(&noise)?;
         let trial = Trial {
-            white,
+            moments: &moments,
             folds,
-            candidates: &candidates,
+            precision: white.precision(),
+            variance: plain.fits.variance(&[]).unwrap_or(1.0),
+            groups: &plain.groups,
         };
         let base = trial.score(&chosen, &noise).ok_or(CloseError::Singular)?;
         noise = base.noise;
@@ -276,7 +325,7 @@ fn coloured<'a>(
             let others: Vec<usize> = chosen.iter().copied().filter(|&c| c != g).collect();
             let without = trial.score(&others, &noise).ok_or(CloseError::Singular)?;
             let mut judgement = trial.judge(&base, at, &without, plain.groups[g].choices, tried);
-            if base.stands_instead(&without, white_alone[g].p_value) {
+            if base.stands_instead(&without, &white_alone[g]) {
                 judgement.p_value = white_alone[g].p_value;
             }
             if !judgement.stands() {
@@ -309,23 +358,24 @@ fn coloured<'a>(
         shortlist.sort_unstable();
         shortlist.dedup();
         let best = shortlist
-            .into_iter()
+            .into_par_iter()
             .filter_map(|g| {
                 let mut with = chosen.clone();
                 with.push(g);
                 let scored = trial.score(&with, &noise)?;
                 let group = &plain.groups[g];
                 let mut judgement = trial.judge(&scored, chosen.len(), &base, group.choices, tried);
-                if scored.stands_instead(&base, white_alone[g].p_value) {
+                if scored.stands_instead(&base, &white_alone[g]) {
                     judgement.p_value = white_alone[g].p_value;
                 }
                 let rank = judgement.delta_loglik - price(group, plain.scalars);
                 judgement.stands().then_some((g, rank, scored.noise))
             })
+            .collect::<Vec<_>>()
+            .into_iter()
             .max_by(|a, b| a.1.total_cmp(&b.1));
         let Some((added, _, its_noise)) = best else {
-            let evidence = white.with_noise(&noise);
-            let fitted = fit(&evidence, folds, &borrowed(&candidates))?;
+            let fitted = under(&noise)?;
             let mut judged = judged(&fitted.fits, &fitted.groups, &chosen, tried);
             for (&g, judgement) in chosen.iter().zip(stands) {
                 judged[g] = judgement;
@@ -337,7 +387,7 @@ fn coloured<'a>(
                     fitted,
                     selection: Selection { chosen, judged },
                 },
-                evidence: Some(evidence),
+                evidence: Some(white.with_noise(&noise)),
                 wander: Some(Wander {
                     noise,
                     rotations: base.rotations,
@@ -347,9 +397,10 @@ fn coloured<'a>(
         };
         chosen.push(added);
         noise = its_noise;
+        let fitted = under(&noise)?;
         let evidence = white.with_noise(&noise);
-        let fitted = fit(&evidence, folds, &borrowed(&candidates))?;
         polish(&evidence, folds, &mut candidates, &fitted, &chosen)?;
+        moments = white.moments(folds, &borrowed(&candidates));
     }
 }
 
@@ -361,8 +412,13 @@ impl Wander {
 }
 
 fn significant(ratio: &[f64; 3]) -> [bool; 3] {
+    chances(ratio).map(|p| p < FAMILY_ALPHA)
+}
+
+/// Chance of such a ratio on any of three axes where the noise is white.
+fn chances(ratio: &[f64; 3]) -> [f64; 3] {
     ratio.map(|ratio| {
         let p = ChiSquared::new(2.0).map_or(1.0, |law| law.sf(ratio.max(0.0) / WIDENING));
-        3.0 * p < FAMILY_ALPHA
+        3.0 * p
     })
 }
