@@ -27,7 +27,10 @@
 //!
 //! Source: Liang & Zeger 1986 (cluster-robust variance); Hotelling 1931.
 
+use std::ops::Range;
+
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use rayon::prelude::*;
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
 
 use crate::folds::Folds;
@@ -47,6 +50,14 @@ pub(crate) struct Layout {
 }
 
 impl Layout {
+    /// Candidate columns and the residual of `fold`.
+    fn picked(&self, fold: Option<usize>) -> Vec<usize> {
+        let n = self.nuisance_precision.len();
+        (n..n + self.candidates)
+            .chain([self.residual(fold)])
+            .collect()
+    }
+
     /// The residual column that belongs to `fold` (`None`: all data).
     pub(crate) fn residual(&self, fold: Option<usize>) -> usize {
         let first = self.nuisance_precision.len() + self.candidates;
@@ -71,7 +82,7 @@ struct Eliminated {
     scalars: f64,
     /// Training scalars less the nuisance freedom.
     freedom: f64,
-    /// Gram of each judged block in the transformed columns, and its scalars.
+    /// Gram of what is judged in the transformed columns, and its scalars.
     blocks: Vec<(DMatrix<f64>, f64)>,
 }
 
@@ -82,13 +93,11 @@ impl Eliminated {
         variance: f64,
         fold: Option<usize>,
         train: impl Fn(usize) -> bool,
-        judged: impl Fn(usize) -> bool,
+        judged: impl Fn(usize) -> bool + Sync,
     ) -> Option<Self> {
         let n = layout.nuisance_precision.len();
         let (gram, scalars) = grams.sum(train);
-        let pick: Vec<usize> = (n..n + layout.candidates)
-            .chain([layout.residual(fold)])
-            .collect();
+        let pick = layout.picked(fold);
         let mut normal = gram.view((0, 0), (n, n)).into_owned();
         // A column that nothing constrains (a gauge freedom, a star never seen in
         // training) gets a precision far below what one scalar of data brings.
@@ -96,22 +105,21 @@ impl Eliminated {
         for (k, &precision) in layout.nuisance_precision.iter().enumerate() {
             normal[(k, k)] += precision * variance + floor;
         }
-        let cross = DMatrix::from_fn(n, pick.len(), |i, j| gram[(i, pick[j])]);
+        let cross = picked(&gram, 0..n, &pick);
         let (nuisance, log_det) = if n == 0 {
             (cross.clone(), 0.0)
         } else {
             let factor = Cholesky::new(normal)?;
             (factor.solve(&cross), factor.ln_determinant())
         };
-        let reduced = DMatrix::from_fn(pick.len(), pick.len(), |i, j| gram[(pick[i], pick[j])])
-            - cross.transpose() * &nuisance;
+        let mut reduced = both(&gram, &pick);
+        reduced.gemm(-1.0, &cross.transpose(), &nuisance, 1.0);
         let blocks = (0..grams.gram.len())
+            .into_par_iter()
             .filter(|&b| judged(b))
             .map(|b| {
-                (
-                    transformed(&grams.gram[b], n, &pick, &nuisance),
-                    grams.scalars[b],
-                )
+                let gram = transformed(&grams.gram[b], n, &pick, &nuisance);
+                (gram, grams.scalars[b])
             })
             .collect();
         // Columns under a tight prior cost less than one degree of freedom each;
@@ -150,11 +158,48 @@ impl Eliminated {
 
 /// `T^T G T` for `T = [-W; I]` over the picked columns.
 fn transformed(gram: &DMatrix<f64>, n: usize, pick: &[usize], w: &DMatrix<f64>) -> DMatrix<f64> {
-    let nn = gram.view((0, 0), (n, n));
-    let np = DMatrix::from_fn(n, pick.len(), |i, j| gram[(i, pick[j])]);
-    let pp = DMatrix::from_fn(pick.len(), pick.len(), |i, j| gram[(pick[i], pick[j])]);
-    let cross = w.transpose() * &np;
-    pp - &cross - cross.transpose() + w.transpose() * (nn * w)
+    let cross = picked(gram, 0..n, pick);
+    // cross^T W and its transpose, and W^T G W, in one product: W^T (G W - 2 cross)
+    let mut inner = -2.0 * cross;
+    inner.gemm(1.0, &gram.view((0, 0), (n, n)), w, 1.0);
+    let mut out = both(gram, pick);
+    out.gemm(1.0, &w.transpose(), &inner, 1.0);
+    // the product above is symmetric but for its cross term
+    symmetric(out)
+}
+
+/// Mean of a matrix and its transpose.
+fn symmetric(mut m: DMatrix<f64>) -> DMatrix<f64> {
+    for j in 0..m.ncols() {
+        for i in 0..j {
+            let mean = 0.5 * (m[(i, j)] + m[(j, i)]);
+            m[(i, j)] = mean;
+            m[(j, i)] = mean;
+        }
+    }
+    m
+}
+
+/// Columns `pick` of some rows.
+fn picked(gram: &DMatrix<f64>, rows: Range<usize>, pick: &[usize]) -> DMatrix<f64> {
+    let mut out = DMatrix::zeros(rows.len(), pick.len());
+    for (&column, mut out) in pick.iter().zip(out.column_iter_mut()) {
+        out.copy_from(&gram.column(column).rows(rows.start, rows.len()));
+    }
+    out
+}
+
+/// Rows and columns `pick`: candidates in one run, then a residual.
+fn both(gram: &DMatrix<f64>, pick: &[usize]) -> DMatrix<f64> {
+    let run = pick.len() - 1;
+    let first = pick[0];
+    let mut out = DMatrix::zeros(pick.len(), pick.len());
+    for (&column, mut out) in pick.iter().zip(out.column_iter_mut()) {
+        let from = gram.column(column);
+        out.rows_mut(0, run).copy_from(&from.rows(first, run));
+        out[run] = from[pick[run]];
+    }
+    out
 }
 
 /// What a set of candidate columns does outside the folds it was fitted on.
@@ -257,6 +302,7 @@ impl Fits {
     ) -> Option<Self> {
         let of = &folds.fold_of_block;
         let by_fold = (0..folds.count)
+            .into_par_iter()
             .map(|f| {
                 Eliminated::new(
                     grams,
@@ -274,6 +320,26 @@ impl Fits {
             all,
             blocks: of.len(),
         })
+    }
+
+    /// Noise variance of a scalar where no candidate is in the model, from a first guess.
+    pub(crate) fn noise_alone(grams: &BlockGrams, layout: &Layout, guess: f64) -> Option<f64> {
+        let n = layout.nuisance_precision.len();
+        let (whole, scalars) = grams.sum(|_| true);
+        let alone = BlockGrams {
+            gram: vec![
+                whole
+                    .remove_columns(n, layout.candidates)
+                    .remove_rows(n, layout.candidates),
+            ],
+            scalars: vec![scalars],
+            log_scale: 0.0,
+        };
+        let layout = Layout {
+            candidates: 0,
+            ..layout.clone()
+        };
+        Self::whole(&alone, &layout, guess)?.variance(&[])
     }
 
     /// As [`new`](Self::new), on all data alone: for what asks nothing of the folds.
@@ -448,7 +514,6 @@ mod tests {
     use rand_core::SeedableRng;
     use rand_distr::{Distribution, StandardNormal};
     use rand_xoshiro::Xoshiro256PlusPlus;
-    use std::ops::Range;
 
     /// One scalar a frame: two nuisance columns, three candidates, one residual.
     struct Table(DMatrix<f64>);

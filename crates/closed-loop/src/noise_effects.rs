@@ -22,7 +22,6 @@ mod variance;
 use std::collections::BTreeMap;
 
 use focal_plane::Pixel;
-use nalgebra::DVector;
 use star_tracker::StarView;
 use telemetry::report::{ConsideredEffect, Estimate, FoundEffect};
 use telemetry::{EffectEntry, EffectValue};
@@ -31,7 +30,7 @@ use crate::declared;
 use crate::error::CloseError;
 use crate::evidence::{Amplitudes, Evidence, Residuals};
 use crate::folds::Folds;
-use crate::search::{Found, borrowed};
+use crate::search::Found;
 use crate::selection::columns_of;
 use crate::situation::Situation;
 use crate::star_data::StarData;
@@ -225,23 +224,15 @@ pub(crate) fn in_sample(level: &StarEvidence<'_>, found: &Found) -> Option<Vec<V
     }
     let set = columns_of(&found.fitted.groups, &found.selection.chosen);
     let value = found.fitted.fits.estimate(&set)?.value;
-    let columns = found
-        .candidates
-        .iter()
-        .map(|c| c.coefficients().len())
-        .sum();
-    let mut beta = DVector::zeros(columns);
-    for (i, &c) in set.iter().enumerate() {
-        beta[c] = value[i];
-    }
+    let only = found.only(&found.selection.chosen);
     let amplitudes = Amplitudes {
         nuisance: vec![found.fitted.fits.nuisance(None, &set, &value)],
-        candidates: vec![beta],
+        candidates: vec![only.spread(&value)],
     };
     let whole = Folds::whole(level.data.frames.frames());
     Some(
         level
-            .residuals(&whole, &borrowed(&found.candidates), &amplitudes)
+            .residuals(&whole, &only.candidates, &amplitudes)
             .axes,
     )
 }

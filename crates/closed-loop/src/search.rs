@@ -75,17 +75,11 @@ pub(crate) fn fit_grams(
         candidates: candidates.iter().map(|c| c.coefficients().len()).sum(),
         residuals: evidence.residual_columns(),
     };
-    let mut variance = evidence.variance_guess();
-    let mut fits = None;
-    for _ in 0..2 {
-        let found = Fits::new(grams, folds, &layout, variance).ok_or(CloseError::Singular)?;
-        variance = found
-            .variance(&[])
-            .unwrap_or(variance)
-            .max(f64::MIN_POSITIVE);
-        fits = Some(found);
-    }
-    let fits = fits.ok_or(CloseError::Singular)?;
+    let guess = evidence.variance_guess();
+    let variance = Fits::noise_alone(grams, &layout, guess)
+        .unwrap_or(guess)
+        .max(f64::MIN_POSITIVE);
+    let fits = Fits::new(grams, folds, &layout, variance).ok_or(CloseError::Singular)?;
     let (whole, scalars) = grams.sum(|_| true);
     let first = layout.nuisance_precision.len();
     let mut groups = Vec::new();
@@ -145,17 +139,63 @@ pub(crate) struct Found {
     pub(crate) selection: Selection,
 }
 
-/// Runs rounds of selection and polish. Candidates that not `may` be chosen are
-/// judged.
+impl Found {
+    /// Some of the candidates, and where their amplitudes stand among theirs alone:
+    /// one place for each of [`columns_of`] them.
+    pub(crate) fn only(&self, chosen: &[usize]) -> Only<'_> {
+        let mut only = Only {
+            candidates: Vec::new(),
+            places: Vec::new(),
+            columns: 0,
+        };
+        for &g in chosen {
+            let first: usize = self.candidates[..g]
+                .iter()
+                .map(|c| c.coefficients().len())
+                .sum();
+            let columns = &self.fitted.groups[g].columns;
+            only.places
+                .extend(columns.iter().map(|c| only.columns + c - first));
+            only.columns += self.candidates[g].coefficients().len();
+            only.candidates.push(self.candidates[g].as_ref());
+        }
+        only
+    }
+}
+
+/// See [`Found::only`].
+pub(crate) struct Only<'a> {
+    pub(crate) candidates: Vec<&'a dyn Candidate>,
+    places: Vec<usize>,
+    columns: usize,
+}
+
+impl Only<'_> {
+    /// `beta` of the observable columns among all columns of the candidates.
+    pub(crate) fn spread(&self, beta: &DVector<f64>) -> DVector<f64> {
+        let mut all = DVector::zeros(self.columns);
+        for (&place, b) in self.places.iter().zip(beta.iter()) {
+            all[place] = *b;
+        }
+        all
+    }
+}
+
+/// Runs rounds of selection and polish, the first on `start` where there is one.
+/// Candidates that may not be chosen are judged.
 pub(crate) fn search(
     evidence: &dyn Evidence,
     folds: &Folds,
     mut candidates: Vec<Box<dyn Candidate>>,
     may: &[bool],
+    mut start: Option<Fitted>,
 ) -> Result<Found, CloseError> {
     let mut before: Vec<usize> = Vec::new();
     for round in 1.. {
-        let fitted = fit(evidence, folds, &borrowed(&candidates))?;
+        let fitted = match start.take() {
+            Some(fitted) => fitted,
+            None => fit(evidence, folds, &borrowed(&candidates))?,
+        };
         let selection = select(&fitted.fits, &fitted.groups, may, fitted.scalars);
         let settled = selection.chosen == before || round == ROUNDS;
         if selection.chosen.is_empty() || settled {

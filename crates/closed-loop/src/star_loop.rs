@@ -19,7 +19,7 @@ use crate::close::{Closed, catalogue_candidates};
 use crate::declared;
 use crate::empirical::{EMPIRICAL, Empirical, Variable};
 use crate::error::CloseError;
-use crate::evidence::{Evidence, Residuals};
+use crate::evidence::{Amplitudes, Evidence, Residuals};
 use crate::figures;
 use crate::folds::Folds;
 use crate::image_level::{self, ImageLevel, Side};
@@ -29,7 +29,7 @@ use crate::motion::{self, Around};
 use crate::noise_effects;
 use crate::nuisance::StarNuisance;
 use crate::reference_wander::{self, REFERENCE_ERROR};
-use crate::search::{Found, amplitudes, borrowed, fit};
+use crate::search::{Found, amplitudes, fit};
 use crate::selection::columns_of;
 use crate::situation::Situation;
 use crate::star_data::{Inputs, Star, StarData, median_step};
@@ -311,17 +311,25 @@ struct Finish<'a> {
 
 impl Finish<'_> {
     fn residuals(&self, chosen: &[usize]) -> Result<Residuals, CloseError> {
-        let columns = self
-            .found
-            .candidates
-            .iter()
-            .map(|c| c.coefficients().len())
-            .sum();
-        let amplitudes = amplitudes(&self.found.fitted, self.folds, chosen, columns)
-            .ok_or(CloseError::Singular)?;
+        let fits = &self.found.fitted.fits;
+        let set = columns_of(&self.found.fitted.groups, chosen);
+        let only = self.found.only(chosen);
+        let mut amplitudes = Amplitudes {
+            nuisance: Vec::new(),
+            candidates: Vec::new(),
+        };
+        for fold in 0..self.folds.count {
+            let beta = fits
+                .amplitudes_without(fold, &set)
+                .ok_or(CloseError::Singular)?;
+            amplitudes
+                .nuisance
+                .push(fits.nuisance(Some(fold), &set, &beta));
+            amplitudes.candidates.push(only.spread(&beta));
+        }
         Ok(self
             .level
-            .residuals(self.folds, &borrowed(&self.found.candidates), &amplitudes))
+            .residuals(self.folds, &only.candidates, &amplitudes))
     }
 
     fn power(&self, residual: &Residuals) -> f64 {

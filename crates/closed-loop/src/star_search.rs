@@ -26,7 +26,7 @@ use crate::error::CloseError;
 use crate::evidence::Evidence;
 use crate::fit::{Estimate, Fits, Layout};
 use crate::folds::Folds;
-use crate::search::{Found, borrowed, fit_grams, polish, search};
+use crate::search::{Fitted, Found, borrowed, fit_grams, polish, search};
 use crate::selection::{
     FAMILY_ALPHA, Group, Judgement, Selection, columns_of, judged, price, ranked,
 };
@@ -83,20 +83,28 @@ pub(crate) fn run<'a>(
         declared_noise(white, folds)?
     };
     let mut suspected = false;
-    if let Some(start) = start {
-        let searched = coloured(white, folds, candidates(), eligible, start)?;
-        // Less than that imitates no effect, and would only hide one.
-        if let Some(wander) = &searched.wander {
-            if wander.axes().contains(&true) {
-                return Ok(searched);
-            }
-            suspected = chances(&wander.ratio).iter().any(|p| *p < SUSPICION);
-        }
-    }
     let mut list = candidates();
     let mut may: Vec<bool> = list.iter().map(|c| eligible(c.as_ref())).collect();
+    let mut begun = None;
+    if let Some(start) = start {
+        let Coloured {
+            searched,
+            wander,
+            white: plain,
+        } = coloured(white, folds, list, &may, start)?;
+        // Less than that imitates no effect, and would only hide one.
+        if wander.axes().contains(&true) {
+            return Ok(Searched {
+                wander: Some(wander),
+                ..searched
+            });
+        }
+        suspected = chances(&wander.ratio).iter().any(|p| *p < SUSPICION);
+        list = searched.found.candidates;
+        begun = Some(plain);
+    }
     loop {
-        let found = search(white, folds, list, &may)?;
+        let found = search(white, folds, list, &may, begun.take())?;
         let imitator = found.selection.chosen.iter().copied().find(|&g| {
             suspected
                 && found.candidates[g].acts_on_attitude()
@@ -283,14 +291,21 @@ impl Trial<'_> {
     }
 }
 
+/// What the search beside a slow error ends with.
+struct Coloured<'a> {
+    searched: Searched<'a>,
+    wander: Wander,
+    /// The same candidates under white noise.
+    white: Fitted,
+}
+
 fn coloured<'a>(
     white: &StarEvidence<'a>,
     folds: &Folds,
     mut candidates: Vec<Box<dyn Candidate>>,
-    eligible: &dyn Fn(&dyn Candidate) -> bool,
+    may: &[bool],
     start: CommonNoise,
-) -> Result<Searched<'a>, CloseError> {
-    let may: Vec<bool> = candidates.iter().map(|c| eligible(c.as_ref())).collect();
+) -> Result<Coloured<'a>, CloseError> {
     let tried = may.iter().filter(|m| **m).count().max(1);
     let mut banned = vec![false; candidates.len()];
     let mut chosen: Vec<usize> = Vec::new();
@@ -381,18 +396,22 @@ fn coloured<'a>(
                 judged[g] = judgement;
             }
             let ratio = base.rotations.slow_ratio(&noise);
-            return Ok(Searched {
-                found: Found {
-                    candidates,
-                    fitted,
-                    selection: Selection { chosen, judged },
+            return Ok(Coloured {
+                searched: Searched {
+                    found: Found {
+                        candidates,
+                        fitted,
+                        selection: Selection { chosen, judged },
+                    },
+                    evidence: Some(white.with_noise(&noise)),
+                    wander: None,
                 },
-                evidence: Some(white.with_noise(&noise)),
-                wander: Some(Wander {
+                wander: Wander {
                     noise,
                     rotations: base.rotations,
                     ratio,
-                }),
+                },
+                white: plain,
             });
         };
         chosen.push(added);
