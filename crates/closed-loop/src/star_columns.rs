@@ -1,23 +1,25 @@
 //! Columns at star level: nuisance, candidates and residuals, in arcsec.
 //!
-//! The distortion of both axes is the same polynomials of position, one axis' columns
-//! being zero in the rows of the other. So three matrices stand for the whole design,
+//! Most columns have a form that makes their products cheap. The distortion of both
+//! axes is the same polynomials of position, one axis' columns being zero in the rows of
+//! the other; and what turns the camera as a whole is the same rotation for all stars of
+//! a frame:
 //!
 //! ```text
-//! rows of x: [ D 0 | X ]     rows of y: [ 0 D | Y ]
+//! rows of x: [ D 0 | X | A_x T ]     rows of y: [ 0 D | Y | A_y T ]     A: columns of a rotation
 //! ```
 //!
-//! and a product of all columns with themselves costs a third of what it would.
 //! In a Gram matrix the columns stand as `nuisance | candidates | residuals`.
 //!
 //! Source: [M23] Eq. 5-8 (the polynomials).
 
 use std::ops::Range;
 
-use effects::{Candidate, StarRows};
-use focal_plane::{AttitudeSource, PointsMut};
-use nalgebra::{DMatrix, DVector};
+use effects::{AttitudeRows, Candidate, StarRows};
+use focal_plane::{ARCSEC_PER_RAD, AttitudeSource, PointsMut, VectorsMut};
+use nalgebra::{DMatrix, DVector, Vector3};
 
+use crate::frame_rotation::rotation_row;
 use crate::nuisance::StarNuisance;
 use crate::star_data::StarData;
 
@@ -32,13 +34,15 @@ pub(crate) struct StarColumns<'a> {
     pub(crate) motion: Option<&'a dyn AttitudeSource>,
 }
 
-/// The columns of some rows.
+/// The columns of some frames.
 #[derive(Clone, Debug)]
 pub(crate) struct Filled {
-    /// D: polynomials of position.
+    /// D: polynomials of position, a row a star.
     pub(crate) shared: DMatrix<f64>,
-    /// X and Y: everything else.
+    /// X and Y: everything that has no special form, a row a star.
     pub(crate) own: [DMatrix<f64>; 2],
+    /// T: rotations, arcsec, three rows a frame.
+    pub(crate) turn: DMatrix<f64>,
 }
 
 impl Default for Filled {
@@ -47,81 +51,84 @@ impl Default for Filled {
         Self {
             shared: empty(),
             own: [empty(), empty()],
+            turn: empty(),
         }
     }
 }
 
 impl Filled {
-    /// Some of the rows.
-    pub(crate) fn rows(&self, rows: Range<usize>) -> Self {
-        let part = |m: &DMatrix<f64>| m.rows(rows.start, rows.len()).into_owned();
-        Self {
-            shared: part(&self.shared),
-            own: self.own.each_ref().map(part),
-        }
-    }
-
     /// Rows for the columns of `layout`, all zero.
-    fn reset(&mut self, rows: usize, layout: Layout) {
-        let clear = |m: &mut DMatrix<f64>, columns: usize| {
+    fn reset(&mut self, rows: usize, frames: usize, layout: &Layout) {
+        let clear = |m: &mut DMatrix<f64>, rows: usize, columns: usize| {
             if m.shape() == (rows, columns) {
                 m.fill(0.0);
             } else {
                 *m = DMatrix::zeros(rows, columns);
             }
         };
-        clear(&mut self.shared, layout.shared);
+        clear(&mut self.shared, rows, layout.shared);
         for own in &mut self.own {
-            clear(own, layout.own());
+            clear(own, rows, layout.own.len());
         }
+        clear(&mut self.turn, 3 * frames, layout.turn.len());
     }
 }
 
 /// Where the columns of [`Filled`] stand in a Gram matrix.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Layout {
-    /// Own columns before the distortion: the misalignment.
-    before: usize,
-    /// Polynomials.
+    /// Polynomials, and the place of the first one's x.
     pub(crate) shared: usize,
-    /// Own columns after the distortion.
-    after: usize,
+    shared_from: usize,
+    /// Places of the columns of X and Y, and of T.
+    pub(crate) own: Vec<usize>,
+    pub(crate) turn: Vec<usize>,
 }
 
 impl Layout {
-    pub(crate) fn own(self) -> usize {
-        self.before + self.after
-    }
-
     /// Columns in all.
-    pub(crate) fn width(self) -> usize {
-        self.own() + 2 * self.shared
+    pub(crate) fn width(&self) -> usize {
+        2 * self.shared + self.own.len() + self.turn.len()
     }
 
-    /// Column of polynomial `k` on `axis`.
-    pub(crate) fn shared_at(self, k: usize, axis: usize) -> usize {
-        self.before + 2 * k + axis
+    /// Place of polynomial `k` on `axis`.
+    pub(crate) fn shared_at(&self, k: usize, axis: usize) -> usize {
+        self.shared_from + 2 * k + axis
     }
 
-    /// Column of own column `k`.
-    pub(crate) fn own_at(self, k: usize) -> usize {
-        if k < self.before {
-            k
-        } else {
-            k + 2 * self.shared
-        }
+    /// Places of all columns: D on x, D on y, X and Y, T.
+    pub(crate) fn places(&self) -> Vec<usize> {
+        (0..2)
+            .flat_map(|axis| (0..self.shared).map(move |k| self.shared_at(k, axis)))
+            .chain(self.own.iter().copied())
+            .chain(self.turn.iter().copied())
+            .collect()
     }
 }
 
 impl StarColumns<'_> {
     pub(crate) fn layout(&self) -> Layout {
-        let (before, shared, directions) = self.nuisance.parts();
-        let candidates: usize = self.candidates.iter().map(|c| c.coefficients().len()).sum();
-        Layout {
-            before,
+        let (misalignment, shared, directions) = self.nuisance.parts();
+        let mut layout = Layout {
             shared,
-            after: directions + candidates + self.residuals.len(),
+            shared_from: misalignment,
+            own: (0..misalignment).collect(),
+            turn: Vec::new(),
+        };
+        let mut place = misalignment + 2 * shared;
+        layout.own.extend(place..place + directions);
+        place += directions;
+        for candidate in self.candidates {
+            let end = place + candidate.coefficients().len();
+            if candidate.turns_camera() {
+                layout.turn.extend(place..end);
+            } else {
+                layout.own.extend(place..end);
+            }
+            place = end;
         }
+        layout.own.extend(place..place + self.residuals.len());
+        layout
     }
 
     /// The rows of `frames` as effects see them.
@@ -144,18 +151,19 @@ impl StarColumns<'_> {
     }
 
     /// Fills the rows of `frames`, outliers too.
-    pub(crate) fn fill(&self, frames: Range<usize>, out: &mut Filled) {
+    pub(crate) fn fill(&self, frames: Range<usize>, layout: &Layout, out: &mut Filled) {
         let data = self.data;
         let rows = data.frames.first_row[frames.start]..data.frames.first_row[frames.end];
         let n = rows.len();
-        out.reset(n, self.layout());
-        self.nuisance.fill(data, frames, out);
-        let (before, _, directions) = self.nuisance.parts();
-        let mut column = before + directions;
+        out.reset(n, frames.len(), layout);
+        self.nuisance.fill(data, frames.clone(), out);
+        self.fill_turns(&data.frames.t_s[frames], &mut out.turn);
+        let (misalignment, _, directions) = self.nuisance.parts();
+        let mut column = misalignment + directions;
         let seen = self.rows(rows.clone());
         let scale = data.camera.arcsec_per_px();
         let [x, y] = &mut out.own;
-        for candidate in self.candidates {
+        for candidate in self.candidates.iter().filter(|c| !c.turns_camera()) {
             let p = candidate.coefficients().len();
             let at = column * n..(column + p) * n;
             let (x, y) = (
@@ -187,6 +195,38 @@ impl StarColumns<'_> {
         }
     }
 
+    fn fill_turns(&self, t_s: &[f64], out: &mut DMatrix<f64>) {
+        let frames = t_s.len();
+        let mut column = 0;
+        let mut scratch: [Vec<f64>; 3] = Default::default();
+        for candidate in self.candidates.iter().filter(|c| c.turns_camera()) {
+            let p = candidate.coefficients().len();
+            for axis in &mut scratch {
+                axis.clear();
+                axis.resize(p * frames, 0.0);
+            }
+            let [x, y, z] = &mut scratch;
+            let seen = AttitudeRows {
+                t_s,
+                wx_rad_s: &[],
+                wy_rad_s: &[],
+                wz_rad_s: &[],
+                attitude: self.motion,
+            };
+            if candidate.attitude_columns(&seen, VectorsMut { x, y, z }) {
+                for j in 0..p {
+                    for k in 0..frames {
+                        for (axis, values) in scratch.iter().enumerate() {
+                            out[(3 * k + axis, column + j)] =
+                                values[j * frames + k] * ARCSEC_PER_RAD;
+                        }
+                    }
+                }
+            }
+            column += p;
+        }
+    }
+
     /// Zeroes the rows of outliers; returns how many of `frames`' rows count.
     pub(crate) fn mask(&self, frames: Range<usize>, out: &mut Filled) -> usize {
         let data = self.data;
@@ -202,16 +242,37 @@ impl StarColumns<'_> {
         used
     }
 
-    /// What `amplitudes` (nuisance and candidates) shift the filled rows by, arcsec.
-    pub(crate) fn shift(&self, filled: &Filled, amplitudes: &DVector<f64>) -> [DVector<f64>; 2] {
-        let layout = self.layout();
-        let own = DVector::from_fn(layout.own() - self.residuals.len(), |k, _| {
-            amplitudes[layout.own_at(k)]
-        });
-        std::array::from_fn(|axis| {
+    /// What `amplitudes` (nuisance and candidates) shift the filled rows of `frames`
+    /// by, arcsec.
+    pub(crate) fn shift(
+        &self,
+        frames: Range<usize>,
+        layout: &Layout,
+        filled: &Filled,
+        amplitudes: &DVector<f64>,
+    ) -> [DVector<f64>; 2] {
+        let of = |places: &[usize]| {
+            DVector::from_iterator(places.len(), places.iter().map(|&p| amplitudes[p]))
+        };
+        let own = of(&layout.own[..layout.own.len() - self.residuals.len()]);
+        let mut shift: [DVector<f64>; 2] = std::array::from_fn(|axis| {
             let shared =
                 DVector::from_fn(layout.shared, |k, _| amplitudes[layout.shared_at(k, axis)]);
             &filled.shared * shared + filled.own[axis].columns(0, own.len()) * &own
-        })
+        });
+        if !layout.turn.is_empty() {
+            let turn = &filled.turn * of(&layout.turn);
+            let first = self.data.frames.first_row[frames.start];
+            for (k, frame) in frames.enumerate() {
+                let theta: Vector3<f64> = turn.fixed_rows::<3>(3 * k).into_owned();
+                for row in self.data.frames.rows_of(frame) {
+                    let jacobian = rotation_row(self.data, row);
+                    for axis in 0..2 {
+                        shift[axis][row - first] += Vector3::from(jacobian[axis]).dot(&theta);
+                    }
+                }
+            }
+        }
+        shift
     }
 }

@@ -109,6 +109,7 @@ impl Evidence for StarEvidence<'_> {
             residuals: &[],
             ..self.columns(candidates)
         };
+        let layout = columns.layout();
         let rows = data.t_s.len();
         let mut out = Residuals {
             axes: vec![vec![0.0; rows]; 2],
@@ -137,8 +138,8 @@ impl Evidence for StarEvidence<'_> {
         let shifts: Vec<[DVector<f64>; 2]> = chunks
             .par_iter()
             .map_init(Filled::default, |filled, (fold, frames)| {
-                columns.fill(frames.clone(), filled);
-                columns.shift(filled, &whole[*fold])
+                columns.fill(frames.clone(), &layout, filled);
+                columns.shift(frames.clone(), &layout, filled, &whole[*fold])
             })
             .collect();
         for ((fold, frames), shift) in chunks.into_iter().zip(shifts) {

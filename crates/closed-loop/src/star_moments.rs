@@ -54,21 +54,48 @@ pub(crate) enum Keep<'a> {
 /// What the pass keeps of a block.
 #[derive(Clone, Debug)]
 struct Block {
-    gram: DMatrix<f64>,
-    scalars: f64,
-    rotations: Option<Kept>,
-}
-
-#[derive(Clone, Debug)]
-struct Kept {
-    /// R.
+    /// R; G where no rotation is kept apart.
     rest: DMatrix<f64>,
-    /// Independent scalars in it.
+    /// Products of the rows of bins without an attitude; they are not in R.
+    lost: Option<DMatrix<f64>>,
+    /// Scalars of G and of R.
+    scalars: f64,
     rest_scalars: f64,
     /// Mean rotations, three rows a bin.
     theta: DMatrix<f64>,
-    /// Inverse of N of each bin; `None`: no attitude there.
+    /// Inverse of N of each bin; `None`: no attitude there, and no rotation.
     inverse: Vec<Option<Matrix3<f64>>>,
+}
+
+impl Block {
+    /// G of some columns.
+    fn gram(&self, columns: &[usize]) -> DMatrix<f64> {
+        let mut gram = pick(&self.rest, columns);
+        if let Some(lost) = &self.lost {
+            gram += pick(lost, columns);
+        }
+        let mut whitened = self.theta.select_columns(columns);
+        for (bin, inverse) in self.inverse.iter().enumerate() {
+            let root = inverse.and_then(|v| v.cholesky()?.l().try_inverse());
+            let part = whitened.fixed_rows::<3>(3 * bin).into_owned();
+            whitened
+                .fixed_rows_mut::<3>(3 * bin)
+                .copy_from(&(root.unwrap_or_else(Matrix3::zeros) * part));
+        }
+        gram.gemm(1.0, &whitened.transpose(), &whitened, 1.0);
+        gram
+    }
+
+    /// The block with every bin's rotation thrown away.
+    fn freed(self) -> Self {
+        Self {
+            lost: None,
+            scalars: self.rest_scalars,
+            theta: DMatrix::zeros(0, self.rest.ncols()),
+            inverse: Vec::new(),
+            ..self
+        }
+    }
 }
 
 /// See the module.
@@ -115,12 +142,15 @@ impl StarMoments {
         }
     }
 
-    /// The products under white noise.
+    /// The products under white noise, of a pass that kept no rotation apart.
     pub(crate) fn white(self) -> BlockGrams {
         let (gram, scalars) = self
             .blocks
             .into_iter()
-            .map(|b| (b.gram, b.scalars))
+            .map(|b| {
+                debug_assert!(b.inverse.is_empty(), "rotations are in no block");
+                (b.rest, b.scalars)
+            })
             .unzip();
         BlockGrams {
             gram,
@@ -129,10 +159,10 @@ impl StarMoments {
         }
     }
 
-    /// The same of some of the columns.
+    /// The products of some of the columns under white noise.
     pub(crate) fn white_of(&self, columns: &[usize]) -> BlockGrams {
         BlockGrams {
-            gram: self.blocks.iter().map(|b| pick(&b.gram, columns)).collect(),
+            gram: self.blocks.par_iter().map(|b| b.gram(columns)).collect(),
             scalars: self.blocks.iter().map(|b| b.scalars).collect(),
             log_scale: 0.0,
         }
@@ -140,25 +170,23 @@ impl StarMoments {
 
     /// Columns of the pass.
     pub(crate) fn width(&self) -> usize {
-        self.blocks.first().map_or(0, |b| b.gram.ncols())
+        self.blocks.first().map_or(0, |b| b.rest.ncols())
     }
 
     /// The products of `columns` under `noise`: of scalars of unit variance.
     pub(crate) fn under(&self, columns: &[usize], noise: &CommonNoise) -> BlockGrams {
-        let kept: Vec<&Kept> = self
+        let inverse: Vec<Option<Matrix3<f64>>> = self
             .blocks
             .iter()
-            .filter_map(|b| b.rotations.as_ref())
+            .flat_map(|b| b.inverse.iter().copied())
             .collect();
-        let inverse: Vec<Option<Matrix3<f64>>> =
-            kept.iter().flat_map(|k| k.inverse.iter().copied()).collect();
         let filter = Filter::new(noise, &self.t_s, &self.frames, &inverse);
         let mut log_scale = filter.log_scale;
         let weight = noise.centroid.powi(-2);
         let mut first = 0;
-        let mut jobs = Vec::with_capacity(kept.len());
+        let mut jobs = Vec::with_capacity(self.blocks.len());
         let mut state = vec![Vector3::zeros(); columns.len()];
-        for k in &kept {
+        for k in &self.blocks {
             let steps = first..first + k.inverse.len();
             first = steps.end;
             log_scale -= k.rest_scalars * noise.centroid.ln();
@@ -172,7 +200,7 @@ impl StarMoments {
                 gram
             })
             .collect();
-        let scalars = kept.iter().map(|k| {
+        let scalars = self.blocks.iter().map(|k| {
             let solved = k.inverse.iter().flatten().count();
             k.rest_scalars + 3.0 * solved as f64
         });
@@ -199,7 +227,7 @@ impl StarMoments {
         let (mut sse, mut rest) = (0.0, 0.0);
         let mut mean: [Vec<f64>; 3] = std::array::from_fn(|_| Vec::with_capacity(self.t_s.len()));
         let mut count = mean.clone();
-        for kept in self.blocks.iter().filter_map(|b| b.rotations.as_ref()) {
+        for kept in &self.blocks {
             sse += left.dot(&(pick(&kept.rest, columns) * &left));
             rest += kept.rest_scalars;
             let mut theta = kept.theta.column(residual).into_owned();
@@ -234,18 +262,37 @@ fn pick(matrix: &DMatrix<f64>, columns: &[usize]) -> DMatrix<f64> {
     })
 }
 
-/// Sums of one block.
+/// Columns of a product that are formed at once: a product of columns with themselves
+/// needs only what lies below the diagonal.
+const PANEL: usize = 64;
+
+/// Sums of one block; columns stand in the order of [`Layout::places`].
 struct Sums {
     layout: Layout,
-    /// D^T D, D^T X and D^T Y, X^T X + Y^T Y.
+    /// D^T D.
     shared: DMatrix<f64>,
-    cross: [DMatrix<f64>; 2],
+    /// [D^T X; D^T Y].
+    cross: DMatrix<f64>,
+    /// X^T X + Y^T Y, below the diagonal.
     own: DMatrix<f64>,
+    /// Products of T with all columns.
+    turn: DMatrix<f64>,
     scalars: usize,
     /// M and N of each bin.
     bins: Option<(DMatrix<f64>, Vec<Matrix3<f64>>)>,
-    /// Rows of bins that have no attitude.
-    lost: Option<Box<Sums>>,
+    /// Products of the rows of bins that have no attitude, and how many scalars.
+    lost: Option<(DMatrix<f64>, usize)>,
+}
+
+/// Scratch of the inner loop.
+#[derive(Default)]
+struct Scratch {
+    filled: Filled,
+    jacobian: Vec<[[f64; 3]; 2]>,
+    /// N of each frame.
+    normal: Vec<Matrix3<f64>>,
+    /// Columns of X or Y that are not all zero.
+    active: Vec<usize>,
 }
 
 impl Sums {
@@ -255,13 +302,23 @@ impl Sums {
         bins: Option<&[Range<usize>]>,
     ) -> Self {
         let layout = columns.layout();
-        let mut sums = Self::zero(layout);
-        sums.bins = bins.map(|b| {
-            (
-                DMatrix::zeros(3 * b.len(), layout.width()),
-                vec![Matrix3::zeros(); b.len()],
-            )
-        });
+        let (shared, own, turn) = (layout.shared, layout.own.len(), layout.turn.len());
+        let width = layout.width();
+        let mut sums = Self {
+            shared: DMatrix::zeros(shared, shared),
+            cross: DMatrix::zeros(2 * shared, own),
+            own: DMatrix::zeros(own, own),
+            turn: DMatrix::zeros(turn, width),
+            scalars: 0,
+            bins: bins.map(|b| {
+                (
+                    DMatrix::zeros(3 * b.len(), width),
+                    vec![Matrix3::zeros(); b.len()],
+                )
+            }),
+            lost: None,
+            layout,
+        };
         let used = |frame: usize| {
             let rows = columns.data.frames.rows_of(frame);
             rows.filter(|&r| !columns.data.outlier[r]).count()
@@ -270,216 +327,254 @@ impl Sums {
             let stars = |r: &Range<usize>| r.clone().map(used).sum::<usize>();
             ranges.iter().map(|r| stars(r) < SOLVING).collect()
         });
-        let mut filled = Filled::default();
-        let mut jacobian = Vec::new();
+        let mut scratch = Scratch::default();
         let mut at = frames.start;
         let mut bin = 0;
         while at < frames.end {
             let chunk = at..(at + CHUNK_FRAMES).min(frames.end);
-            columns.fill(chunk.clone(), &mut filled);
-            sums.scalars += 2 * columns.mask(chunk.clone(), &mut filled);
-            sums.add(&filled);
-            if let (Some(ranges), Some((moments, normals))) = (bins, &mut sums.bins) {
-                let first = columns.data.frames.first_row[chunk.start];
-                for frame in chunk.clone() {
-                    while ranges[bin].end <= frame {
-                        bin += 1;
-                    }
-                    if without[bin] {
-                        let rows = columns.data.frames.rows_of(frame);
-                        let local = rows.start - first..rows.end - first;
-                        let lost = sums
-                            .lost
-                            .get_or_insert_with(|| Box::new(Self::zero(layout)));
-                        lost.scalars += 2 * used(frame);
-                        lost.add(&filled.rows(local));
-                        continue;
-                    }
-                    add_frame(
-                        columns.data,
-                        frame,
-                        first,
-                        &filled,
-                        layout,
-                        &mut jacobian,
-                        (moments, 3 * bin),
-                        &mut normals[bin],
-                    );
+            at = chunk.end;
+            columns.fill(chunk.clone(), &sums.layout, &mut scratch.filled);
+            sums.scalars += 2 * columns.mask(chunk.clone(), &mut scratch.filled);
+            sums.add_rows(&mut scratch);
+            if bins.is_none() && turn == 0 {
+                continue;
+            }
+            let moments = moments(columns.data, chunk.clone(), &sums.layout, &mut scratch);
+            if turn > 0 {
+                let turned = scratch.filled.turn.transpose();
+                sums.turn.gemm(1.0, &turned, &moments, 1.0);
+            }
+            let Some(ranges) = bins else { continue };
+            for (k, frame) in chunk.enumerate() {
+                while ranges[bin].end <= frame {
+                    bin += 1;
+                }
+                if without[bin] {
+                    sums.lose(columns.data, frame, k, &scratch);
+                } else if let Some((kept, normals)) = &mut sums.bins {
+                    let mut kept = kept.fixed_rows_mut::<3>(3 * bin);
+                    kept += moments.fixed_rows::<3>(3 * k);
+                    normals[bin] += scratch.normal[k];
                 }
             }
-            at = chunk.end;
         }
         sums
     }
 
-    fn zero(layout: Layout) -> Self {
-        let (shared, own) = (layout.shared, layout.own());
-        Self {
-            layout,
-            shared: DMatrix::zeros(shared, shared),
-            cross: [DMatrix::zeros(shared, own), DMatrix::zeros(shared, own)],
-            own: DMatrix::zeros(own, own),
-            scalars: 0,
-            bins: None,
-            lost: None,
-        }
-    }
-
-    fn add(&mut self, filled: &Filled) {
+    /// Adds the products of D, X and Y.
+    fn add_rows(&mut self, scratch: &mut Scratch) {
+        let Scratch { filled, active, .. } = scratch;
         let shared = filled.shared.transpose();
         self.shared.gemm(1.0, &shared, &filled.shared, 1.0);
-        for axis in 0..2 {
-            let own = &filled.own[axis];
-            self.cross[axis].gemm(1.0, &shared, own, 1.0);
-            self.own.gemm(1.0, &own.transpose(), own, 1.0);
+        for (axis, own) in filled.own.iter().enumerate() {
+            let is_active = |c: &usize| own.column(*c).iter().any(|v| v.to_bits() << 1 != 0);
+            active.clear();
+            active.extend((0..own.ncols()).filter(is_active));
+            let gathered;
+            let own = if active.len() == own.ncols() {
+                own
+            } else {
+                gathered = own.select_columns(active.iter());
+                &gathered
+            };
+            let cross = &shared * own;
+            let first = axis * shared.nrows();
+            for (from, &to) in active.iter().enumerate() {
+                let mut into = self.cross.view_mut((first, to), (shared.nrows(), 1));
+                into += cross.column(from);
+            }
+            let transposed = own.transpose();
+            for start in (0..active.len()).step_by(PANEL) {
+                let panel = PANEL.min(active.len() - start);
+                let below = active.len() - start;
+                let product = transposed.rows(start, below) * own.columns(start, panel);
+                for (j, &to) in active[start..start + panel].iter().enumerate() {
+                    let mut into = self.own.column_mut(to);
+                    for (from, &row) in product.column(j).iter().zip(&active[start..]) {
+                        into[row] += from;
+                    }
+                }
+            }
         }
     }
 
-    /// The products in the order of a Gram matrix.
-    fn gram(&self) -> DMatrix<f64> {
-        let layout = self.layout;
-        let mut gram = DMatrix::zeros(layout.width(), layout.width());
-        for j in 0..layout.shared {
-            for i in 0..layout.shared {
-                for axis in 0..2 {
-                    gram[(layout.shared_at(i, axis), layout.shared_at(j, axis))] =
-                        self.shared[(i, j)];
-                }
-            }
-        }
-        for j in 0..layout.own() {
-            let column = layout.own_at(j);
-            for i in 0..layout.own() {
-                gram[(layout.own_at(i), column)] = self.own[(i, j)];
-            }
+    /// Puts the rows of frame `k` of the chunk among those of no rotation.
+    fn lose(&mut self, data: &StarData, frame: usize, k: usize, scratch: &Scratch) {
+        let width = self.layout.width();
+        let (lost, scalars) = self
+            .lost
+            .get_or_insert_with(|| (DMatrix::zeros(width, width), 0));
+        let (shared, own) = (self.layout.shared, self.layout.own.len());
+        let filled = &scratch.filled;
+        let first = data.frames.first_row[frame - k];
+        for row in data.frames.rows_of(frame).filter(|&r| !data.outlier[r]) {
+            let jacobian = rotation_row(data, row);
+            let i = row - first;
             for axis in 0..2 {
-                for i in 0..layout.shared {
-                    let row = layout.shared_at(i, axis);
-                    gram[(row, column)] = self.cross[axis][(i, j)];
-                    gram[(column, row)] = self.cross[axis][(i, j)];
+                let mut line = DVector::zeros(width);
+                line.rows_mut(axis * shared, shared)
+                    .tr_copy_from(&filled.shared.row(i));
+                line.rows_mut(2 * shared, own)
+                    .tr_copy_from(&filled.own[axis].row(i));
+                let turned = filled.turn.fixed_rows::<3>(3 * k);
+                for (j, t) in turned.column_iter().enumerate() {
+                    line[2 * shared + own + j] = Vector3::from(jacobian[axis]).dot(&t);
                 }
+                lost.ger(1.0, &line, &line, 1.0);
             }
+            *scalars += 2;
         }
-        gram
+    }
+
+    /// The products in the order of [`Layout::places`].
+    fn product(&self) -> DMatrix<f64> {
+        let (shared, own, width) = (
+            self.layout.shared,
+            self.layout.own.len(),
+            self.layout.width(),
+        );
+        let mut out = DMatrix::zeros(width, width);
+        for axis in 0..2 {
+            let at = axis * shared;
+            out.view_mut((at, at), (shared, shared))
+                .copy_from(&self.shared);
+        }
+        out.view_mut((2 * shared, 2 * shared), (own, own))
+            .copy_from(&self.own);
+        out.view_mut((2 * shared, 0), (own, 2 * shared))
+            .copy_from(&self.cross.transpose());
+        out.view_mut((2 * shared + own, 0), (self.layout.turn.len(), width))
+            .copy_from(&self.turn);
+        out.fill_upper_triangle_with_lower_triangle();
+        out
     }
 
     fn block(self) -> Block {
-        let gram = self.gram();
-        let lost = self.lost.as_ref();
-        let rest = lost.map_or_else(|| gram.clone(), |l| &gram - l.gram());
-        let scalars = self.scalars - lost.map_or(0, |l| l.scalars);
-        let rotations = self
-            .bins
-            .map(|(moments, normals)| kept(rest, scalars, moments, &normals));
-        Block {
-            gram,
+        let mut rest = self.product();
+        let mut scalars = self.scalars;
+        if let Some((lost, count)) = &self.lost {
+            rest -= lost;
+            scalars -= count;
+        }
+        let places = self.layout.places();
+        let mut order = vec![0; places.len()];
+        for (from, to) in places.into_iter().enumerate() {
+            order[to] = from;
+        }
+        let width = order.len();
+        let mut block = Block {
+            rest: pick(&rest, &order),
+            lost: self.lost.map(|(lost, _)| pick(&lost, &order)),
             scalars: self.scalars as f64,
-            rotations,
-        }
-    }
-}
-
-/// Adds a frame's moments to its bin's.
-#[expect(clippy::too_many_arguments, reason = "one inner loop, its scratch with it")]
-fn add_frame(
-    data: &StarData,
-    frame: usize,
-    first: usize,
-    filled: &Filled,
-    layout: Layout,
-    jacobian: &mut Vec<[[f64; 3]; 2]>,
-    (moments, at): (&mut DMatrix<f64>, usize),
-    normal: &mut Matrix3<f64>,
-) {
-    let rows = data.frames.rows_of(frame);
-    let local = rows.start - first..rows.end - first;
-    jacobian.clear();
-    for row in rows {
-        let j = if data.outlier[row] {
-            [[0.0; 3]; 2]
-        } else {
-            rotation_row(data, row)
+            rest_scalars: scalars as f64,
+            theta: DMatrix::zeros(0, width),
+            inverse: Vec::new(),
         };
-        for a in j.map(Vector3::from) {
-            *normal += a * a.transpose();
+        if let Some((moments, normals)) = self.bins {
+            block.keep_apart(moments.select_columns(&order), &normals);
         }
-        jacobian.push(j);
-    }
-    let mut add = |column: usize, axis: usize, values: &[f64]| {
-        let mut sum = Vector3::zeros();
-        for (j, v) in jacobian.iter().zip(values) {
-            sum += Vector3::from(j[axis]) * *v;
-        }
-        for k in 0..3 {
-            moments[(at + k, column)] += sum[k];
-        }
-    };
-    let n = filled.shared.nrows();
-    let values = |m: &DMatrix<f64>, column: usize| -> Range<usize> {
-        debug_assert_eq!(m.nrows(), n);
-        column * n + local.start..column * n + local.end
-    };
-    for k in 0..layout.shared {
-        let part = &filled.shared.as_slice()[values(&filled.shared, k)];
-        for axis in 0..2 {
-            add(layout.shared_at(k, axis), axis, part);
-        }
-    }
-    for k in 0..layout.own() {
-        for axis in 0..2 {
-            let own = &filled.own[axis];
-            add(layout.own_at(k), axis, &own.as_slice()[values(own, k)]);
-        }
-    }
-}
-
-fn kept(
-    mut rest: DMatrix<f64>,
-    scalars: usize,
-    mut moments: DMatrix<f64>,
-    normals: &[Matrix3<f64>],
-) -> Kept {
-    let mut rest_scalars = scalars as f64;
-    let mut inverse = Vec::with_capacity(normals.len());
-    let mut whitened = DMatrix::zeros(moments.nrows(), moments.ncols());
-    for (bin, normal) in normals.iter().enumerate() {
-        let solved = normal
-            .cholesky()
-            .filter(|c| {
-                let pivots = c.l_dirty().diagonal();
-                (0..3).all(|k| pivots[k].powi(2) > SINGULAR * normal[(k, k)])
-            })
-            .and_then(|c| Some((c.l().try_inverse()?, c.inverse())));
-        let Some((root, whole)) = solved else {
-            moments.rows_mut(3 * bin, 3).fill(0.0);
-            inverse.push(None);
-            continue;
-        };
-        let part = moments.fixed_rows::<3>(3 * bin).into_owned();
-        whitened.fixed_rows_mut::<3>(3 * bin).copy_from(&(root * &part));
-        moments.fixed_rows_mut::<3>(3 * bin).copy_from(&(whole * &part));
-        rest_scalars -= 3.0;
-        inverse.push(Some(whole));
-    }
-    rest.gemm(-1.0, &whitened.transpose(), &whitened, 1.0);
-    Kept {
-        rest,
-        rest_scalars,
-        theta: moments,
-        inverse,
+        block
     }
 }
 
 impl Block {
-    /// The block with every bin's rotation thrown away.
-    fn freed(self) -> Self {
-        match self.rotations {
-            Some(kept) => Self {
-                gram: kept.rest,
-                scalars: kept.rest_scalars,
-                rotations: None,
-            },
-            None => self,
+    /// Takes the rotations of bins with these M and N out of R.
+    fn keep_apart(&mut self, mut moments: DMatrix<f64>, normals: &[Matrix3<f64>]) {
+        let mut whitened = DMatrix::zeros(moments.nrows(), moments.ncols());
+        for (bin, normal) in normals.iter().enumerate() {
+            let solved = normal
+                .cholesky()
+                .filter(|c| {
+                    let pivots = c.l_dirty().diagonal();
+                    (0..3).all(|k| pivots[k].powi(2) > SINGULAR * normal[(k, k)])
+                })
+                .and_then(|c| Some((c.l().try_inverse()?, c.inverse())));
+            let part = moments.fixed_rows::<3>(3 * bin).into_owned();
+            let mut theta = moments.fixed_rows_mut::<3>(3 * bin);
+            if let Some((root, whole)) = solved {
+                theta.copy_from(&(whole * &part));
+                let mut whitened = whitened.fixed_rows_mut::<3>(3 * bin);
+                whitened.copy_from(&(root * &part));
+                self.rest_scalars -= 3.0;
+                self.inverse.push(Some(whole));
+            } else {
+                theta.fill(0.0);
+                self.inverse.push(None);
+            }
+        }
+        self.rest
+            .gemm(-1.0, &whitened.transpose(), &whitened, 1.0);
+        self.theta = moments;
+    }
+}
+
+/// A^T c of every frame and column, three rows a frame, and N of every frame.
+fn moments(
+    data: &StarData,
+    frames: Range<usize>,
+    layout: &Layout,
+    scratch: &mut Scratch,
+) -> DMatrix<f64> {
+    let first = data.frames.first_row[frames.start];
+    let last = data.frames.first_row[frames.end];
+    let Scratch {
+        filled,
+        jacobian,
+        normal,
+        ..
+    } = scratch;
+    jacobian.clear();
+    jacobian.extend((first..last).map(|row| {
+        if data.outlier[row] {
+            [[0.0; 3]; 2]
+        } else {
+            rotation_row(data, row)
+        }
+    }));
+    let of_frame: Vec<Range<usize>> = frames
+        .map(|k| {
+            let rows = data.frames.rows_of(k);
+            rows.start - first..rows.end - first
+        })
+        .collect();
+    normal.clear();
+    normal.extend(of_frame.iter().map(|rows| {
+        let axes = jacobian[rows.clone()].iter().flatten();
+        axes.fold(Matrix3::zeros(), |sum, a| {
+            let a = Vector3::from(*a);
+            sum + a * a.transpose()
+        })
+    }));
+    let (shared, own) = (layout.shared, layout.own.len());
+    let mut out = DMatrix::zeros(3 * of_frame.len(), layout.width());
+    let add = |out: &mut DMatrix<f64>, column: usize, axis: usize, values: &[f64]| {
+        for (k, rows) in of_frame.iter().enumerate() {
+            let mut sum = [0.0; 3];
+            for (j, v) in jacobian[rows.clone()].iter().zip(&values[rows.clone()]) {
+                for i in 0..3 {
+                    sum[i] += j[axis][i] * v;
+                }
+            }
+            for i in 0..3 {
+                out[(3 * k + i, column)] += sum[i];
+            }
+        }
+    };
+    let n = filled.shared.nrows();
+    for axis in 0..2 {
+        for k in 0..shared {
+            let values = &filled.shared.as_slice()[k * n..(k + 1) * n];
+            add(&mut out, axis * shared + k, axis, values);
+        }
+        for k in 0..own {
+            let values = &filled.own[axis].as_slice()[k * n..(k + 1) * n];
+            add(&mut out, 2 * shared + k, axis, values);
         }
     }
+    for (k, normal) in normal.iter().enumerate() {
+        let turned = normal * filled.turn.fixed_rows::<3>(3 * k);
+        out.view_mut((3 * k, 2 * shared + own), turned.shape())
+            .copy_from(&turned);
+    }
+    out
 }

@@ -142,6 +142,9 @@ impl<B: Bending> Candidate for BendingCandidate<B> {
     fn acts_on_attitude(&self) -> bool {
         true
     }
+    fn turns_camera(&self) -> bool {
+        true
+    }
     fn star_columns(&self, camera: &Camera, rows: &StarRows<'_>, out: PointsMut<'_>) -> bool {
         let (n, functions) = (rows.len(), self.bending.functions());
         check_columns(self.coefficients.len(), n, out.x.len());

@@ -192,6 +192,11 @@ pub trait Candidate: Debug + Send + Sync {
     fn acts_on_stars(&self) -> bool;
     /// Whether it moves the attitude as a whole in a way that attitude rows alone can show.
     fn acts_on_attitude(&self) -> bool;
+    /// Whether the star columns are what [`attitude_columns`](Self::attitude_columns) make of every
+    /// star alike, as a small rotation of the camera: then nothing else need be evaluated.
+    fn turns_camera(&self) -> bool {
+        false
+    }
     /// Star columns, px per unit: `out` holds coefficient after coefficient, each `rows.len()` long.
     /// Returns false, leaving `out` unspecified, when it does not act on stars or lacks what it needs.
     ///
