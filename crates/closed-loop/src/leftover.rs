@@ -20,16 +20,17 @@
 //!
 //! Source: Scargle 1982 (periodogram), the F law of a ratio of two mean powers; Wilks 1938.
 
-use nalgebra::{DMatrix, DVector, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix4, Vector3, Vector4};
+use rayon::prelude::*;
 use spectra::{LombScargle, LombScargleSettings, robust};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use crate::bins::{self, Bins};
 use crate::coloured::Coloured;
 use crate::folds::Folds;
+use crate::frame_rotation::{rotation_inverse, rotation_row};
 use crate::selection::FAMILY_ALPHA;
 use crate::star_data::{StarData, median_step};
-use crate::frame_rotation::{rotation_inverse, rotation_row};
 use crate::star_search::WIDENING;
 use telemetry::report::Unattributed;
 
@@ -84,21 +85,27 @@ impl Leftover {
 /// Searches `tracks`.
 pub(crate) fn describe(tracks: &[Track]) -> Leftover {
     let alpha = FAMILY_ALPHA / (2.0 * tracks.len().max(1) as f64);
+    let each: Vec<_> = tracks
+        .par_iter()
+        .map(Track::thinned)
+        .filter(|track| track.t_s.len() >= MIN_POINTS)
+        .map(|mut track| {
+            let lines = track.lines(alpha);
+            let jumps = track.jumps(alpha);
+            (track, lines, jumps)
+        })
+        .collect();
     let mut out = Leftover::default();
-    for track in tracks {
-        let mut track = track.thinned();
-        if track.t_s.len() < MIN_POINTS {
-            continue;
-        }
+    for (track, lines, jumps) in each {
         let span = track.span();
-        for f in track.lines(alpha) {
+        for f in lines {
             // the same line in two series is one
             if out.lines_hz.iter().all(|g| (f - g).abs() > 1.0 / span) {
                 out.lines_hz.push(f);
             }
         }
         let step = median_step(&track.t_s).unwrap_or(0.0);
-        for t in track.jumps(alpha) {
+        for t in jumps {
             if out.jumps_s.iter().all(|s| (t - s).abs() > 2.5 * step) {
                 out.jumps_s.push(t);
             }
@@ -130,15 +137,15 @@ pub(crate) fn star_tracks(data: &StarData, residual: &[Vec<f64>]) -> Vec<Track> 
         let Some(inverse) = rotation_inverse(data, frame) else {
             continue;
         };
-        let (mut normal, mut moment) = (DMatrix::zeros(4, 4), DVector::zeros(4));
+        let (mut normal, mut moment) = (Matrix4::zeros(), Vector4::zeros());
         for &r in &rows {
             let jacobian = rotation_row(data, r);
             for axis in 0..2 {
                 let growth = data.modelled[axis][r] / half[axis];
                 let [x, y, z] = jacobian[axis];
-                let a = DVector::from_vec(vec![x, y, z, growth]);
-                moment += &a * residual[axis][r];
-                normal += &a * a.transpose();
+                let a = Vector4::new(x, y, z, growth);
+                moment += a * residual[axis][r];
+                normal += a * a.transpose();
             }
         }
         let rotation = inverse * Vector3::new(moment[0], moment[1], moment[2]);
@@ -151,7 +158,7 @@ pub(crate) fn star_tracks(data: &StarData, residual: &[Vec<f64>]) -> Vec<Track> 
         if rows.len() >= 3
             && let Some(covariance) = normal.try_inverse()
         {
-            tracks[3].value[frame] = (&covariance * &moment)[3];
+            tracks[3].value[frame] = (covariance * moment)[3];
             tracks[3].weight[frame] = 1.0 / covariance[(3, 3)];
         }
     }

@@ -34,11 +34,11 @@ mod reference_wander;
 mod search;
 mod selection;
 mod situation;
-mod star_data;
 mod star_columns;
+mod star_data;
 mod star_evidence;
-mod star_moments;
 mod star_loop;
+mod star_moments;
 mod star_search;
 
 pub use close::{Closed, Rival, close};

@@ -230,9 +230,5 @@ pub(crate) fn in_sample(level: &StarEvidence<'_>, found: &Found) -> Option<Vec<V
         candidates: vec![only.spread(&value)],
     };
     let whole = Folds::whole(level.data.frames.frames());
-    Some(
-        level
-            .residuals(&whole, &only.candidates, &amplitudes)
-            .axes,
-    )
+    Some(level.residuals(&whole, &only.candidates, &amplitudes).axes)
 }

@@ -22,6 +22,7 @@ use crate::error::CloseError;
 use crate::evidence::{Amplitudes, Evidence, Residuals};
 use crate::figures;
 use crate::folds::Folds;
+use crate::frame_rotation::rotation_of;
 use crate::image_level::{self, ImageLevel, Side};
 use crate::images::{self, Formed};
 use crate::leftover;
@@ -33,7 +34,6 @@ use crate::search::{Found, amplitudes, fit};
 use crate::selection::columns_of;
 use crate::situation::Situation;
 use crate::star_data::{Inputs, Star, StarData, median_step};
-use crate::frame_rotation::rotation_of;
 use crate::star_evidence::StarEvidence;
 use crate::star_search::{self, Wander};
 use spectra::robust;
@@ -396,15 +396,21 @@ fn finish(f: &Finish<'_>) -> Result<Closed, CloseError> {
         effects.push(effect);
         entries.push(entry);
     }
-    let noise = noise_effects::claim(f.situation, f.level, f.found, f.folds, &after.axes)?;
+    let (noise, leftover) = rayon::join(
+        || noise_effects::claim(f.situation, f.level, f.found, f.folds, &after.axes),
+        || {
+            let inside = noise_effects::in_sample(f.level, f.found);
+            let residual = inside.as_deref().unwrap_or(&after.axes);
+            leftover::describe(&leftover::star_tracks(f.data, residual))
+        },
+    );
+    let noise = noise?;
     effects.extend(noise.effects.iter().cloned());
     entries.extend(noise.entries.iter().cloned());
     model.effects.extend(entries);
 
     let mut unattributed = figures::unattributed(f.found, last / whole);
-    let inside = noise_effects::in_sample(f.level, f.found);
-    let tracks = leftover::star_tracks(f.data, inside.as_deref().unwrap_or(&after.axes));
-    leftover::describe(&tracks).tell(&mut unattributed);
+    leftover.tell(&mut unattributed);
     let excess = excess(f, last);
     let mut considered = figures::considered(f.found, excess);
     considered.retain(|c| !effects.iter().any(|e| e.id == c.id));

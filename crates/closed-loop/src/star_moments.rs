@@ -24,10 +24,10 @@ use rayon::prelude::*;
 use crate::bins::Bins;
 use crate::common_noise::{CommonNoise, Filter, Rotations};
 use crate::folds::Folds;
+use crate::frame_rotation::rotation_row;
 use crate::gram::BlockGrams;
 use crate::star_columns::{Filled, Layout, StarColumns};
 use crate::star_data::StarData;
-use crate::frame_rotation::rotation_row;
 
 /// Frames whose columns are filled at once: enough for the matrix product to
 /// dominate, few enough to stay in cache.
@@ -502,8 +502,7 @@ impl Block {
                 self.inverse.push(None);
             }
         }
-        self.rest
-            .gemm(-1.0, &whitened.transpose(), &whitened, 1.0);
+        self.rest.gemm(-1.0, &whitened.transpose(), &whitened, 1.0);
         self.theta = moments;
     }
 }

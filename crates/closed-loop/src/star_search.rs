@@ -47,7 +47,7 @@ const INSTEAD: f64 = 4.5;
 const SUSPICION: f64 = 0.3;
 /// What looks like a slow error of the reference has to be this far from chance
 /// where one is suspected.
-const SUSPECT_ALPHA: f64 = 1e-3;
+const SUSPECT_ALPHA: f64 = 1e-4;
 /// Most effects that are added.
 const MOST: usize = 8;
 
@@ -158,7 +158,11 @@ impl Scored {
     /// `white` is what white evidence says of what it adds.
     fn stands_instead(&self, other: &Self, white: &Judgement) -> bool {
         let slow = |s: &Self| significant(&s.rotations.slow_ratio(&s.noise)).contains(&true);
-        white.stands() && self.loglik > other.loglik + INSTEAD && !slow(self) && slow(other)
+        white.stands()
+            && white.p_value < SUSPECT_ALPHA
+            && self.loglik > other.loglik + INSTEAD
+            && !slow(self)
+            && slow(other)
     }
 }
 
@@ -198,9 +202,7 @@ impl Trial<'_> {
         let fits = Fits::whole(&grams, &layout, self.variance)?;
         let all: Vec<usize> = (0..layout.candidates).collect();
         let solution = fits.solution(&all)?;
-        let rotations = self
-            .moments
-            .rotations(columns, &solution, solution.len())?;
+        let rotations = self.moments.rotations(columns, &solution, solution.len())?;
         Some(rotations.noise(None))
     }
 
@@ -254,9 +256,7 @@ impl Trial<'_> {
             let grams = self.moments.under(columns, &noise);
             let fits = Fits::whole(&grams, &layout, 1.0)?;
             let solution = fits.solution(&all)?;
-            let rotations = self
-                .moments
-                .rotations(columns, &solution, solution.len())?;
+            let rotations = self.moments.rotations(columns, &solution, solution.len())?;
             let better = rotations.noise(Some(&noise));
             if round < ALTERNATIONS && !better.is_like(&noise) {
                 noise = better;
