@@ -129,6 +129,59 @@ impl Trial {
         }
     }
 
+    /// What the reference says of its own error about x, y, z, 1 sigma, arcsec.
+    pub(crate) fn reference_sigma(&self) -> Result<[f64; 3], PaperError> {
+        let table = self.made.bundle.reference.as_ref();
+        let sigmas = table.and_then(|table| table.sigma_arcsec.as_ref()?.first().copied());
+        sigmas.ok_or_else(|| PaperError::Preset {
+            name: self.name.clone(),
+            what: "no sigma of the reference",
+        })
+    }
+
+    /// Where the star goes that is in the middle of the field at the first frame, x and y, px, frame by
+    /// frame.
+    pub(crate) fn middle_px(&self) -> Result<[Vec<f64>; 2], PaperError> {
+        let star = self.truth[0].inverse() * nalgebra::Vector3::z();
+        let mut path = [const { Vec::new() }; 2];
+        for (frame, q) in self.truth.iter().enumerate() {
+            let at = self
+                .camera()
+                .project(&(q * star))
+                .ok_or_else(|| PaperError::NoAttitude {
+                    name: self.name.clone(),
+                    frame,
+                })?;
+            path[0].push(at.x);
+            path[1].push(at.y);
+        }
+        Ok(path)
+    }
+
+    /// The straight line through that path, from end to end, px.
+    pub(crate) fn migration_px(&self) -> Result<[f64; 2], PaperError> {
+        let n = self.frames() as f64;
+        let middle = 0.5 * (n - 1.0);
+        let square = n * (n * n - 1.0) / 12.0;
+        Ok(self.middle_px()?.map(|path| {
+            let each = path.iter().enumerate();
+            let product: f64 = each.map(|(k, x)| (k as f64 - middle) * x).sum();
+            product / square * n
+        }))
+    }
+
+    /// How fast stars cross the field by the turning of the tracker, px/s at the mean scale, frame by
+    /// frame.
+    pub(crate) fn rate_px_s(&self) -> Vec<f64> {
+        let camera = self.camera();
+        let scale = f64::from(camera.pixels()[0]) / camera.fov()[0].rad();
+        let rates = self.made.rows.t_s.iter();
+        rates
+            .filter_map(|&t| self.made.truth.rate_rad_s(t))
+            .map(|rate| rate.x.hypot(rate.y) * scale)
+            .collect()
+    }
+
     /// What the flight measured, against its reference.
     pub(crate) fn residual(&self) -> Result<Axes, PaperError> {
         self.against(&self.reference, &self.made.measured)

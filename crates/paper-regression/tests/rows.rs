@@ -1,11 +1,11 @@
 //! Every row is computed: from the inputs, and from nothing else.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::Path;
 use std::process::Command;
 
-use paper_regression::{Group, Inputs, m23, page};
+use paper_regression::{Group, Inputs, a01, m23};
 
 /// Enough to compute every row, not enough for their verdicts.
 fn little() -> Inputs {
@@ -47,7 +47,11 @@ fn rows_follow_their_inputs() {
             "distortion and the number",
             "boresight to cross-axis",
             "LSFE",
+            "bias",
             "work per frame",
+            "how fast stars move",
+            "camera's uncertainty",
+            "migration of the stars",
         ];
         if id == "mode in the hybrid model" {
             // that nothing shows there is its claim
@@ -61,17 +65,59 @@ fn rows_follow_their_inputs() {
             after[id]
         );
     }
+    assert_sections(&groups);
+}
+
+/// Names of the rows in each section of the page in `docs/`, by its heading.
+fn sections() -> BTreeMap<String, Vec<String>> {
     let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/paper-regression.md");
-    let current = fs::read_to_string(docs).unwrap();
-    for id in before.keys() {
-        assert!(
-            current.contains(&format!("| {id} |")),
-            "`{id}` is not in docs"
-        );
+    let mut sections = BTreeMap::new();
+    let mut title = None;
+    for line in fs::read_to_string(docs).unwrap().lines() {
+        if let Some(heading) = line.strip_prefix("## ") {
+            assert!(
+                sections.insert(heading.to_owned(), vec![]).is_none(),
+                "`{heading}` twice"
+            );
+            title = Some(heading.to_owned());
+        } else if let Some(cells) = line.strip_prefix("| ") {
+            let id = cells.split(" | ").next().unwrap();
+            if id != "claim" {
+                let title = title.as_ref().expect("a row above all headings");
+                sections.get_mut(title).unwrap().push(id.to_owned());
+            }
+        }
     }
-    // the page holds the other paper's rows too; its being current is checked by the command
-    let rows = |text: &str| text.lines().filter(|l| l.starts_with('|')).count();
-    assert!(rows(&page(&groups)) <= rows(&current));
+    sections
+}
+
+/// The section of each group holds its rows in their order, and no other. Whether their numbers are
+/// current is checked by the command.
+fn assert_sections(groups: &[Group]) {
+    let sections = sections();
+    for group in groups {
+        let ids: Vec<&str> = group.rows.iter().map(|row| row.id.as_str()).collect();
+        let on_page = sections.get(group.title);
+        assert_eq!(on_page.map(Vec::len), Some(ids.len()), "{}", group.title);
+        assert_eq!(on_page.unwrap(), &ids, "{}", group.title);
+    }
+}
+
+/// Every group of both papers has its section, and every section its group; those of the second paper
+/// are held to their rows here, those of the first where its rows are computed.
+#[test]
+fn sections_are_the_groups() {
+    let a01 = a01::groups().unwrap();
+    assert_sections(&a01);
+    let m23 = m23::groups(&Inputs {
+        duration: 0.04,
+        ..little()
+    })
+    .unwrap();
+    let titles: BTreeSet<&str> = m23.iter().chain(&a01).map(|group| group.title).collect();
+    let sections = sections();
+    let on_page: BTreeSet<&str> = sections.keys().map(String::as_str).collect();
+    assert_eq!(titles, on_page);
 }
 
 /// The distortion enters where the paper says, and the centroid error.

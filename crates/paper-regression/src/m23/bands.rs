@@ -11,6 +11,9 @@
 //! (10 / ln 10) sqrt( var_model / (n_model mean^2) + var_flight / (n_flight mean^2) )
 //! ```
 //!
+//! The paper had one flight: what it calls a good fit cannot be told from the model's mean more finely
+//! than one flight scatters about it, `(10 / ln 10) sqrt(var_flight) / mean`.
+//!
 //! Source: \[M23\] Sections 4.2 and 4.3, Figs. 11, 12, 13, 16, 17.
 
 use spectra::Psd;
@@ -43,6 +46,8 @@ fn mean_level(draws: &[[Psd; 3]], axis: usize, band_hz: [f64; 2]) -> [f64; 2] {
 pub(super) struct Misfit {
     pub(super) db: f64,
     pub(super) error_db: f64,
+    /// By how much single flights scatter.
+    pub(super) flight_db: f64,
 }
 
 impl Misfit {
@@ -54,9 +59,11 @@ impl Misfit {
     ) -> Self {
         let [m, m_var] = mean_level(model, axis, band_hz);
         let [f, f_var] = mean_level(flights, axis, band_hz);
+        let decibels = |relative: f64| 10.0 / std::f64::consts::LN_10 * relative;
         Self {
             db: db(m / f),
-            error_db: 10.0 / std::f64::consts::LN_10 * (m_var + f_var).sqrt(),
+            error_db: decibels((m_var + f_var).sqrt()),
+            flight_db: decibels((flights.len() as f64 * f_var).sqrt()),
         }
     }
 
@@ -68,6 +75,16 @@ impl Misfit {
     /// Above by as much.
     pub(super) fn over(self) -> bool {
         self.db > 1.0 + 2.0 * self.error_db
+    }
+
+    /// Within a decibel and two standard deviations of a single flight, that of the means included.
+    pub(super) fn like_one_flight(self) -> bool {
+        self.db.abs() < self.one_flight_db()
+    }
+
+    /// What [`like_one_flight`](Self::like_one_flight) allows, dB.
+    pub(super) fn one_flight_db(self) -> f64 {
+        1.0 + 2.0 * self.flight_db.hypot(self.error_db)
     }
 }
 
@@ -110,5 +127,24 @@ mod tests {
             ..misfit
         };
         assert!(!vague.over(), "2.2 dB of error and 1 dB");
+        // flights of 0.9 and 1.1: one scatters by 0.141 of the mean, 0.614 dB, the means' ratio by 0.1
+        let misfit = Misfit::of(
+            &[flat(1.2), flat(1.2)],
+            &[flat(0.9), flat(1.1)],
+            1,
+            [0.5, 1.5],
+        );
+        let per_cent = 10.0 / 10_f64.ln() / 100.0;
+        assert!((misfit.flight_db - 10.0 * 2_f64.sqrt() * per_cent).abs() < 1e-12);
+        assert!((misfit.one_flight_db() - 1.0 - 20.0 * 3_f64.sqrt() * per_cent).abs() < 1e-12);
+        assert!(
+            misfit.like_one_flight()
+                && !Misfit {
+                    flight_db: 0.0,
+                    error_db: 0.0,
+                    db: -1.01
+                }
+                .like_one_flight()
+        );
     }
 }

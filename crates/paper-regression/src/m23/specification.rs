@@ -4,9 +4,11 @@
 //! ```text
 //! NEA    3 sigma of the attitude under temporal noise alone
 //! LSFE   3 sigma of the attitude under distortion alone, over a track of 0.1 deg/s, about its mean
+//! bias   3 sigma over the tracks of that mean
 //! ```
 //!
-//! The mean over a track is a bias, which Table 1 lists apart.
+//! A tracker's bias may hold more than the mean of its distortion, its mounting above all: what the model
+//! has is a part of it.
 //!
 //! Source: \[M23\] Table 1, Sections 2.1 and 2.2; errata E14, E15, E17.
 
@@ -21,6 +23,7 @@ use crate::{Inputs, PaperError};
 /// Three sigma of Table 1, arcsec: across and about the boresight.
 const NEA: [f64; 2] = [6.0, 49.4];
 const LSFE: [f64; 2] = [3.3, 15.6];
+const BIAS: [f64; 2] = [8.25, 11.1];
 /// Tracks over which the specification is evaluated.
 const TRACKS: u64 = 40;
 /// Frames of a track: 16 deg at 0.1 deg/s.
@@ -32,17 +35,20 @@ fn squares([x, y, z]: &Axes) -> [f64; 2] {
     [0.5 * (square(x) + square(y)), square(z)]
 }
 
-/// The same about the means.
-fn variances(axes: Axes) -> [f64; 2] {
-    squares(&axes.map(|mut axis| {
-        let mean = axis.iter().sum::<f64>() / axis.len() as f64;
-        axis.iter_mut().for_each(|e| *e -= mean);
-        axis
-    }))
+/// The same about the means, and of the means.
+fn variances(axes: Axes) -> [[f64; 2]; 2] {
+    let means = axes
+        .each_ref()
+        .map(|axis| vec![axis.iter().sum::<f64>() / axis.len() as f64]);
+    let mut left = axes;
+    for (axis, mean) in left.iter_mut().zip(&means) {
+        axis.iter_mut().for_each(|e| *e -= mean[0]);
+    }
+    [squares(&left), squares(&means)]
 }
 
-/// NEA and LSFE mean squares of one track.
-fn track(at: u64, inputs: &Inputs) -> Result<[[f64; 2]; 2], PaperError> {
+/// NEA, LSFE and bias mean squares of one track.
+fn track(at: u64, inputs: &Inputs) -> Result<[[f64; 2]; 3], PaperError> {
     let mut flown = towards(scenario("iht", inputs)?, at);
     if let Motion::Hold(hold) = &mut flown.motion {
         // 0.1 deg/s, in a direction of its own
@@ -59,10 +65,9 @@ fn track(at: u64, inputs: &Inputs) -> Result<[[f64; 2]; 2], PaperError> {
         .clone()
         .with_noise(TemporalNoise::circular_arcsec(inputs.sigma_tn_arcsec)?);
     let lens = blank.with_distortion(field(inputs, at)?);
-    Ok([
-        variances(trial.pbm(&noise, at)?),
-        variances(trial.pbm(&lens, at)?),
-    ])
+    let [noise, _] = variances(trial.pbm(&noise, at)?);
+    let [moving, mean] = variances(trial.pbm(&lens, at)?);
+    Ok([noise, moving, mean])
 }
 
 pub(super) fn group(inputs: &Inputs) -> Result<Group, PaperError> {
@@ -80,6 +85,16 @@ pub(super) fn group(inputs: &Inputs) -> Result<Group, PaperError> {
             [
                 Verdict::Consistent,
                 Verdict::Consistent,
+                Verdict::Contradicts,
+            ],
+        ),
+        (
+            2,
+            "bias",
+            BIAS,
+            [
+                Verdict::Consistent,
+                Verdict::Contradicts,
                 Verdict::Contradicts,
             ],
         ),
@@ -128,15 +143,26 @@ pub(super) fn group(inputs: &Inputs) -> Result<Group, PaperError> {
 fn bound(name: &str, place: &str, got: f64, printed: f64, expected: Verdict) -> Row {
     Row {
         id: format!("{name} {place}"),
-        paper: format!("{printed}″, 3σ, at 0.1°/s"),
+        paper: format!(
+            "{printed}″, 3σ{}",
+            if name == "NEA" { ", at 0.1°/s" } else { "" }
+        ),
         ours: format!(
             "{}″, 3σ; {} of the bound",
             digits(got),
             digits(got / printed)
         ),
-        under: "Table 1 as an upper bound; model noise does not grow with the rate".into(),
-        tolerance: "5 %: the scatter over the tracks".into(),
-        verdict: if got < 1.05 * printed {
+        under: match name {
+            "bias" => "Table 1 as an upper bound; the mean of the distortion over a track, and no mounting",
+            _ => "Table 1 as an upper bound; model noise does not grow with the rate",
+        }
+        .into(),
+        tolerance: match name {
+            "bias" => "24 %: two standard errors of the rms of 40 tracks, 1/√80 each",
+            _ => "5 %: the scatter over the tracks",
+        }
+        .into(),
+        verdict: if got < printed * if name == "bias" { 1.24 } else { 1.05 } {
             Verdict::Consistent
         } else {
             Verdict::Contradicts
@@ -228,7 +254,7 @@ mod tests {
             let tracks = (0..6).map(|at| track(at, inputs).unwrap());
             let ratio = |of: [f64; 2]| (of[1] / of[0]).sqrt();
             tracks
-                .map(|[noise, lens]| [ratio(noise), ratio(lens)])
+                .map(|[noise, lens, _]| [ratio(noise), ratio(lens)])
                 .collect::<Vec<_>>()
         };
         let inputs = Inputs::default();

@@ -8,7 +8,7 @@
 use rayon::prelude::*;
 use spectra::Psd;
 
-use super::bands::{Misfit, SEGMENT_S, TOLERANCE, spectra};
+use super::bands::{Misfit, SEGMENT_S, spectra};
 use crate::row::{Group, Row, Verdict, digits};
 use crate::spectrum::{averaged, consistent, level, mean, raw};
 use crate::trial::{Axes, Trial, field, hem, pbm, scenario};
@@ -64,9 +64,7 @@ pub(super) fn group(inputs: &Inputs) -> Result<Group, PaperError> {
         )
     })?;
     let misfit = |model: &[[Psd; 3]]| BANDS.map(|band| Misfit::of(model, &flights, Y, band));
-    let bad = |m: [Misfit; 3]| m.into_iter().any(|m| m.under() || m.over());
-    let worst = |m: [Misfit; 3]| m.into_iter().map(|m| m.db.abs()).fold(0.0, f64::max);
-    let rms = |m: [Misfit; 3]| (m.into_iter().map(|m| m.db.powi(2)).sum::<f64>() / 3.0).sqrt();
+    let fits = |m: [Misfit; 3]| m.into_iter().all(Misfit::like_one_flight);
     let (of_hold, refitted, physics) = (misfit(&tuned), misfit(&again), misfit(&physical));
     let under = format!(
         "y axis; {} draws against {} flights",
@@ -78,32 +76,34 @@ pub(super) fn group(inputs: &Inputs) -> Result<Group, PaperError> {
             m[0], m[1], m[2]
         )
     };
-    let row = |id: &str, paper: &str, m, tolerance: &str, verdict, expected| Row {
+    let row = |id: &str, paper: &str, m: [Misfit; 3], verdict, expected| Row {
         id: id.into(),
         paper: paper.into(),
         ours: told(m),
         under: under.clone(),
-        tolerance: tolerance.into(),
+        tolerance: format!(
+            "{}, {} and {} dB: 1 dB and two deviations of one flight, which is what the paper had",
+            digits(m[0].one_flight_db()),
+            digits(m[1].one_flight_db()),
+            digits(m[2].one_flight_db())
+        ),
         verdict,
         expected,
     };
-    let factor_of_two = |m| match (worst(m) < 3.0, rms(m) < 3.0 && worst(m) < worst(of_hold)) {
-        (true, _) => Verdict::Reproduced,
-        (false, true) => Verdict::Consistent,
-        (false, false) => Verdict::Contradicts,
+    // size and rate of the thrusters' pulses are not printed: what does not come out hangs on them
+    let well = |m| match fits(m) {
+        true => Verdict::Reproduced,
+        false => Verdict::NotReproducible,
     };
-    let within = "reproduced if every band is within 3 dB, a factor of two; consistent if their rms is, and the worst is \
-                  better than tuned on the hold";
-    let mut rows = vec![one_axis(trial)?];
+    let mut rows = vec![camera_frame(trial)?, one_axis(trial)?, migration(&trials)?];
     rows.push(row(
         "thruster hold, hybrid model tuned on the hold",
         "clearly inadequate",
         of_hold,
-        &format!("some band off by {TOLERANCE}, and the worst by more than 3 dB"),
-        if bad(of_hold) && worst(of_hold) > 3.0 {
-            Verdict::Reproduced
-        } else {
+        if fits(of_hold) {
             Verdict::Contradicts
+        } else {
+            Verdict::Reproduced
         },
         Verdict::Reproduced,
     ));
@@ -111,16 +111,14 @@ pub(super) fn group(inputs: &Inputs) -> Result<Group, PaperError> {
         "thruster hold, refitted hybrid model",
         "fits quite well",
         refitted,
-        within,
-        factor_of_two(refitted),
-        Verdict::Consistent,
+        well(refitted),
+        Verdict::Reproduced,
     ));
     rows.push(row(
         "thruster hold, physics-based model, never refitted",
         "worked well as a medium-fidelity model",
         physics,
-        within,
-        factor_of_two(physics),
+        well(physics),
         Verdict::Reproduced,
     ));
     rows.push(heaters(&flights, &physical));
@@ -130,6 +128,61 @@ pub(super) fn group(inputs: &Inputs) -> Result<Group, PaperError> {
                 whose frame bends by 2″ per °C of a heater that cycles in 180 s: an assumption, and in no model."
             .into(),
         rows,
+    })
+}
+
+/// The camera's uncertainty, turned by 15 degrees.
+fn camera_frame(trial: &Trial) -> Result<Row, PaperError> {
+    let [x, y, z] = trial.reference_sigma()?.map(|sigma| 3.0 * sigma);
+    let near = [x - 32.0, y - 1.5, z - 120.0].map(f64::abs);
+    Ok(Row {
+        id: "camera's uncertainty in the tracker's frame".into(),
+        paper:
+            "1.5 and 124″ (3σ) across and about its boresight are (32, 1.5, 120)″ in the tracker"
+                .into(),
+        ours: format!("({}, {}, {})″", digits(x), digits(y), digits(z)),
+        under: "boresights 15° apart, turned about y".into(),
+        tolerance: "half of the printed digits: 0.5, 0.05 and 0.5″".into(),
+        verdict: if near[0] < 0.5 && near[1] < 0.05 && near[2] < 0.5 {
+            Verdict::Reproduced
+        } else {
+            Verdict::Contradicts
+        },
+        expected: Verdict::Reproduced,
+    })
+}
+
+/// How far the stars go on average, beneath the dithering.
+fn migration(trials: &[Trial]) -> Result<Row, PaperError> {
+    let moves = trials
+        .iter()
+        .map(Trial::migration_px)
+        .collect::<Result<Vec<_>, _>>()?;
+    let n = moves.len() as f64;
+    let mean = [0, 1].map(|axis| moves.iter().map(|m| m[axis]).sum::<f64>() / n);
+    let scatter = |axis: usize| {
+        let square = moves.iter().map(|m| (m[axis] - mean[axis]).powi(2));
+        square.sum::<f64>() / (n - 1.0).max(1.0) / n
+    };
+    let (got, error) = (mean[0].hypot(mean[1]), (scatter(0) + scatter(1)).sqrt());
+    Ok(Row {
+        id: "migration of the stars".into(),
+        paper: "about 6.5 px on average in 2.9 h".into(),
+        ours: format!("{} px", digits(got)),
+        under: format!(
+            "straight line through the path of the middle of the field, mean of {} flights: the dithering is of the same size",
+            trials.len()
+        ),
+        tolerance: format!(
+            "{} px: half of the digit, and two standard errors by the scatter between flights",
+            digits(0.05 + 2.0 * error)
+        ),
+        verdict: if (got - 6.5).abs() < 0.05 + 2.0 * error {
+            Verdict::Reproduced
+        } else {
+            Verdict::Contradicts
+        },
+        expected: Verdict::Reproduced,
     })
 }
 
