@@ -115,7 +115,7 @@ pub fn compare(
             settings.seed,
             &mut notes,
         )?;
-        first.push(flight.draw(0, true)?);
+        first.push(flight.draw(0)?);
         flights.push(flight);
     }
     let lost: Vec<bool> = (0..residual.t_s.len())
@@ -156,9 +156,12 @@ pub fn compare(
             ));
         }
         progress(&format!("{} draws of {name}", settings.draws));
-        let draws = |distortion: bool| {
+        let draws = |whole: bool| {
             ensemble(&plans, settings.draws, |draw| {
-                let mut theta = flight.draw(draw, distortion)?;
+                let mut theta = match whole {
+                    true => flight.draw(draw)?,
+                    false => flight.processes_alone(draw)?,
+                };
                 theta.iter_mut().for_each(|axis| without_outliers(axis));
                 Ok::<_, ComparisonError>(theta)
             })

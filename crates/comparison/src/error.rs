@@ -1,9 +1,9 @@
 //! Why a bundle cannot be compared.
 
-use distortion::DistortionError;
 use effects::EffectError;
 use focal_plane::{AttitudeError, CameraError};
 use fogm_fit::FogmError;
+use scenarios::ScenarioError;
 use spectra::SpectraError;
 use star_tracker::TrackerError;
 
@@ -62,12 +62,12 @@ pub enum ComparisonError {
     /// Numbers of the model that make no camera.
     #[error("model: {0}")]
     Camera(#[from] CameraError),
-    /// Numbers of the model outside their range.
+    /// Made-up stars that the model's field has no room for.
     #[error("model: {0}")]
     Tracker(#[from] TrackerError),
-    /// A distortion that cannot be drawn.
+    /// A model that cannot be flown.
     #[error("model: {0}")]
-    Distortion(#[from] DistortionError),
+    Scenario(#[from] ScenarioError),
     /// An effect that cannot be built.
     #[error("model: {0}")]
     Effect(#[from] EffectError),
@@ -77,6 +77,16 @@ pub enum ComparisonError {
     /// No spectrum of a draw.
     #[error("spectrum of a draw: {0}")]
     Draw(#[from] SpectraError),
+    /// A residual that does not vary.
+    #[error(
+        "the residual about {axis} does not vary (standard deviation {std_arcsec:.0e} arcsec, which is rounding): there is no noise to fit; is the reference a copy of the attitude?"
+    )]
+    NoScatter {
+        /// The axis.
+        axis: &'static str,
+        /// Its standard deviation, arcsec.
+        std_arcsec: f64,
+    },
     /// No fit of an axis.
     #[error("fit of the residual about {axis}: {source}")]
     Fit {

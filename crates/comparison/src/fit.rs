@@ -14,8 +14,8 @@
 //! Source: \[M23\] Eq. 15-20; errata E6 to E9.
 
 use fogm_fit::{
-    Convention, Estimate, Fit, FitOptions, HANN_BIN_CORRELATION, LogPsdFit, Preferred, fit_log_psd,
-    fit_psd, fit_times,
+    Convention, Estimate, Fit, FitOptions, Fogm, FogmWhite, HANN_BIN_CORRELATION, LogPsdFit,
+    Preferred, fit_log_psd, fit_psd, fit_times,
 };
 use spectra::Psd;
 use star_tracker::{Purpose, stream};
@@ -26,7 +26,7 @@ use telemetry::{Bundle, HemAxes, HemAxis, Model, ModelKind, ModelTracker};
 
 use crate::ensemble::ensemble;
 use crate::residual::masked;
-use crate::{AXES, ComparisonError, Ensemble, Residual, Spectrum, hybrid};
+use crate::{AXES, ComparisonError, Ensemble, Residual, Spectrum};
 
 /// Draws of the fitted process, and their seed: the same fit says the same twice.
 const DRAWS: u64 = 64;
@@ -34,6 +34,10 @@ const SEED: u64 = 1;
 
 /// A cost per degree of freedom above which the shape counts as something else than FOGM plus white.
 const POOR: f64 = 2.0;
+
+/// A scatter below which a residual holds rounding only: products of unit quaternions are good to some
+/// 1e-10 arcsec.
+const ROUNDING_ARCSEC: f64 = 1e-7;
 
 /// Which frequencies count.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -145,6 +149,13 @@ impl Started {
         let of_spectrum = |source| ComparisonError::Spectrum { axis: name, source };
         let of_fit = |source| ComparisonError::Fit { axis: name, source };
         let kept = residual.kept(axis);
+        let std_arcsec = residual.std_arcsec(axis);
+        if std_arcsec < ROUNDING_ARCSEC {
+            return Err(ComparisonError::NoScatter {
+                axis: name,
+                std_arcsec,
+            });
+        }
         let plan = Spectrum::new(&residual.t_s, &kept).map_err(of_spectrum)?;
         let options = FitOptions {
             band_hz: settings.band_hz,
@@ -165,7 +176,6 @@ impl Started {
             let fine = plan.fine(&kept).map_err(of_spectrum)?;
             fit_psd(&usable(&fine), &options).map_err(of_fit)?
         };
-        let std_arcsec = residual.std_arcsec(axis);
         let raw = plan.raw(&kept).map_err(of_spectrum)?;
         Ok(Self {
             process: preferred_process(&fit, std_arcsec),
@@ -183,15 +193,26 @@ impl Started {
 /// Spectra of draws of the fitted processes.
 fn drawn(t_s: &[f64], started: &[Started; 3]) -> Result<[Ensemble; 3], ComparisonError> {
     let plans = [0, 1, 2].map(|i| started[i].plan.clone());
-    let mut processes = [None; 3];
-    for ((process, axis), name) in processes.iter_mut().zip(started).zip(AXES) {
-        let of_fit = |source| ComparisonError::Fit { axis: name, source };
-        *process = Some(hybrid::process(axis.process).map_err(of_fit)?);
-    }
+    let process = |i: usize| {
+        let HemAxis {
+            sigma_hsf_arcsec,
+            tau_hsf_s,
+            sigma_tn_arcsec,
+        } = started[i].process;
+        Fogm::new(sigma_hsf_arcsec, tau_hsf_s)
+            .and_then(|fogm| FogmWhite::new(fogm, sigma_tn_arcsec))
+            .map_err(|source| ComparisonError::Fit {
+                axis: AXES[i],
+                source,
+            })
+    };
+    let processes = [process(0)?, process(1)?, process(2)?];
     ensemble(&plans, DRAWS, |draw| {
         let mut rng = stream(SEED, draw, Purpose::Estimation);
         Ok(processes.map(|process| {
-            process.map_or_else(Vec::new, |process| hybrid::series(process, t_s, &mut rng))
+            let mut series = vec![0.0; t_s.len()];
+            process.simulate_at_into(t_s, &mut rng, &mut series);
+            series
         }))
     })
 }

@@ -14,28 +14,20 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use centroid::{CentroidError, Triangle};
-use distortion::{DistortionField, LsfSigma};
-use effects::{
-    Effect, FrameGeometry, ParameterValue, Parameters, ReferenceWander, Surroundings, VectorFrame,
-};
+use effects::{Effect, FrameGeometry, ReferenceWander, Surroundings, VectorFrame};
 use focal_plane::{
-    ARCSEC_PER_RAD, Angle, AttitudeSeries, AttitudeSource, Camera, Series, rotation_vector,
+    ARCSEC_PER_RAD, AttitudeSeries, AttitudeSource, Camera, Series, Vectors, rotation_vector,
 };
 use fogm_fit::{Fogm, FogmWhite};
+use scenarios::{Declared, effect_parameters};
 use spectra::robust;
-use star_tracker::{
-    Disturbance, Measured, NoiseStreams, Pbm, Purpose, Scratch, TemporalNoise, stream,
-};
+use star_tracker::{Disturbance, HemState, Measured, NoiseStreams, Purpose, Rows, Scratch, stream};
 use telemetry::report::StarSource;
-use telemetry::{Bundle, EffectEntry, EffectValue, Model, ModelKind};
+use telemetry::{Bundle, EffectEntry, Model, ModelKind};
 
 use crate::ComparisonError;
-use crate::hybrid;
 use crate::stars::Stars;
 
-/// Order of the distortion polynomials where the model does not say: \[M23\] Section 4.2.
-const DISTORTION_ORDER: u32 = 7;
 /// Frames that are simulated at once: bounds the memory of a draw.
 const BATCH: usize = 2048;
 
@@ -46,11 +38,10 @@ pub(crate) struct Flight<'a> {
     truth: &'a AttitudeSeries,
     model: &'a Model,
     seed: u64,
-    /// Camera and stars, unless the model needs none.
-    sky: Option<(Camera, Stars)>,
+    camera: Camera,
+    /// None where the model needs none.
+    stars: Option<Stars>,
     effects: Vec<Arc<dyn Effect>>,
-    /// About x, y, z.
-    processes: Option<[FogmWhite; 3]>,
 }
 
 impl<'a> Flight<'a> {
@@ -67,69 +58,73 @@ impl<'a> Flight<'a> {
         seed: u64,
         notes: &mut Vec<String>,
     ) -> Result<Self, ComparisonError> {
-        let processes = match (model.kind, &model.hem) {
-            (ModelKind::Pbm, _) => None,
-            (ModelKind::Hem, Some(hem)) => Some(hybrid::processes(hem)?),
-            (ModelKind::Hem, None) => {
-                return Err(ComparisonError::NothingToCompare(
-                    "the model is of kind \"hem\" and has no [hem.x], [hem.y], [hem.z]",
-                ));
-            }
-        };
+        let hybrid = model.kind == ModelKind::Hem;
+        if hybrid {
+            scenarios::hybrid_processes(model)?;
+        }
         let distorted = model.noise.distortion_arcsec.is_some_and(|s| s > 0.0);
-        let needs_stars = processes.is_none() || distorted || !model.effects.is_empty();
-        let (sky, effects) = if needs_stars {
+        let (camera, effects, stars) = if !hybrid || distorted || !model.effects.is_empty() {
             let camera = camera(model, bundle)?;
             let effects = built(&model.effects, bundle, &camera, t_s, notes)?;
             let max_stars = model.tracker.max_stars;
             let stars = Stars::of(bundle, &camera, truth, t_s, max_stars, seed)?;
-            (Some((camera, stars)), effects)
+            (camera, effects, Some(stars))
         } else {
-            (None, vec![])
+            // without stars nothing is projected: any camera does
+            (Camera::from_focal_length_px([2, 2], 1.0)?, vec![], None)
         };
         Ok(Self {
             t_s,
             truth,
             model,
             seed,
-            sky,
+            camera,
+            stars,
             effects,
-            processes,
         })
     }
 
     /// Where its stars come from.
     pub(crate) fn stars(&self) -> StarSource {
-        self.sky
-            .as_ref()
-            .map_or(StarSource::None, |(_, stars)| stars.source)
+        let stars = self.stars.as_ref();
+        stars.map_or(StarSource::None, |stars| stars.source)
     }
 
     /// The residual of a draw about x, y, z, arcsec; NaN where the stars fix no attitude.
-    /// `distortion` of a hybrid model may be left out.
     ///
     /// # Errors
     ///
     /// Numbers of the model outside their range.
-    pub(crate) fn draw(
+    pub(crate) fn draw(&self, draw: u64) -> Result<[Vec<f64>; 3], ComparisonError> {
+        let disturbances: Vec<Arc<dyn Disturbance>> = self
+            .effects
+            .iter()
+            .map(|effect| -> Arc<dyn Disturbance> { effect.clone() })
+            .collect();
+        self.of(self.model, &disturbances, draw)
+    }
+
+    /// The same of a hybrid model's processes alone, without distortion and effects.
+    ///
+    /// # Errors
+    ///
+    /// As [`draw`](Self::draw).
+    pub(crate) fn processes_alone(&self, draw: u64) -> Result<[Vec<f64>; 3], ComparisonError> {
+        let mut model = self.model.clone();
+        model.noise.distortion_arcsec = None;
+        self.of(&model, &[], draw)
+    }
+
+    fn of(
         &self,
+        model: &Model,
+        disturbances: &[Arc<dyn Disturbance>],
         draw: u64,
-        distortion: bool,
     ) -> Result<[Vec<f64>; 3], ComparisonError> {
-        let mut theta = match &self.sky {
-            Some((camera, stars)) if distortion || self.processes.is_none() => {
-                self.fly(&self.tracker(camera, draw)?, stars, draw)
-            }
-            _ => [(); 3].map(|()| vec![0.0; self.t_s.len()]),
-        };
-        let mut rng = stream(self.seed, draw, Purpose::Estimation);
-        if let Some(processes) = self.processes {
-            for (theta, process) in theta.iter_mut().zip(processes) {
-                let error = hybrid::series(process, self.t_s, &mut rng);
-                theta.iter_mut().zip(error).for_each(|(t, e)| *t += e);
-            }
-        }
+        let declared = Declared::draw(model, &self.camera, disturbances, self.seed, draw)?;
+        let mut theta = self.fly(&declared, draw);
         let mut rng = stream(self.seed, draw, Purpose::Reference);
+        let mut error = vec![0.0; self.t_s.len()];
         for wander in self.effects.iter().filter_map(|e| e.reference_wander()) {
             let ReferenceWander {
                 sigma_arcsec,
@@ -138,48 +133,44 @@ impl<'a> Flight<'a> {
             for axis in 0..3 {
                 let process = FogmWhite::new(Fogm::new(sigma_arcsec[axis], tau_s[axis])?, 0.0)?;
                 // the reference's error has the other sign, which no spectrum sees
-                let error = hybrid::series(process, self.t_s, &mut rng);
-                theta[axis].iter_mut().zip(error).for_each(|(t, e)| *t -= e);
+                process.simulate_at_into(self.t_s, &mut rng, &mut error);
+                theta[axis]
+                    .iter_mut()
+                    .zip(&error)
+                    .for_each(|(t, e)| *t -= e);
             }
         }
         Ok(theta)
     }
 
-    fn tracker(&self, camera: &Camera, draw: u64) -> Result<Pbm, ComparisonError> {
-        let noise = &self.model.noise;
-        let mut pbm = Pbm::new(camera.clone());
-        // the processes of a hybrid model stand for both
-        if self.processes.is_none() {
-            if let Some(sigma) = noise.temporal_arcsec {
-                pbm = pbm.with_noise(TemporalNoise::circular_arcsec(sigma)?);
-            }
-            if let Some(peak) = noise.centroid_arcsec {
-                pbm = pbm.with_centroid_error(CentroidError::Triangle(Triangle::from_peak(peak)));
-            }
-        }
-        if let Some(sigma) = noise.distortion_arcsec {
-            let order = noise.distortion_order.unwrap_or(DISTORTION_ORDER) as usize;
-            let sigma = LsfSigma::Circular(Angle::from_arcsec(sigma));
-            let mut rng = stream(self.seed, draw, Purpose::Distortion);
-            pbm = pbm.with_distortion(DistortionField::draw(order, sigma, &mut rng)?);
-        }
-        for effect in &self.effects {
-            let disturbance: Arc<dyn Disturbance> = effect.clone();
-            pbm = pbm.with_disturbance(disturbance);
-        }
-        Ok(pbm)
-    }
-
-    fn fly(&self, pbm: &Pbm, stars: &Stars, draw: u64) -> [Vec<f64>; 3] {
+    fn fly(&self, declared: &Declared, draw: u64) -> [Vec<f64>; 3] {
         let mut theta = [(); 3].map(|()| vec![f64::NAN; self.t_s.len()]);
         let mut streams = NoiseStreams::new(self.seed, draw);
+        let mut state = HemState::new(self.seed, draw);
         let (mut scratch, mut out, mut first_row) =
             (Scratch::default(), Measured::default(), vec![]);
+        let none = vec![0; BATCH + 1];
         let mut from = 0;
         while from < self.t_s.len() {
             let to = (from + BATCH).min(self.t_s.len());
-            let rows = stars.rows(self.t_s, from..to, &mut first_row);
-            pbm.measure_into(self.truth, rows, &mut streams, &mut scratch, &mut out);
+            let rows = match &self.stars {
+                Some(stars) => stars.rows(self.t_s, from..to, &mut first_row),
+                None => starless(&self.t_s[from..to], &none[..=to - from]),
+            };
+            match &declared.hem {
+                Some(hem) => hem.measure_into(
+                    self.truth,
+                    rows,
+                    &mut state,
+                    &mut streams,
+                    &mut scratch,
+                    &mut out,
+                ),
+                None => {
+                    let pbm = &declared.pbm;
+                    pbm.measure_into(self.truth, rows, &mut streams, &mut scratch, &mut out);
+                }
+            }
             for k in from..to {
                 let truth = self.truth.attitude(self.t_s[k]);
                 if let (Some(q), Some(truth)) = (out.attitude(k - from), truth) {
@@ -192,6 +183,23 @@ impl<'a> Flight<'a> {
             from = to;
         }
         theta
+    }
+}
+
+/// Frames without stars.
+fn starless<'a>(t_s: &'a [f64], first_row: &'a [usize]) -> Rows<'a> {
+    Rows {
+        t_s,
+        first_row,
+        slot: &[],
+        star_id: &[],
+        mag: &[],
+        bv: &[],
+        direction: Vectors {
+            x: &[],
+            y: &[],
+            z: &[],
+        },
     }
 }
 
@@ -271,25 +279,10 @@ fn built(
             ));
             continue;
         }
-        let parameters: Parameters = entry
-            .parameters
-            .iter()
-            .map(|(name, value)| (name.clone(), parameter(value)))
-            .collect();
+        let parameters = effect_parameters(entry)?;
         out.push(effects::build(&entry.id, &parameters, &surroundings)?.into());
     }
     Ok(out)
-}
-
-fn parameter(value: &EffectValue) -> ParameterValue {
-    match value {
-        EffectValue::Number(number) => ParameterValue::Number(*number),
-        EffectValue::Text(text) => ParameterValue::Text(text.clone()),
-        EffectValue::Numbers(numbers) => {
-            let numbers: Vec<String> = numbers.iter().map(f64::to_string).collect();
-            ParameterValue::Text(numbers.join(","))
-        }
-    }
 }
 
 /// A frame that a draw has no value for.

@@ -13,7 +13,6 @@ mod ensemble;
 mod error;
 mod fit;
 mod flight;
-mod hybrid;
 mod residual;
 mod scene;
 mod spectrum;

@@ -32,7 +32,7 @@ use bins::{Bins, Chosen};
 use exact::Exact;
 use information::Spread;
 use likelihood::{Likelihood, Logs, place_of};
-use surface::{Best, Plane, Region};
+use surface::{Best, Plane, Range, Region};
 use whittle::Whittle;
 
 pub use estimate::{Estimate, Reason};
@@ -432,9 +432,37 @@ fn choose(ln_l: [f64; 3], ln_n: f64) -> Choice {
     }
 }
 
+/// Where the FOGM is not seen, a part of the white noise could still be correlated over less than a step.
+/// No such series tells the two apart, and nothing hangs on it: it counts as white.
+fn white_alone(region: &Region) -> Option<Estimate> {
+    let Range {
+        low,
+        high,
+        open_low,
+        ..
+    } = region.white;
+    let lost = region.ranges[0].open_low && region.ranges[2].open_low;
+    (lost && !open_low && low < high).then(|| {
+        let width = (high - low) / (2.0 * 1.96);
+        let value = (region.best_white - 0.5 * width * width)
+            .clamp(low, high)
+            .exp();
+        Estimate::Estimated {
+            value,
+            sigma: value * width,
+            interval: [low.exp(), high.exp()],
+        }
+    })
+}
+
 /// `spread` is what the spectrum tells at best; without it errors follow from the intervals.
 fn estimates(logs: Logs, plane: &Plane, region: &Region, spread: Option<Spread>) -> [Estimate; 3] {
     std::array::from_fn(|i| {
+        if i == 2
+            && let Some(white) = white_alone(region)
+        {
+            return white;
+        }
         let range = region.ranges[i];
         let (low, high) = (range.low.exp(), range.high.exp());
         match (range.open_low, range.open_high) {

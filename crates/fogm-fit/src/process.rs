@@ -151,6 +151,26 @@ impl FogmWhite {
             *value = self.measure(*value, rng);
         }
     }
+
+    /// Fills `out` with samples at the times `t_s`, which need not be evenly spaced, from a stationary
+    /// start.
+    ///
+    /// # Panics
+    ///
+    /// If `t_s` and `out` differ in length.
+    pub fn simulate_at_into<R: Rng + ?Sized>(self, t_s: &[f64], rng: &mut R, out: &mut [f64]) {
+        assert_eq!(t_s.len(), out.len(), "one time a sample");
+        let mut state = 0.0;
+        let mut last_s = None;
+        for (&t, value) in t_s.iter().zip(out) {
+            match last_s {
+                None => state = self.fogm.start(rng),
+                Some(last) => self.fogm.step(&mut state, t - last, rng),
+            }
+            last_s = Some(t);
+            *value = self.measure(state, rng);
+        }
+    }
 }
 
 pub(crate) fn positive(name: &'static str, value: f64) -> Result<(), FogmError> {

@@ -5,6 +5,7 @@
 #![forbid(unsafe_code)]
 
 mod course;
+mod declared;
 mod error;
 mod housekeeping;
 mod motion;
@@ -16,6 +17,7 @@ mod simulate;
 mod sky;
 
 pub use course::Course;
+pub use declared::{Declared, effect_parameters, hybrid_processes};
 pub use error::ScenarioError;
 pub use housekeeping::{Channel, Housekeeping, OrbitVelocity, SinusoidChannel, Thermostat};
 pub use motion::{

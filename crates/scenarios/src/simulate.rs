@@ -14,30 +14,23 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use centroid::{CentroidError, Triangle};
-use distortion::{DistortionField, LsfSigma};
-use effects::{Effect, FrameGeometry, ParameterValue, Parameters, Surroundings, VectorFrame};
+use effects::{Effect, FrameGeometry, Surroundings, VectorFrame};
 use focal_plane::{Angle, AttitudeSeries, AttitudeSource, Camera, StarFrames, Vectors};
-use fogm_fit::{Fogm, FogmWhite};
 use nalgebra::Vector3;
 use rand_distr::{Distribution, StandardNormal};
 use star_tracker::{
-    Disturbance, Hem, HemState, Measured, NoiseStreams, Pbm, Purpose, Rows, Scratch, Stages,
-    TemporalNoise, stream,
+    Disturbance, Hem, HemState, Measured, NoiseStreams, Pbm, Purpose, Rows, Scratch, Stages, stream,
 };
 use telemetry::{
-    AttitudeTable, Bundle, EffectEntry, EffectValue, Frames, HemAxis, Metadata, Model, ModelKind,
-    QuaternionSigns, TrackerMeta,
+    AttitudeTable, Bundle, EffectEntry, Frames, Metadata, Model, QuaternionSigns, TrackerMeta,
 };
 
+use crate::declared::{Declared, effect_parameters};
 use crate::housekeeping::Channels;
 use crate::reference::Wander;
 use crate::run::{Reported, Run};
 use crate::sky::Seen;
 use crate::{Motion, Scenario, ScenarioError};
-
-/// Order of the distortion polynomials where the model does not say: `[M23]` Section 4.2.
-const DISTORTION_ORDER: u32 = 7;
 
 /// A bundle with what it was made from.
 #[derive(Clone, Debug)]
@@ -106,12 +99,11 @@ pub fn simulate_with_truth(scenario: &Scenario, draw: u64) -> Result<Simulated, 
         frames: channels.vectors.then_some(INERTIAL),
     };
     let effects = build_effects(&model.effects, &surroundings)?;
-    let mut pbm = tracker(model, &camera, seed, draw)?;
+    let mut disturbances: Vec<Arc<dyn Disturbance>> = bias(model, seed, draw).into_iter().collect();
     for effect in &effects {
-        let disturbance: Arc<dyn Disturbance> = effect.clone();
-        pbm = pbm.with_disturbance(disturbance);
+        disturbances.push(effect.clone());
     }
-    let hem = hybrid(model, &pbm)?;
+    let Declared { pbm, hem } = Declared::draw(model, &camera, &disturbances, seed, draw)?;
     let seen = if hem.as_ref().is_none_or(Hem::needs_stars) {
         scenario.sky.follow(
             &camera,
@@ -216,59 +208,14 @@ pub(crate) fn truth_and_times(
     Ok((truth, t_s))
 }
 
-/// The declared tracker: distortion drawn, nothing beyond the model yet but the constant misalignment
-/// of this draw.
-fn tracker(model: &Model, camera: &Camera, seed: u64, draw: u64) -> Result<Pbm, ScenarioError> {
-    let noise = &model.noise;
-    let mut pbm = Pbm::new(camera.clone());
-    // the processes of a hybrid model stand for both
-    let physical = model.kind == ModelKind::Pbm;
-    if let Some(sigma_arcsec) = noise.temporal_arcsec.filter(|_| physical) {
-        pbm = pbm.with_noise(TemporalNoise::circular_arcsec(sigma_arcsec)?);
-    }
-    if let Some(peak_arcsec) = noise.centroid_arcsec.filter(|_| physical) {
-        pbm = pbm.with_centroid_error(CentroidError::Triangle(Triangle::from_peak(peak_arcsec)));
-    }
-    if let Some(sigma_arcsec) = noise.distortion_arcsec {
-        let order = noise.distortion_order.unwrap_or(DISTORTION_ORDER) as usize;
-        let sigma = LsfSigma::Circular(Angle::from_arcsec(sigma_arcsec));
-        let mut rng = stream(seed, draw, Purpose::Distortion);
-        pbm = pbm.with_distortion(DistortionField::draw(order, sigma, &mut rng)?);
-    }
-    if let Some(sigma_arcsec) = noise.bias_arcsec {
-        let mut rng = stream(seed, draw, Purpose::Bias);
-        let theta_rad = Vector3::from(sigma_arcsec.map(|sigma| {
-            let normal: f64 = StandardNormal.sample(&mut rng);
-            Angle::from_arcsec(sigma * normal).rad()
-        }));
-        let bias: Arc<dyn Disturbance> = Arc::new(ConstantMisalignment { theta_rad });
-        pbm = pbm.with_disturbance(bias);
-    }
-    Ok(pbm)
-}
-
-/// The hybrid model over the optics of `pbm`, if the model is of that kind.
-fn hybrid(model: &Model, pbm: &Pbm) -> Result<Option<Hem>, ScenarioError> {
-    let (ModelKind::Hem, Some(axes)) = (model.kind, &model.hem) else {
-        return Ok(None);
-    };
-    let process = |axis: &HemAxis| -> Result<FogmWhite, ScenarioError> {
-        let fogm = Fogm::new(axis.sigma_hsf_arcsec, axis.tau_hsf_s)?;
-        Ok(FogmWhite::new(fogm, axis.sigma_tn_arcsec)?)
-    };
-    let axes = [process(&axes.x)?, process(&axes.y)?, process(&axes.z)?];
-    let mut hem = Hem::new(pbm.camera().clone(), axes);
-    if model
-        .noise
-        .distortion_arcsec
-        .is_some_and(|sigma| sigma > 0.0)
-    {
-        hem = hem.with_distortion(pbm.distortion().clone());
-    }
-    for disturbance in pbm.disturbances() {
-        hem = hem.with_disturbance(disturbance.clone());
-    }
-    Ok(Some(hem))
+/// The unknown constant misalignment of this draw.
+fn bias(model: &Model, seed: u64, draw: u64) -> Option<Arc<dyn Disturbance>> {
+    let mut rng = stream(seed, draw, Purpose::Bias);
+    let theta_rad = Vector3::from(model.noise.bias_arcsec?.map(|sigma| {
+        let normal: f64 = StandardNormal.sample(&mut rng);
+        Angle::from_arcsec(sigma * normal).rad()
+    }));
+    Some(Arc::new(ConstantMisalignment { theta_rad }))
 }
 
 /// The unknown constant misalignment of one draw: part of the declared model, so no effect.
@@ -297,27 +244,10 @@ fn build_effects(
     entries
         .iter()
         .map(|entry| {
-            let built = effects::build(&entry.id, &parameters(entry)?, surroundings)?;
+            let built = effects::build(&entry.id, &effect_parameters(entry)?, surroundings)?;
             Ok(Arc::from(built))
         })
         .collect()
-}
-
-fn parameters(entry: &EffectEntry) -> Result<Parameters, ScenarioError> {
-    let value = |(name, value): (&String, &EffectValue)| {
-        let value = match value {
-            EffectValue::Number(number) => ParameterValue::Number(*number),
-            EffectValue::Text(text) => ParameterValue::Text(text.clone()),
-            EffectValue::Numbers(_) => {
-                return Err(ScenarioError::EffectList {
-                    effect: entry.id.clone(),
-                    name: name.clone(),
-                });
-            }
-        };
-        Ok((name.clone(), value))
-    };
-    entry.parameters.iter().map(value).collect()
 }
 
 fn measure(

@@ -44,8 +44,9 @@ pub enum Estimate {
         /// 95 % interval.
         interval: [f64; 2],
     },
-    /// No more than `limit`; zero is possible. For `sigma_hsf` it holds for correlation times within
-    /// the span: a slower process is a constant, which no series shows.
+    /// No more than `limit`; zero is possible. For `sigma_hsf` it holds for correlation times from one
+    /// step to the span: a slower process is a constant, which no series shows, and a faster one is
+    /// white.
     UpperBound {
         /// The bound.
         limit: f64,

@@ -9,7 +9,7 @@ mod column;
 mod region;
 
 use super::likelihood::{LANES, Likelihood, Logs, Place, logs_of};
-pub(crate) use region::{Region, region};
+pub(crate) use region::{Range, Region, region};
 
 /// The part of the plane that is searched.
 #[derive(Clone, Copy, Debug)]

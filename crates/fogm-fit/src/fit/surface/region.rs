@@ -54,8 +54,12 @@ pub(crate) struct Region {
     pub(crate) best: Best,
     /// `sigma_HSF`, `tau`, `sigma_TN`.
     pub(crate) ranges: [Range; 3],
-    /// Upper end for `sigma_HSF` of correlation times within the span.
+    /// Upper end for `sigma_HSF` of correlation times from one step to the span.
     pub(crate) sigma_high_within_span: f64,
+    /// `sigma_TN` for correlation times of one step and more, and where it is best there: what is
+    /// correlated over less than a step is white to such a series.
+    pub(crate) white: Range,
+    pub(crate) best_white: f64,
 }
 
 /// The region around the maximum `best`, which is replaced should a better one turn up.
@@ -88,6 +92,7 @@ pub(crate) fn region<L: Likelihood>(likelihood: &L, plane: &Plane, best: Best) -
         range.open_low = wide.open_low;
         range.open_high = wide.open_high;
     }
+    region.white.open_low = wide.white.open_low;
     region
 }
 
@@ -176,6 +181,8 @@ fn summarise(weight: f64, plane: &Plane, best: Best, columns: &[Column], drop: f
     let floor = best.ln_l - drop;
     let mut ranges = [Range::EMPTY; 3];
     let mut within = f64::NEG_INFINITY;
+    let mut white = Range::EMPTY;
+    let (mut best_white, mut top) = (f64::NEG_INFINITY, f64::NEG_INFINITY);
     let logs = logs_of(best.place, best.ln_v, plane.dt_s);
     for (range, value) in ranges.iter_mut().zip(logs) {
         range.add(value, value);
@@ -188,6 +195,13 @@ fn summarise(weight: f64, plane: &Plane, best: Best, columns: &[Column], drop: f
         let tip = logs_of(column.best.place, column.best.ln_v, plane.dt_s);
         ranges[0].add(tip[0], tip[0]);
         ranges[2].add(tip[2], tip[2]);
+        let from_step = column.x >= plane.dt_s.ln();
+        if from_step {
+            white.add(tip[2], tip[2]);
+            if column.best.ln_l > top {
+                (best_white, top) = (tip[2], column.best.ln_l);
+            }
+        }
         for node in refined(&column.nodes) {
             let (u, excess) = (node.0, node.1 - floor);
             if excess < 0.0 {
@@ -200,8 +214,12 @@ fn summarise(weight: f64, plane: &Plane, best: Best, columns: &[Column], drop: f
             let small = logs_of(place, node.2 - t_high.ln(), plane.dt_s);
             ranges[0].add(small[0], large[0]);
             ranges[2].add(small[2], large[2]);
-            if column.x <= plane.span_s.ln() {
+            if from_step && column.x <= plane.span_s.ln() {
                 within = within.max(large[0]);
+            }
+            if from_step {
+                white.add(small[2], large[2]);
+                white.open_low |= u >= plane.u[1] - 1e-9;
             }
             ranges[0].open_low |= u <= plane.u[0] + 1e-9;
             ranges[2].open_low |= u >= plane.u[1] - 1e-9;
@@ -217,6 +235,8 @@ fn summarise(weight: f64, plane: &Plane, best: Best, columns: &[Column], drop: f
         best,
         ranges,
         sigma_high_within_span: within,
+        white,
+        best_white,
     }
 }
 
