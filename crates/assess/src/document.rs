@@ -229,19 +229,25 @@ fn estimate(value: f64, sigma: f64, unit: &str) -> Estimate {
 }
 
 impl RotatorFindings {
-    /// Parameters of the last model: rate, misalignment, and all terms.
+    /// Parameters of the last model: inertial spin axis, rate, misalignment, and all terms.
     #[must_use]
     pub fn parameters(&self) -> Vec<NamedEstimate> {
         let fit = &self.closing.last;
-        let mut out: Vec<NamedEstimate> = (0..3)
-            .filter_map(|axis| {
-                let [value, sigma] = fit.estimate(Free::Rate(axis))?;
-                Some(NamedEstimate {
-                    name: format!("rate_{}_deg_s", ["x", "y", "z"][axis]),
-                    estimate: estimate(value.to_degrees(), sigma.to_degrees(), "deg/s"),
-                })
+        let mut out: Vec<NamedEstimate> = ["spin_axis_ra_deg", "spin_axis_dec_deg"]
+            .into_iter()
+            .zip(fit.spin_axis_deg())
+            .map(|(name, [value, sigma])| NamedEstimate {
+                name: name.into(),
+                estimate: estimate(value, sigma, "deg"),
             })
             .collect();
+        out.extend((0..3).filter_map(|axis| {
+            let [value, sigma] = fit.estimate(Free::Rate(axis))?;
+            Some(NamedEstimate {
+                name: format!("rate_{}_deg_s", ["x", "y", "z"][axis]),
+                estimate: estimate(value.to_degrees(), sigma.to_degrees(), "deg/s"),
+            })
+        }));
         out.extend(self.parameters_of(Term::Misalignment, 0));
         for added in self
             .closing

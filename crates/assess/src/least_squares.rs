@@ -102,7 +102,8 @@ pub(crate) fn minimise(
 }
 
 impl Minimum {
-    /// Covariance of the parameters for residuals of `width` to a frame, correlated over `lags` frames.
+    /// Covariance of the parameters for residuals of `width` to a frame, correlated over `lags` frames; no
+    /// variance is less than that of frames that do not go together.
     pub(crate) fn covariance(
         &self,
         width: usize,
@@ -122,7 +123,8 @@ impl Minimum {
             let r = self.residuals.rows(k * width, width);
             scores.set_column(k, &rows.tr_mul(&r));
         }
-        let mut s = &scores * scores.transpose();
+        let alone = &scores * scores.transpose();
+        let mut s = alone.clone();
         let lags = lags.min(frames.saturating_sub(1));
         for lag in 1..=lags {
             let m = frames - lag;
@@ -132,6 +134,16 @@ impl Minimum {
         }
         let spare = (width * frames).saturating_sub(n).max(1) as f64;
         let small = (width * frames) as f64 / spare;
-        Ok(&inverse * s * &inverse * small)
+        let mut together = &inverse * s * &inverse * small;
+        // what is fitted takes its share of the residuals at low frequency, which is all that the lags see:
+        // the sum over them comes out small. No residuals that go together tell more than free ones
+        let alone = &inverse * alone * &inverse * small;
+        let factor = DVector::from_fn(n, |i, _| (alone[(i, i)] / together[(i, i)]).max(1.0).sqrt());
+        for i in 0..n {
+            for j in 0..n {
+                together[(i, j)] *= factor[i] * factor[j];
+            }
+        }
+        Ok(together)
     }
 }

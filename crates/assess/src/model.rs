@@ -305,6 +305,50 @@ impl Fit {
     }
 }
 
+impl Fit {
+    /// The spin axis, inertial: the direction of the angular momentum at the epoch. Right ascension and
+    /// declination, each with its 1 sigma, deg.
+    #[must_use]
+    pub fn spin_axis_deg(&self) -> [[f64; 2]; 2] {
+        let direction = |model: &Rotating| {
+            let l = model.body.epoch.inverse() * model.body.momentum_rad_s();
+            let ra = l.y.atan2(l.x).to_degrees().rem_euclid(360.0);
+            [ra, l.z.atan2(l.x.hypot(l.y)).to_degrees()]
+        };
+        let at = direction(&self.model);
+        let rate = self.model.body.rate_rad_s.norm();
+        let slopes: Vec<[f64; 2]> = self
+            .free
+            .iter()
+            .map(|free| {
+                let mut moved = self.model.clone();
+                let h = 1e-6
+                    * if matches!(free, Free::Rate(_)) {
+                        rate
+                    } else {
+                        1.0
+                    };
+                if let Free::Attitude(axis) = free {
+                    let turn = Vector3::from_fn(|i, _| if i == *axis { h } else { 0.0 });
+                    moved.body.epoch = rotation_from_vector(&turn) * moved.body.epoch;
+                } else {
+                    free.change(&mut moved, h);
+                }
+                let to = direction(&moved);
+                [
+                    ((to[0] - at[0] + 180.0).rem_euclid(360.0) - 180.0) / h,
+                    (to[1] - at[1]) / h,
+                ]
+            })
+            .collect();
+        [0, 1].map(|k| {
+            let g = DVector::from_fn(slopes.len(), |i, _| slopes[i][k]);
+            let variance = g.dot(&(&self.covariance * &g));
+            [at[k], variance.max(0.0).sqrt()]
+        })
+    }
+}
+
 /// A model as a function of small changes to it.
 struct Around<'a, 'b> {
     fitter: &'a Fitter<'b>,

@@ -131,6 +131,7 @@ pub fn compare(
     let mut plans = vec![];
     let mut measured = vec![];
     for (kept, axis) in kept.iter().zip(AXES) {
+        ComparisonError::check_scatter(axis, std_of(kept))?;
         let of_spectrum = |source| ComparisonError::Spectrum { axis, source };
         let plan = Spectrum::new(&residual.t_s, kept).map_err(of_spectrum)?;
         measured.push(plan.of(kept).map_err(of_spectrum)?);

@@ -79,7 +79,7 @@ pub enum ComparisonError {
     Draw(#[from] SpectraError),
     /// A residual that does not vary.
     #[error(
-        "the residual about {axis} does not vary (standard deviation {std_arcsec:.0e} arcsec, which is rounding): there is no noise to fit; is the reference a copy of the attitude?"
+        "the residual about {axis} does not vary (standard deviation {std_arcsec:.0e} arcsec, which is rounding): there is no noise to speak of; is the reference a copy of the attitude?"
     )]
     NoScatter {
         /// The axis.
@@ -95,4 +95,20 @@ pub enum ComparisonError {
         /// Why.
         source: FogmError,
     },
+}
+
+/// A scatter below which a residual holds rounding only: products of unit quaternions are good to some
+/// 1e-10 arcsec.
+const ROUNDING_ARCSEC: f64 = 1e-7;
+
+impl ComparisonError {
+    /// Refuses a residual of rounding.
+    pub(crate) fn check_scatter(axis: &'static str, std_arcsec: f64) -> Result<(), Self> {
+        // NaN has no scatter either
+        if std_arcsec >= ROUNDING_ARCSEC {
+            Ok(())
+        } else {
+            Err(Self::NoScatter { axis, std_arcsec })
+        }
+    }
 }

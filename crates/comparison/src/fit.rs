@@ -35,10 +35,6 @@ const SEED: u64 = 1;
 /// A cost per degree of freedom above which the shape counts as something else than FOGM plus white.
 const POOR: f64 = 2.0;
 
-/// A scatter below which a residual holds rounding only: products of unit quaternions are good to some
-/// 1e-10 arcsec.
-const ROUNDING_ARCSEC: f64 = 1e-7;
-
 /// Which frequencies count.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FitSettings {
@@ -150,12 +146,7 @@ impl Started {
         let of_fit = |source| ComparisonError::Fit { axis: name, source };
         let kept = residual.kept(axis);
         let std_arcsec = residual.std_arcsec(axis);
-        if std_arcsec < ROUNDING_ARCSEC {
-            return Err(ComparisonError::NoScatter {
-                axis: name,
-                std_arcsec,
-            });
-        }
+        ComparisonError::check_scatter(name, std_arcsec)?;
         let plan = Spectrum::new(&residual.t_s, &kept).map_err(of_spectrum)?;
         let options = FitOptions {
             band_hz: settings.band_hz,
