@@ -202,11 +202,11 @@ fn rates(rate_px_s: &[f64]) -> Row {
 
 /// The peak that the paper blames on smear, shutter or turn-around.
 fn peak(seen: &Seen) -> Row {
-    const PEAK: [f64; 2] = [0.0055, 0.0065];
+    const PEAK: [f64; 2] = [0.005, 0.007];
     let stands_out = |draws: &[[Psd; 3]], axis: usize| {
         let all: Vec<Psd> = draws.iter().map(|psd| psd[axis].clone()).collect();
         let mean = mean(&all);
-        let beside = 0.5 * (level(&mean, [0.0045, PEAK[0]]) + level(&mean, [PEAK[1], 0.0075]));
+        let beside = 0.5 * (level(&mean, [0.003, PEAK[0]]) + level(&mean, [PEAK[1], 0.009]));
         level(&mean, PEAK) / beside
     };
     let [flown, model] =
