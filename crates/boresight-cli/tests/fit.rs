@@ -5,6 +5,7 @@ use std::f64::consts::{PI, TAU};
 use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::process::Output;
 
 use assert_cmd::Command;
 use serde_json::Value;
@@ -190,6 +191,16 @@ fn fit(bundle: &Path) -> Result<Value, Box<dyn std::error::Error>> {
     Ok(serde_json::from_slice(&done.stdout)?)
 }
 
+/// `fit BUNDLE --out MODEL.toml`.
+fn fit_to(bundle: &Path, model: &Path) -> std::io::Result<Output> {
+    boresight()
+        .arg("fit")
+        .arg(bundle)
+        .arg("--out")
+        .arg(model)
+        .output()
+}
+
 /// Every parameter within five of its own standard errors of the truth; white noise, FOGM and cost as
 /// the truth has them. The cost is the mean of some 30 squares of unit variance: 1 +- 0.26.
 fn holds(report: &Value) -> Done {
@@ -324,12 +335,7 @@ fn the_model_is_read_again() -> Done {
     let dir = tempfile::tempdir()?;
     let bundle = write(dir.path(), PLAIN, 5)?;
     let model = dir.path().join("hem.toml");
-    let done = boresight()
-        .arg("fit")
-        .arg(&bundle)
-        .arg("--out")
-        .arg(&model)
-        .output()?;
+    let done = fit_to(&bundle, &model)?;
     assert!(done.status.success() && done.stderr.is_empty());
     let text = fs::read_to_string(&model)?;
     assert!(
@@ -409,12 +415,7 @@ fn bad_input_leaves_nothing_behind() -> Done {
         )?;
         break_it(&bundle)?;
         let model = dir.path().join("hem.toml");
-        let done = boresight()
-            .arg("fit")
-            .arg(&bundle)
-            .arg("--out")
-            .arg(&model)
-            .output()?;
+        let done = fit_to(&bundle, &model)?;
         let message = String::from_utf8(done.stderr)?;
         assert_eq!(done.status.code(), Some(2), "{message}");
         assert!(done.stdout.is_empty());
@@ -441,12 +442,7 @@ fn a_fitted_model_is_compared_with_its_bundle() -> Done {
     let dir = tempfile::tempdir()?;
     let bundle = write(dir.path(), PLAIN, 7)?;
     let (model, out) = (dir.path().join("hem.toml"), dir.path().join("figures"));
-    let fitted = boresight()
-        .arg("fit")
-        .arg(&bundle)
-        .arg("--out")
-        .arg(&model)
-        .output()?;
+    let fitted = fit_to(&bundle, &model)?;
     assert!(fitted.status.success());
     let done = boresight()
         .args(["compare", "--json", "--draws", "40"])

@@ -1,10 +1,10 @@
 //! Models flown along simulated bundles: the model that made a bundle agrees with it, another one does not,
 //! and the difference is where it should be.
 
-use comparison::{CompareSettings, ComparisonError, compare};
+use comparison::{CompareSettings, ComparisonError, FitSettings, compare, fit};
 use scenarios::{Scenario, simulate};
-use telemetry::report::{ComparedAxis, StarSource};
-use telemetry::{Bundle, HemAxes, HemAxis, Model, ModelKind};
+use telemetry::report::{ComparedAxis, ComparedBand, StarSource};
+use telemetry::{AttitudeTable, Bundle, HemAxes, HemAxis, Model, ModelKind};
 
 type Done = Result<(), Box<dyn std::error::Error>>;
 
@@ -48,6 +48,32 @@ fn axes(of: &telemetry::report::ComparedModel) -> [&ComparedAxis; 3] {
     [&of.axes.x, &of.axes.y, &of.axes.z]
 }
 
+/// The hybrid model of `sigma_HSF`, `tau`, `sigma_TN` about every axis, else as `model`.
+fn hybrid(model: &Model, [sigma_hsf_arcsec, tau_hsf_s, sigma_tn_arcsec]: [f64; 3]) -> Model {
+    let one = HemAxis {
+        sigma_hsf_arcsec,
+        tau_hsf_s,
+        sigma_tn_arcsec,
+    };
+    Model {
+        kind: ModelKind::Hem,
+        hem: Some(HemAxes {
+            x: one,
+            y: one,
+            z: one,
+        }),
+        ..model.clone()
+    }
+}
+
+/// Error of a band and its 1 sigma, dB.
+fn error_of(band: &ComparedBand) -> Result<[f64; 2], Box<dyn std::error::Error>> {
+    match (band.error_db, band.sigma_db) {
+        (Some(error), Some(sigma)) => Ok([error, sigma]),
+        _ => Err(format!("2000 s at 4 Hz reach every band: {band:?}").into()),
+    }
+}
+
 /// The cost is the mean of some 35 squares of unit variance, 1 +- 0.35, with a long tail: the logarithm of a
 /// density of two degrees of freedom is below -6 sigma once in 3000 bins (it is Gumbel's), which is one more
 /// in the mean. Three such bins at once are 4; wrong models are above 10.
@@ -67,9 +93,7 @@ fn a_bundle_agrees_with_the_model_that_made_it() -> Done {
         );
         assert!(axis.above_3_sigma < 0.2, "{}", axis.above_3_sigma);
         for band in &axis.bands {
-            let (Some(error), Some(sigma)) = (band.error_db, band.sigma_db) else {
-                panic!("2000 s at 4 Hz reach every band: {band:?}");
-            };
+            let [error, sigma] = error_of(band)?;
             assert!(error.abs() < 5.0 * sigma, "{band:?}");
         }
     }
@@ -85,10 +109,7 @@ fn too_much_declared_noise_is_seen_where_it_is() -> Done {
     let compared = compare(&model, &[], &bundle, &settings(32), &|_| ())?;
     for axis in axes(&compared.report.model) {
         let white = axis.bands.last().ok_or("a last band")?;
-        let (error, sigma) = (
-            white.error_db.ok_or("error")?,
-            white.sigma_db.ok_or("sigma")?,
-        );
+        let [error, sigma] = error_of(white)?;
         assert!(
             (-3.52 - 5.0 * sigma..-3.0).contains(&error),
             "{error} +- {sigma}"
@@ -103,20 +124,7 @@ fn too_much_declared_noise_is_seen_where_it_is() -> Done {
 #[test]
 fn models_stand_side_by_side() -> Done {
     let (model, bundle) = made()?;
-    let one = HemAxis {
-        sigma_hsf_arcsec: 0.01,
-        tau_hsf_s: 40.0,
-        sigma_tn_arcsec: 0.2,
-    };
-    let hybrid = Model {
-        kind: ModelKind::Hem,
-        hem: Some(HemAxes {
-            x: one,
-            y: one,
-            z: one,
-        }),
-        ..model.clone()
-    };
+    let hybrid = hybrid(&model, [0.01, 40.0, 0.2]);
     let alone = compare(&model, &[], &bundle, &settings(16), &|_| ())?;
     let both = compare(
         &model,
@@ -186,7 +194,7 @@ fn an_error_of_the_reference_is_declared_or_seen() -> Done {
     for axis in axes(&with.report.model) {
         assert!(axis.log_psd_cost < COST, "{}", axis.log_psd_cost);
         for band in &axis.bands {
-            let (error, sigma) = (band.error_db.ok_or("error")?, band.sigma_db.ok_or("sigma")?);
+            let [error, sigma] = error_of(band)?;
             assert!(error.abs() < 5.0 * sigma, "{band:?}");
         }
     }
@@ -212,20 +220,9 @@ fn threads_change_nothing() -> Done {
 #[test]
 fn a_hybrid_draw_has_the_variance_of_its_process() -> Done {
     let (model, bundle) = made()?;
-    let one = HemAxis {
-        sigma_hsf_arcsec: 3.0,
-        tau_hsf_s: 10.0,
-        sigma_tn_arcsec: 4.0,
-    };
     let hybrid = Model {
-        kind: ModelKind::Hem,
-        hem: Some(HemAxes {
-            x: one,
-            y: one,
-            z: one,
-        }),
         noise: telemetry::ModelNoise::default(),
-        ..model
+        ..hybrid(&model, [3.0, 10.0, 4.0])
     };
     let compared = compare(&hybrid, &[], &bundle, &settings(16), &|_| ())?;
     assert_eq!(compared.report.model.stars, StarSource::None);
@@ -237,6 +234,31 @@ fn a_hybrid_draw_has_the_variance_of_its_process() -> Done {
             axis.model_std_arcsec
         );
     }
+    Ok(())
+}
+
+/// A reference that is a copy of the attitude leaves rounding, of which there is nothing to say.
+#[test]
+fn a_residual_of_rounding_is_refused() -> Done {
+    let (model, mut bundle) = made()?;
+    let reference = bundle.reference.as_ref().ok_or("a reference")?;
+    // a constant misalignment of an arcminute besides, so that nothing is exactly zero
+    let turn =
+        nalgebra::UnitQuaternion::from_scaled_axis(nalgebra::Vector3::new(2e-4, -1e-4, 1e-4));
+    bundle.attitude = Some(AttitudeTable {
+        t_s: reference.t_s.clone(),
+        q: reference.q.iter().map(|q| turn * q).collect(),
+    });
+    let fitted = fit(&bundle, &FitSettings::default());
+    assert!(matches!(
+        fitted,
+        Err(ComparisonError::NoScatter { axis: "x", .. })
+    ));
+    let compared = compare(&model, &[], &bundle, &settings(8), &|_| ());
+    assert!(matches!(
+        compared,
+        Err(ComparisonError::NoScatter { axis: "x", .. })
+    ));
     Ok(())
 }
 

@@ -2,7 +2,8 @@
 //!
 //! ```text
 //! linear       steps of 1, 2 or 5 times a power of ten, some six of them
-//! logarithmic  decades, with 2 and 5 where there are fewer than two of them; light lines at 2 to 9
+//! logarithmic  decades, with 2 and 5 where there are fewer than two of them; light lines at 2 to 9;
+//!              the steps of a linear axis where even of these there would be fewer than three
 //! ```
 //!
 //! Not physics: drawing.
@@ -139,7 +140,35 @@ impl Laid {
         out
     }
 
+    /// Round numbers at equal steps on a logarithmic axis of a fraction of a decade.
+    fn narrow_ticks(&self, about: f64) -> Vec<Tick> {
+        let [low, high] = self.ends.map(|e| 10_f64.powf(e));
+        let step = nice((high - low) / about.max(1.0));
+        let decimals = (-step.log10().floor()).max(0.0);
+        let mut out = vec![];
+        let mut k = (low / step).ceil();
+        while k * step <= high + 1e-9 * step {
+            out.push(Tick {
+                px: self.at(k * step),
+                text: Some(written(k * step, decimals)),
+            });
+            k += 1.0;
+        }
+        out
+    }
+
     fn log_ticks(&self, about: f64) -> Vec<Tick> {
+        let ticks = self.decade_ticks(about);
+        let labels = ticks.iter().filter(|tick| tick.text.is_some()).count();
+        // a decade has 1, 2 and 5
+        if labels < 3 && self.ends[1] - self.ends[0] < 1.0 {
+            self.narrow_ticks(about)
+        } else {
+            ticks
+        }
+    }
+
+    fn decade_ticks(&self, about: f64) -> Vec<Tick> {
         let [low, high] = self.ends;
         let decades = high - low;
         let every = (decades / about.max(1.0)).ceil().max(1.0);
@@ -152,7 +181,12 @@ impl Laid {
                 if place < low - 1e-9 || place > high + 1e-9 {
                     continue;
                 }
+                let plain = few && (-3.5..4.5).contains(&exponent);
                 let text = match digit {
+                    1 | 2 | 5 if plain => {
+                        let value = f64::from(digit) * 10_f64.powf(exponent);
+                        Some(written(value, (-exponent).max(0.0)))
+                    }
                     1 if (exponent / every).fract().abs() < 1e-9 => Some(power(exponent)),
                     2 | 5 if few => Some(format!("{digit}·{}", power(exponent))),
                     _ => None,
@@ -244,7 +278,26 @@ mod tests {
             ["10⁻⁴", "10⁻³", "10⁻²", "10⁻¹", "1", "10"]
         );
         let narrow = Laid::new(&Axis::log("Hz").over(0.03, 0.3), None, [0.0, 100.0]);
-        assert_eq!(texts(&narrow.ticks(8.0)), ["5·10⁻²", "10⁻¹", "2·10⁻¹"]);
+        assert_eq!(texts(&narrow.ticks(8.0)), ["0.05", "0.1", "0.2"]);
+        let spans = Laid::new(&Axis::log("s").over(4.5, 170.0), None, [0.0, 100.0]);
+        assert_eq!(texts(&spans.ticks(8.0)), ["5", "10", "20", "50", "100"]);
+        let tiny = Laid::new(&Axis::log("Hz").over(1e-7, 1e-6), None, [0.0, 100.0]);
+        assert_eq!(
+            texts(&tiny.ticks(8.0)),
+            ["10⁻⁷", "2·10⁻⁷", "5·10⁻⁷", "10⁻⁶"]
+        );
+    }
+
+    /// From 22 to 36 there is neither 20 nor 50: an axis without numbers says nothing.
+    #[test]
+    fn a_fraction_of_a_decade_has_its_numbers() {
+        let laid = Laid::new(&Axis::log("arcsec").over(22.0, 36.0), None, [0.0, 100.0]);
+        let ticks = laid.ticks(5.0);
+        assert_eq!(texts(&ticks), ["25", "30", "35"]);
+        assert!(
+            (ticks[1].px - 100.0 * (30.0_f64 / 22.0).log10() / (36.0_f64 / 22.0).log10()).abs()
+                < 1e-9
+        );
     }
 
     #[test]

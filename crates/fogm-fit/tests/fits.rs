@@ -211,6 +211,42 @@ fn white_noise_has_no_correlation_time() -> Result<(), Failure> {
     Ok(())
 }
 
+/// The white noise of a white series has its value, although no series tells it from a process that is
+/// correlated over less than a step: within five of its sigmas, and those within 3.5 times 1/sqrt(2n), the
+/// error if nothing but white noise could be there.
+#[test]
+fn white_noise_of_a_white_series_has_its_value() -> Result<(), Failure> {
+    for (n, seeds) in [(300, 40), (4000, 20)] {
+        let (mut mean, mut square) = (0.0, 0.0);
+        for seed in 0..seeds {
+            let mut rng = Xoshiro256PlusPlus::seed_from_u64(900 + seed);
+            let y: Vec<f64> = (0..n)
+                .map(|_| rand_distr::StandardNormal.sample(&mut rng))
+                .collect();
+            let fit = fit_series(&y, 10.0, &FitOptions::default())?;
+            let white = fit.sigma_tn;
+            let Some((value, sigma)) = white.value().zip(white.sigma()) else {
+                // short and by chance coloured: declared, not told
+                assert!(n == 300, "{seed}: {white:?}");
+                continue;
+            };
+            assert!((value - 1.0).abs() < 5.0 * sigma, "{seed}: {white:?}");
+            let least = 1.0 / f64::from(2 * n).sqrt();
+            assert!(
+                n == 300 || (0.7 * least..3.5 * least).contains(&sigma),
+                "{seed}: {white:?}"
+            );
+            mean += (value - 1.0) / sigma / seeds as f64;
+            square += ((value - 1.0) / sigma).powi(2) / seeds as f64;
+        }
+        assert!(
+            mean.abs() < 5.0 / (seeds as f64).sqrt() && square < 2.5,
+            "{n}: {mean} {square}"
+        );
+    }
+    Ok(())
+}
+
 /// A process ten times slower than the span is a random walk: tau has no upper end. FOGM and white
 /// are both there. Of 40 series all but 1 % (gate 4) say so.
 #[test]
