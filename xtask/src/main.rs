@@ -119,12 +119,13 @@ const FIXTURES: &[Step] = &[Step {
     env: &[],
 }];
 
-/// In the profile of the tests, which is optimised: what it builds, the tests need anyway, and the release
-/// profile would take longer to build than it saves.
+/// From nothing, the release profile takes half the time to build that the tests' profile does: it leaves
+/// procedural macros unoptimised.
 const PAPER: Step = Step {
     name: "paper",
     args: &[
         "run",
+        "--release",
         "--quiet",
         "--package",
         "paper-regression",
@@ -133,6 +134,7 @@ const PAPER: Step = Step {
     ],
     env: &[],
 };
+/// In the profile of the tests, which build the same: the numbers are the same in both.
 const PAPER_CHECK: Step = Step {
     name: "paper --check",
     args: &[
@@ -297,10 +299,14 @@ mod tests {
     /// What CI holds the page against is what writes it, and leaves it alone.
     #[test]
     fn the_page_is_checked_by_what_writes_it() {
-        let words: Vec<&str> = PAPER_CHECK.args.iter().copied().collect();
-        let writes: Vec<&str> = words.iter().copied().filter(|w| *w != "--check").collect();
-        assert_eq!(writes, PAPER.args);
-        assert_eq!(words.len(), PAPER.args.len() + 1);
+        let without = |step: &Step, word: &str| -> Vec<&str> {
+            step.args.iter().copied().filter(|w| *w != word).collect()
+        };
+        assert_eq!(
+            without(&PAPER_CHECK, "--check"),
+            without(&PAPER, "--release")
+        );
+        assert!(PAPER_CHECK.args.contains(&"--check"));
     }
 
     #[test]

@@ -79,6 +79,8 @@ impl RequirementCheck {
 /// The rigid body route.
 #[derive(Clone, Debug)]
 pub struct RotatorFindings {
+    /// Times of the frames that the body was fitted to, s: all, or every so many of a long record.
+    pub t_s: Vec<f64>,
     /// Where it began.
     pub start: Start,
     /// The loop.
@@ -181,6 +183,10 @@ fn quick_noise(residual: &[Vec<f64>; 3]) -> [f64; 3] {
     noise.map(|n| n.max(1e-2 * most))
 }
 
+/// Frames that a rigid body is fitted to at most: evenly taken out of more. Fits and folds cost some
+/// hundred evaluations of each, and slow errors need no more.
+const MOST_FRAMES: usize = 20_000;
+
 fn by_rotator(
     observed: &Observed,
     options: &Options,
@@ -188,16 +194,24 @@ fn by_rotator(
 ) -> Result<Found, AssessError> {
     let inertia = options.inertia.map(Inertia::principal).transpose()?;
     let given = options.alignment.map(alignment).transpose()?;
+    let every = observed.len().div_ceil(MOST_FRAMES);
+    let fitted = observed.every(every);
     tell("rigid body");
-    let start = start(observed, inertia, given)?;
-    let fitter = crate::Fitter::new(observed, observed.middle_s());
+    let start = start(&fitted, inertia, given)?;
+    let fitter = crate::Fitter::new(&fitted, fitted.middle_s());
     let noise = quick_noise(&fitter.residual_arcsec(&start.model)?);
-    let closing = closing::close(observed, &start, noise, tell)?;
+    let closing = closing::close(&fitted, &start, noise, tell)?;
     let body = closing.axisymmetric.residual_body_arcsec();
     let aligned = &closing.aligned;
     let rate = aligned.model.to_body.inverse() * aligned.model.body.momentum_rad_s();
     let spin_rpm = aligned.model.body.rate_rad_s.norm() * 60.0 / core::f64::consts::TAU;
     let mut notes = Vec::new();
+    if every > 1 {
+        notes.push(format!(
+            "the rigid body is fitted to one frame of every {every}, {} of them; the noise is that of all",
+            fitted.len()
+        ));
+    }
     if spin_rpm > SPIN_LIMITS_RPM[0] {
         let beyond = if spin_rpm > SPIN_LIMITS_RPM[1] {
             "beyond which the tracker of [A01] is expected to lose its stars"
@@ -217,11 +231,13 @@ fn by_rotator(
         notes.push("no nutation shows: nothing can be said of the moments of inertia".into());
     }
     let axis = rate.try_normalize(0.0).unwrap_or_else(Vector3::zeros);
+    let of_all = crate::Fitter::new(observed, fitter.epoch_s());
     Ok(Found {
         t_s: observed.t_s.clone(),
-        residual_arcsec: aligned.residual_arcsec.clone(),
-        whiter: Some(closing.last.residual_arcsec.clone()),
+        residual_arcsec: of_all.residual_arcsec(&aligned.model)?,
+        whiter: Some(of_all.residual_arcsec(&closing.last.model)?),
         rotator: Some(RotatorFindings {
+            t_s: fitted.t_s.clone(),
             spin_rpm,
             spin_axis: axis,
             mean_before_deg: body.each_ref().map(|x| mean(x) / 3600.0),

@@ -132,16 +132,17 @@ impl Assessment {
     /// Residuals before and after the loop, out of fold; `None` without a rigid body.
     #[must_use]
     pub fn residuals(&self) -> Option<AttitudeResiduals> {
-        let closing = &self.rotator.as_ref()?.closing;
-        let (first, last) = (self.t_s[0], self.t_s[self.t_s.len() - 1]);
+        let rotator = self.rotator.as_ref()?;
+        let (closing, t_s) = (&rotator.closing, &rotator.t_s);
+        let (first, last) = (t_s[0], t_s[t_s.len() - 1]);
         #[expect(clippy::cast_possible_truncation, reason = "five folds")]
         let fold = |t: &f64| fold_of([first, last], *t) as u32;
         Some(AttitudeResiduals {
-            t_s: self.t_s.clone(),
+            t_s: t_s.clone(),
             before_arcsec: closing.before_arcsec.clone(),
             after_arcsec: closing.after_arcsec.clone(),
-            fold: self.t_s.iter().map(fold).collect(),
-            outlier: vec![false; self.t_s.len()],
+            fold: t_s.iter().map(fold).collect(),
+            outlier: vec![false; t_s.len()],
         })
     }
 

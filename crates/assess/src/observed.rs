@@ -129,6 +129,15 @@ impl Observed {
         0.5 * (self.t_s[0] + self.t_s[self.len() - 1])
     }
 
+    /// One frame of every so many.
+    pub(crate) fn every(&self, count: usize) -> Self {
+        let count = count.max(1);
+        Self {
+            step_s: self.step_s * count as f64,
+            ..self.only(|k| k % count == 0)
+        }
+    }
+
     /// Frames for which `keep` holds.
     pub(crate) fn only(&self, keep: impl Fn(usize) -> bool) -> Self {
         let index: Vec<usize> = (0..self.len()).filter(|k| keep(*k)).collect();

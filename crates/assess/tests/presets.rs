@@ -154,6 +154,39 @@ fn image_is_recovered() {
     }
 }
 
+/// A long record: 24 000 frames at 40 Hz of a body that spins, more than are fitted. Every second one is, the
+/// noise is that of all, known to 1/sqrt(2 n) and a little more; the table of residuals fits its own times.
+#[test]
+fn a_long_record_is_thinned_for_the_fit_alone() {
+    let mut long = scenario("image", 5);
+    long.run.duration_s = Some(600.0);
+    long.run.rate_hz = Some(40.0);
+    if let Motion::Rotator(rotator) = &mut long.motion {
+        rotator.sinusoid.clear();
+    }
+    let found = run(&simulate(&long).expect("a bundle"), &known());
+    assert_eq!(found.counts.used, 24_000);
+    assert_eq!(found.t_s.len(), 24_000);
+    let table = found.residuals().unwrap();
+    assert_eq!(table.t_s.len(), 12_000);
+    assert_eq!(table.before_arcsec[2].len(), 12_000);
+    assert!(
+        found
+            .notes
+            .iter()
+            .any(|n| n.contains("one frame of every 2,"))
+    );
+    let noise = found.report.inherent_arcsec.unwrap();
+    for (got, truth) in noise.into_iter().zip([2.0, 2.0, 22.9]) {
+        near(
+            got,
+            truth,
+            5.0 * 2.0 * truth / f64::sqrt(48_000.0),
+            "noise",
+        );
+    }
+}
+
 /// Without inertia and alignment: the ratio comes from the nutation, the rest is as before.
 #[test]
 fn nothing_but_quaternions_is_enough() {

@@ -1,5 +1,7 @@
 //! All that is printed.
 
+use std::io::{ErrorKind, Write, stdout};
+use std::process;
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
@@ -40,27 +42,24 @@ impl Console {
     }
 
     /// A result for people; nothing under `--json` or `--quiet`.
-    #[expect(clippy::print_stdout, reason = "results go to stdout, here alone")]
     pub(crate) fn say(&self, text: &str) {
         self.bar.finish_and_clear();
         if !self.json && !self.quiet {
-            println!("{}", text.trim_end());
+            out(&format!("{}\n", text.trim_end()));
         }
     }
 
     /// A file that was asked for, as it is, whatever the flags.
-    #[expect(clippy::print_stdout, reason = "results go to stdout, here alone")]
     pub(crate) fn text(&self, text: &str) {
         self.bar.finish_and_clear();
-        print!("{text}");
+        out(text);
     }
 
     /// A result for machines; nothing without `--json`.
-    #[expect(clippy::print_stdout, reason = "results go to stdout, here alone")]
     pub(crate) fn machine(&self, text: &str) {
         self.bar.finish_and_clear();
         if self.json {
-            println!("{text}");
+            out(&format!("{text}\n"));
         }
     }
 
@@ -69,5 +68,20 @@ impl Console {
     pub(crate) fn error(&self, error: &anyhow::Error) {
         self.bar.finish_and_clear();
         eprintln!("error: {error:#}");
+    }
+}
+
+/// Results go to stdout, here alone. A reader that has seen enough (`| head`) is no error; a disk that is
+/// full is one.
+#[expect(clippy::exit, clippy::print_stderr, reason = "nobody is left to tell")]
+fn out(text: &str) {
+    let mut stdout = stdout().lock();
+    if let Err(error) = stdout
+        .write_all(text.as_bytes())
+        .and_then(|()| stdout.flush())
+        && error.kind() != ErrorKind::BrokenPipe
+    {
+        eprintln!("error: stdout: {error}");
+        process::exit(2);
     }
 }

@@ -96,11 +96,10 @@ impl<'a> Flight<'a> {
     ///
     /// Numbers of the model outside their range.
     pub(crate) fn draw(&self, draw: u64) -> Result<[Vec<f64>; 3], ComparisonError> {
-        let disturbances: Vec<Arc<dyn Disturbance>> = self
-            .effects
-            .iter()
-            .map(|effect| -> Arc<dyn Disturbance> { effect.clone() })
-            .collect();
+        let mut disturbances: Vec<Arc<dyn Disturbance>> = vec![];
+        for effect in &self.effects {
+            disturbances.push(effect.clone());
+        }
         self.of(self.model, &disturbances, draw)
     }
 
