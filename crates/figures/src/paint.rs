@@ -106,9 +106,11 @@ pub(crate) fn mark(out: &mut String, mark: &Mark, frame: &Frame) {
                 path(&mut d, &points);
                 d.push('Z');
             }
+            // a rim: where the band is thinner than a pixel, it is all that shows
+            let rim = (2.0 * opacity).min(1.0);
             let _ = write!(
                 out,
-                r#"<path d="{d}" fill="{colour}" fill-opacity="{opacity}" stroke="none"/>"#
+                r#"<path d="{d}" fill="{colour}" fill-opacity="{opacity}" stroke="{colour}" stroke-opacity="{rim}" stroke-width="0.7" stroke-linejoin="round"/>"#
             );
         }
         Shape::Points {
