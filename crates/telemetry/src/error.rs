@@ -164,6 +164,18 @@ pub enum TelemetryError {
         /// What is wrong with it.
         reason: String,
     },
+    /// A Parquet file whose compression is not read.
+    #[error(
+        "{file}, column {column}: expected snappy compression or none, found {found}; write the file anew with one of them"
+    )]
+    Compression {
+        /// File.
+        file: String,
+        /// The column.
+        column: String,
+        /// Its compression.
+        found: String,
+    },
     /// One table in two files.
     #[error("table {table}: expected one file, found both {first} and {second}")]
     TwoForms {

@@ -551,6 +551,19 @@ fn parquet_cut_short() {
 }
 
 #[test]
+fn parquet_of_another_compression() {
+    check(
+        &fixture("gzip_columns"),
+        &[
+            "b/attitude.parquet",
+            "column t_s",
+            "expected snappy compression or none",
+            "found gzip",
+        ],
+    );
+}
+
+#[test]
 fn parquet_without_a_column() {
     let mut files = fixture("columnar");
     let reference = files.remove("reference.parquet").unwrap();

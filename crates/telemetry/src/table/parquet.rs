@@ -13,6 +13,8 @@ use arrow_array::{Array, ArrayRef, RecordBatch};
 use arrow_schema::DataType;
 use bytes::Bytes;
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
+use parquet::basic::Compression;
+use parquet::file::metadata::RowGroupMetaData;
 use parquet::file::reader::ChunkReader;
 
 use super::{Builder, RawTable, Setting};
@@ -49,6 +51,21 @@ fn read_chunks<C: ChunkReader + 'static>(
     let fields = opened.schema().fields().clone();
     let header = fields.iter().map(|field| field.name().trim().to_owned());
     let mut builder = Builder::new(file, header.collect(), setting)?;
+    for column in opened
+        .metadata()
+        .row_groups()
+        .iter()
+        .flat_map(RowGroupMetaData::columns)
+    {
+        let compression = column.compression();
+        if !matches!(compression, Compression::UNCOMPRESSED | Compression::SNAPPY) {
+            return Err(TelemetryError::Compression {
+                file: file.into(),
+                column: column.column_path().string(),
+                found: compression.to_string().to_lowercase(),
+            });
+        }
+    }
     let batches = opened
         .with_batch_size(BATCH)
         .build()
