@@ -178,12 +178,7 @@ fn a_long_record_is_thinned_for_the_fit_alone() {
     );
     let noise = found.report.inherent_arcsec.unwrap();
     for (got, truth) in noise.into_iter().zip([2.0, 2.0, 22.9]) {
-        near(
-            got,
-            truth,
-            5.0 * 2.0 * truth / f64::sqrt(48_000.0),
-            "noise",
-        );
+        near(got, truth, 5.0 * 2.0 * truth / f64::sqrt(48_000.0), "noise");
     }
 }
 
