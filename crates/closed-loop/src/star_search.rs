@@ -42,7 +42,7 @@ const ALTERNATIONS: usize = 2;
 pub(crate) const WIDENING: f64 = 1.3;
 /// An effect that leaves no slow error behind explains the residual in its place:
 /// it has to be this many times likelier (natural logarithm).
-const INSTEAD: f64 = 4.5;
+const INSTEAD: f64 = 6.0;
 /// Chance under white noise below which a slow error is not even a suspicion.
 const SUSPICION: f64 = 0.3;
 /// What looks like a slow error of the reference has to be this far from chance
