@@ -34,6 +34,7 @@ mod reference_wander;
 mod search;
 mod selection;
 mod situation;
+mod stand_ins;
 mod star_columns;
 mod star_data;
 mod star_evidence;

@@ -30,6 +30,7 @@ use crate::search::{Fitted, Found, borrowed, fit_grams, polish, search};
 use crate::selection::{
     FAMILY_ALPHA, Group, Judgement, Selection, columns_of, judged, price, ranked,
 };
+use crate::stand_ins::stand_ins;
 use crate::star_evidence::StarEvidence;
 use crate::star_moments::StarMoments;
 
@@ -50,6 +51,8 @@ const SUSPICION: f64 = 0.3;
 const SUSPECT_ALPHA: f64 = 1e-4;
 /// Most effects that are added.
 const MOST: usize = 8;
+/// Searches whose outcome is refused before one is taken as it is.
+const MOST_REFUSALS: usize = 8;
 
 /// The slow error of the reference as it was found.
 #[derive(Clone, Debug)]
@@ -82,44 +85,61 @@ pub(crate) fn run<'a>(
     } else {
         declared_noise(white, folds)?
     };
-    let mut suspected = false;
-    let mut list = candidates();
-    let mut may: Vec<bool> = list.iter().map(|c| eligible(c.as_ref())).collect();
-    let mut begun = None;
+    let mut may: Vec<bool> = candidates().iter().map(|c| eligible(c.as_ref())).collect();
+    for _ in 0..MOST_REFUSALS {
+        let (searched, suspected) = attempt(white, folds, candidates(), &may, start)?;
+        let found = &searched.found;
+        let mut refused: Vec<usize> = found.selection.chosen.clone();
+        refused.retain(|&g| {
+            suspected
+                && found.candidates[g].acts_on_attitude()
+                && found.selection.judged[g].p_value > SUSPECT_ALPHA
+        });
+        refused.extend(stand_ins(found));
+        if refused.is_empty() {
+            return Ok(searched);
+        }
+        for g in refused {
+            may[g] = false;
+        }
+    }
+    Ok(attempt(white, folds, candidates(), &may, start)?.0)
+}
+
+/// One search, and whether a slow error of the reference is suspected that is not
+/// part of what was found.
+fn attempt<'a>(
+    white: &StarEvidence<'a>,
+    folds: &Folds,
+    mut candidates: Vec<Box<dyn Candidate>>,
+    may: &[bool],
+    start: Option<CommonNoise>,
+) -> Result<(Searched<'a>, bool), CloseError> {
+    let (mut suspected, mut begun) = (false, None);
     if let Some(start) = start {
         let Coloured {
             searched,
             wander,
             white: plain,
-        } = coloured(white, folds, list, &may, start)?;
+        } = coloured(white, folds, candidates, may, start)?;
         // Less than that imitates no effect, and would only hide one.
         if wander.axes().contains(&true) {
-            return Ok(Searched {
+            let searched = Searched {
                 wander: Some(wander),
                 ..searched
-            });
+            };
+            return Ok((searched, false));
         }
         suspected = chances(&wander.ratio).iter().any(|p| *p < SUSPICION);
-        list = searched.found.candidates;
+        candidates = searched.found.candidates;
         begun = Some(plain);
     }
-    loop {
-        let found = search(white, folds, list, &may, begun.take())?;
-        let imitator = found.selection.chosen.iter().copied().find(|&g| {
-            suspected
-                && found.candidates[g].acts_on_attitude()
-                && found.selection.judged[g].p_value > SUSPECT_ALPHA
-        });
-        let Some(imitator) = imitator else {
-            return Ok(Searched {
-                found,
-                evidence: None,
-                wander: None,
-            });
-        };
-        may[imitator] = false;
-        list = candidates();
-    }
+    let searched = Searched {
+        found: search(white, folds, candidates, may, begun)?,
+        evidence: None,
+        wander: None,
+    };
+    Ok((searched, suspected))
 }
 
 /// Noise of the declared model's residual, where it may hold a slow error. How much
