@@ -42,6 +42,14 @@ pub enum CloseError {
         /// Where the others went.
         why: &'static str,
     },
+    /// A hypothesis that the catalogue does not have.
+    #[error("`{id}` is no effect of the catalogue, which has: {known}")]
+    UnknownHypothesis {
+        /// What was asked about.
+        id: String,
+        /// All ids.
+        known: String,
+    },
     /// The declared unknowns cannot be solved for.
     #[error(
         "the declared unknowns cannot be estimated from this data: the normal equations are singular"

@@ -86,7 +86,7 @@ pub(crate) fn effects_found(
 
 /// Amplitudes of candidate `g` (zero for columns that the data cannot show) and
 /// their covariance, out of a joint estimate on `set`.
-fn amplitudes_of(
+pub(crate) fn amplitudes_of(
     found: &Found,
     g: usize,
     set: &[usize],
@@ -136,6 +136,9 @@ fn confusable(found: &Found, g: usize) -> Vec<Confusable> {
         .map(|(id, correlation)| Confusable {
             id: id.to_owned(),
             correlation,
+            delta_loglik: None,
+            separation_sigma: None,
+            manoeuvre: None,
         })
         .collect();
     list.sort_by(|a, b| b.correlation.abs().total_cmp(&a.correlation.abs()));

@@ -11,11 +11,12 @@ use std::collections::BTreeMap;
 
 use effects::{Candidate, Scene, StarFacts, StarRows};
 use focal_plane::{AttitudeSource, Points, rotation_vector};
-use telemetry::report::{Errors, Report, Rows};
+use telemetry::report::{Errors, FoundEffect, Report, Rows};
 use telemetry::{AttitudeResiduals, DarkMap, StarResiduals};
 
 use crate::attitude_loop::{channels_of_interest, resolved_motion};
 use crate::close::{Closed, catalogue_candidates};
+use crate::confusion;
 use crate::declared;
 use crate::empirical::{EMPIRICAL, Empirical, Variable};
 use crate::error::CloseError;
@@ -23,9 +24,11 @@ use crate::evidence::{Amplitudes, Evidence, Residuals};
 use crate::figures;
 use crate::folds::Folds;
 use crate::frame_rotation::rotation_of;
+use crate::hypothesis::{self, Grounds};
 use crate::image_level::{self, ImageLevel, Side};
 use crate::images::{self, Formed};
 use crate::leftover;
+use crate::manoeuvre::stars::Sky;
 use crate::motion::{self, Around};
 use crate::noise_effects;
 use crate::nuisance::StarNuisance;
@@ -380,6 +383,7 @@ fn finish(f: &Finish<'_>) -> Result<Closed, CloseError> {
     }
     let surroundings = f.situation.surroundings();
     let (mut effects, mut entries) = figures::effects_found(f.found, &explained, &surroundings)?;
+    tell_apart(f, &mut effects);
     if let Some((level, formed)) = f.image {
         for (at, (effect, entry)) in image_level::effects(level, formed).into_iter().enumerate() {
             effects.insert(at, effect);
@@ -429,6 +433,20 @@ fn finish(f: &Finish<'_>) -> Result<Closed, CloseError> {
         }
     }
 
+    let fits = &f.found.fitted.fits;
+    let hypotheses = hypothesis::answer(
+        f.situation.questions,
+        &Grounds {
+            found: f.found,
+            surroundings,
+            information: &|c| fits.information(c),
+            alone: remarkable(f, whole),
+            left: remarkable(f, last),
+            effects: &effects,
+            considered: &considered,
+        },
+    );
+
     let attitude = attitude_residuals(f, &after);
     let attitude_rms = |series: &[Vec<f64>; 3], outlier: &[bool]| {
         std::array::from_fn(|a| figures::rms(&series[a], outlier).unwrap_or(f64::NAN))
@@ -468,6 +486,7 @@ fn finish(f: &Finish<'_>) -> Result<Closed, CloseError> {
         ),
         effects,
         considered,
+        hypotheses,
         unattributed,
     };
     let [ax, ay]: [Vec<f64>; 2] = after.axes.try_into().unwrap_or_default();
@@ -508,6 +527,23 @@ fn finish(f: &Finish<'_>) -> Result<Closed, CloseError> {
     })
 }
 
+/// What else each effect could have been, and the motion that would tell.
+fn tell_apart(f: &Finish<'_>, effects: &mut [FoundEffect]) {
+    let confusion = confusion::compare(f.found, effects);
+    let set = columns_of(&f.found.fitted.groups, &f.found.selection.chosen);
+    let sky = f.found.fitted.fits.variance(&set).and_then(|variance| {
+        let noise = f.wander.filter(|_| f.level.whitener.is_some());
+        Sky::of(f.data, f.situation.model, variance, noise.map(|w| w.noise))
+    });
+    if let (Some(sky), Some(&start)) = (sky, f.data.frames.t_s.first())
+        && !confusion.is_empty()
+    {
+        confusion.tell(effects, start, sky.attitude(), &|flown| {
+            sky.fly(flown, &confusion.candidates)
+        });
+    }
+}
+
 /// Squared residual over what the declared noise accounts for, in the unit of the
 /// fit's scalars (arcsec, or the centroids' noise where they are whitened); 0 where no noise is declared.
 fn excess(f: &Finish<'_>, power: f64) -> f64 {
@@ -516,6 +552,14 @@ fn excess(f: &Finish<'_>, power: f64) -> f64 {
         let unit = f.level.noise.map_or(1.0, |n| n.centroid);
         (rows * power - 0.5 * s * s * f.found.fitted.scalars).max(0.0) / (unit * unit)
     })
+}
+
+/// [`excess`] where it stands out of the noise.
+fn remarkable(f: &Finish<'_>, power: f64) -> Option<f64> {
+    let sigma = f.situation.model.noise.temporal_arcsec?;
+    let unit = f.level.whitener.as_ref().map_or(1.0, |w| w.centroid);
+    let variance = 0.5 * sigma * sigma / (unit * unit);
+    hypothesis::beyond(excess(f, power), variance, f.found.fitted.scalars)
 }
 
 /// The tracker's own attitude beside the stars: its error against the reference,

@@ -137,6 +137,7 @@ fn findings(stars: bool, attitude: bool) -> Report {
             tried(HOSTILE, true),
             tried("hot_pixel", false),
         ],
+        hypotheses: Vec::new(),
         unattributed: Unattributed {
             present: true,
             variance_fraction: Some(0.017),
