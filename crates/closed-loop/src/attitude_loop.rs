@@ -393,8 +393,12 @@ fn finish(
         explained.push((last - now) / whole);
         last = now;
     }
-    let (mut effects, entries) =
-        figures::effects_found(found, &explained, &situation.surroundings())?;
+    let (mut effects, entries) = figures::effects_found(
+        found,
+        &explained,
+        &situation.surroundings(),
+        situation.questions,
+    )?;
     let confusion = confusion::compare(found, &mut effects);
     if let (false, Some(step), Some(&start)) = (
         confusion.is_empty(),

@@ -22,6 +22,7 @@ use telemetry::{EffectEntry, EffectValue};
 use crate::empirical::EMPIRICAL;
 use crate::error::CloseError;
 use crate::evidence::Residuals;
+use crate::hypothesis::Questions;
 use crate::search::Found;
 use crate::selection::{FAMILY_ALPHA, columns_of};
 use crate::star_data::StarData;
@@ -35,6 +36,7 @@ pub(crate) fn effects_found(
     found: &Found,
     explained: &[f64],
     surroundings: &Surroundings<'_>,
+    questions: &Questions,
 ) -> Result<(Vec<FoundEffect>, Vec<EffectEntry>), CloseError> {
     let chosen = &found.selection.chosen;
     let set = columns_of(&found.fitted.groups, chosen);
@@ -77,7 +79,7 @@ pub(crate) fn effects_found(
             delta_loglik: judged.delta_loglik,
             p_value: judged.p_value,
             variance_explained: explained.get(k).copied(),
-            confusable_with: confusable(found, g),
+            confusable_with: confusable(found, g, questions),
         });
         entries.push(EffectEntry::new(candidate.id(), written));
     }
@@ -112,8 +114,8 @@ pub(crate) fn amplitudes_of(
     (values, covariance)
 }
 
-/// Other catalogue effects whose columns resemble those of `g`.
-fn confusable(found: &Found, g: usize) -> Vec<Confusable> {
+/// Other catalogue effects whose columns resemble those of `g`, or that were asked about.
+fn confusable(found: &Found, g: usize, questions: &Questions) -> Vec<Confusable> {
     let mut best: BTreeMap<&str, f64> = BTreeMap::new();
     for (other, group) in found.fitted.groups.iter().enumerate() {
         let id = found.candidates[other].id();
@@ -132,7 +134,7 @@ fn confusable(found: &Found, g: usize) -> Vec<Confusable> {
     }
     let mut list: Vec<Confusable> = best
         .into_iter()
-        .filter(|(_, c)| c.abs() >= CONFUSABLE)
+        .filter(|(id, c)| c.abs() >= CONFUSABLE || questions.include(id))
         .map(|(id, correlation)| Confusable {
             id: id.to_owned(),
             correlation,

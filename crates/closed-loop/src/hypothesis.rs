@@ -65,6 +65,11 @@ impl Questions {
         }
         Ok(Self { ids: all })
     }
+
+    /// Whether this effect was asked about.
+    pub(crate) fn include(&self, id: &str) -> bool {
+        self.ids.iter().any(|known| known == id)
+    }
 }
 
 /// What the answers are drawn from.
@@ -361,14 +366,17 @@ pub(crate) fn short(value: f64) -> String {
     if !value.is_finite() {
         return "unknown".to_owned();
     }
-    if size == 0.0 || (1e-3..1e4).contains(&size) {
+    if size == 0.0 {
+        return "0".to_owned();
+    }
+    if (1e-3..1e4).contains(&size) {
         let steps = [1e-2, 1e-1, 1.0, 10.0, 100.0];
-        let digits = if size > 0.0 {
-            5 - steps.iter().filter(|s| size >= **s).count()
-        } else {
-            0
+        let digits = 5 - steps.iter().filter(|s| size >= **s).count();
+        let text = format!("{value:.digits$}");
+        return match text.contains('.') {
+            true => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
+            false => text,
         };
-        return format!("{value:.digits$}");
     }
     format!("{value:.2e}")
 }
@@ -426,7 +434,7 @@ fn told_size(h: &Hypothesis, size: &HypothesisSize) -> Vec<String> {
     }
     if let Some(d) = size.detectable {
         said.push(format!(
-            "a {name} of {} would have shown at 5 sigma",
+            "{name} = {} would have shown at 5 sigma",
             with_unit(d, unit)
         ));
     }

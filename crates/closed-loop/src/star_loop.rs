@@ -382,7 +382,8 @@ fn finish(f: &Finish<'_>) -> Result<Closed, CloseError> {
         last = now;
     }
     let surroundings = f.situation.surroundings();
-    let (mut effects, mut entries) = figures::effects_found(f.found, &explained, &surroundings)?;
+    let (mut effects, mut entries) =
+        figures::effects_found(f.found, &explained, &surroundings, f.situation.questions)?;
     tell_apart(f, &mut effects);
     if let Some((level, formed)) = f.image {
         for (at, (effect, entry)) in image_level::effects(level, formed).into_iter().enumerate() {

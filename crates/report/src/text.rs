@@ -15,6 +15,7 @@ pub fn summary(closed: &Closed) -> String {
     verdict(&mut out, report);
     figures(&mut out, report);
     effects(&mut out, report);
+    hypotheses(&mut out, report);
     rivals(&mut out, closed);
     considered(&mut out, report);
     leftover(&mut out, report);
@@ -146,10 +147,47 @@ fn effects(out: &mut String, report: &Report) {
         if !alike.is_empty() {
             line!(out, "            looks like {}", alike.join(", "));
         }
+        for c in effect.confusable_with.iter().take(3) {
+            if let Some(here) = c.separation_sigma {
+                let here = format!("this data tells it from {} at {here:.1} sigma", c.id);
+                wrapped(out, "            ", &here);
+            }
+            if let Some(manoeuvre) = &c.manoeuvre {
+                wrapped(out, "            ", &manoeuvre.text);
+            }
+        }
     }
     if !report.effects.is_empty() {
         line!(out);
     }
+}
+
+/// The answers to what was asked by name.
+fn hypotheses(out: &mut String, report: &Report) {
+    for h in &report.hypotheses {
+        line!(out, "Asked     {}", h.id);
+        wrapped(out, "            ", &h.finding);
+    }
+    if !report.hypotheses.is_empty() {
+        line!(out);
+    }
+}
+
+/// Lines of at most 98 columns, each behind `indent`.
+fn wrapped(out: &mut String, indent: &str, text: &str) {
+    let mut row = indent.to_owned();
+    for word in text.split(' ') {
+        if row.len() > indent.len() && row.chars().count() + word.chars().count() + 1 > 98 {
+            line!(out, "{row}");
+            row = format!("{indent}  ");
+        }
+        if row.trim().is_empty() {
+            row.push_str(word);
+        } else {
+            let _ = write!(row, " {word}");
+        }
+    }
+    line!(out, "{row}");
 }
 
 pub(crate) fn selectors(effect: &FoundEffect) -> String {

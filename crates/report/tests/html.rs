@@ -108,6 +108,9 @@ fn findings(stars: bool, attitude: bool) -> Report {
         confusable_with: vec![Confusable {
             id: HOSTILE.to_owned(),
             correlation: -0.31,
+            delta_loglik: None,
+            separation_sigma: None,
+            manoeuvre: None,
         }],
     };
     let tried = |id: &str, observable: bool| ConsideredEffect {

@@ -3,7 +3,7 @@
 use std::io::Write as _;
 
 use anyhow::Context as _;
-use boresight::closed_loop::{Closed, close};
+use boresight::closed_loop::{Closed, Questions, close_asking};
 use boresight::comparison::{CompareSettings, compare};
 use boresight::report::{Run, html, summary};
 use boresight::telemetry::{Bundle, Model, Output};
@@ -13,6 +13,7 @@ use crate::console::Console;
 use crate::example;
 
 pub(crate) fn run(options: &Close, console: &Console) -> anyhow::Result<()> {
+    let questions = Questions::about(&options.tests)?;
     console.progress("reading");
     let (model, bundle, title) = match (&options.model, &options.bundle) {
         (Some(model), Some(bundle)) => {
@@ -25,7 +26,7 @@ pub(crate) fn run(options: &Close, console: &Console) -> anyhow::Result<()> {
             (example::model()?, example::bundle()?, title.to_owned())
         }
     };
-    let closed = close(&model, &bundle, &|what| console.progress(what))?;
+    let closed = close_asking(&model, &bundle, &questions, &|what| console.progress(what))?;
     let text = summary(&closed);
     if let Some(dir) = &options.out {
         console.progress("writing results");
