@@ -442,6 +442,7 @@ fn finish(
             information: &|c| lengths[c],
             alone: beyond_white(data, &before),
             left: beyond_white(data, &after),
+            resolved: motion.is_some(),
             effects: &effects,
             considered: &considered,
         },

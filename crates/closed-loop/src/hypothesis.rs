@@ -82,6 +82,8 @@ pub(crate) struct Grounds<'a> {
     /// where there is none to speak of.
     pub(crate) alone: Option<f64>,
     pub(crate) left: Option<f64>,
+    /// Whether the samples tell how the tracker moved between them.
+    pub(crate) resolved: bool,
     pub(crate) effects: &'a [FoundEffect],
     pub(crate) considered: &'a [ConsideredEffect],
 }
@@ -283,7 +285,9 @@ impl Grounds<'_> {
         let candidates: Vec<usize> = (0..self.found.candidates.len())
             .filter(|&g| self.found.candidates[g].id() == id)
             .collect();
-        let reason = if candidates.is_empty() {
+        let reason = if !self.resolved && kind.needs().contains("the samples resolve") {
+            "the motion between the samples is not known: they do not predict each other".to_owned()
+        } else if candidates.is_empty() {
             format!("the bundle lacks what it needs: {}", kind.needs())
         } else if candidates
             .iter()

@@ -391,10 +391,12 @@ pub(crate) fn recommend(
             let text = if sigma >= WANTED {
                 format!("{words} separates {a} from {b} at {} sigma", short(sigma))
             } else {
-                format!(
-                    "none of {tried} motions tried separates {a} from {b} at 5 sigma; the best is {words}, at {} sigma",
-                    short(sigma)
-                )
+                let most = short((10.0 * sigma).round() / 10.0);
+                if sigma < 1.0 {
+                    format!("none of {tried} motions of at most {} s tells {a} from {b}: at most {most} sigma", DURATIONS_S[1])
+                } else {
+                    format!("none of {tried} motions tells {a} from {b} at 5 sigma; the best is {words}, at {most} sigma")
+                }
             };
             Some(manoeuvre.told(sigma, text))
         })

@@ -17,7 +17,7 @@ use crate::star_data::Star;
 const FOCAL_TOLERANCE: f64 = 2e-3;
 
 /// What the loop works on.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Situation<'a> {
     pub(crate) model: &'a Model,
     pub(crate) bundle: &'a Bundle,
@@ -81,6 +81,14 @@ impl<'a> Situation<'a> {
                 .unwrap_or(2000.0),
             span_s,
         })
+    }
+
+    /// The same under another model of the same tracker.
+    pub(crate) fn believing<'b>(&'b self, model: &'b Model) -> Situation<'b> {
+        Situation {
+            model,
+            ..self.clone()
+        }
     }
 
     /// What effects may look at.

@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 use effects::{Candidate, Scene, StarFacts, StarRows};
 use focal_plane::{AttitudeSource, Points, rotation_vector};
 use telemetry::report::{Errors, FoundEffect, Report, Rows};
-use telemetry::{AttitudeResiduals, DarkMap, StarResiduals};
+use telemetry::{AttitudeResiduals, DarkMap, Model, StarResiduals};
 
 use crate::attitude_loop::{channels_of_interest, resolved_motion};
 use crate::close::{Closed, catalogue_candidates};
@@ -342,8 +342,10 @@ impl Finish<'_> {
             .sum()
     }
 
+    /// `model` is the declared one, or that with what was added.
     fn errors(
         &self,
+        model: &Model,
         residual: &Residuals,
         loglik: Option<f64>,
         attitude: Option<[f64; 3]>,
@@ -361,8 +363,8 @@ impl Finish<'_> {
             log_psd_cost: None,
             // with free attitudes three of each frame's numbers are spent
             chi2_per_dof: declared.and_then(|_| {
-                let square =
-                    noise_effects::in_declared_sigmas(self.situation, self.data, residual)?;
+                let situation = self.situation.believing(model);
+                let square = noise_effects::in_declared_sigmas(&situation, self.data, residual)?;
                 Some(square / self.found.fitted.scalars)
             }),
             loglik_per_frame: loglik.map(|l| l / self.data.frames.frames() as f64),
@@ -409,7 +411,7 @@ fn finish(f: &Finish<'_>) -> Result<Closed, CloseError> {
             leftover::describe(&leftover::star_tracks(f.data, residual))
         },
     );
-    let noise = noise?;
+    let mut noise = noise?;
     effects.extend(noise.effects.iter().cloned());
     entries.extend(noise.entries.iter().cloned());
     model.effects.extend(entries);
@@ -419,7 +421,16 @@ fn finish(f: &Finish<'_>) -> Result<Closed, CloseError> {
     let excess = excess(f, last);
     let mut considered = figures::considered(f.found, excess);
     considered.retain(|c| !effects.iter().any(|e| e.id == c.id));
+    let unit = f.level.whitener.as_ref().map_or(1.0, |w| w.centroid);
+    let squares = excess * unit * unit;
+    noise.need(f.situation, f.data, squares)?;
     noise.tell(&mut considered);
+    if let Some(wander) = reference_wander::consider(f.data, &after.axes, squares) {
+        considered
+            .iter_mut()
+            .filter(|c| c.id == wander.id)
+            .for_each(|c| c.clone_from(&wander));
+    }
     if let Some((level, _)) = f.image {
         for (id, step) in [
             (images::DARK_MAP, &level.dark_map),
@@ -443,6 +454,7 @@ fn finish(f: &Finish<'_>) -> Result<Closed, CloseError> {
             information: &|c| fits.information(c),
             alone: remarkable(f, whole),
             left: remarkable(f, last),
+            resolved: f.level.motion.is_some(),
             effects: &effects,
             considered: &considered,
         },
@@ -472,6 +484,7 @@ fn finish(f: &Finish<'_>) -> Result<Closed, CloseError> {
             outside_reference: f.data.outside_reference,
         },
         before: f.errors(
+            f.situation.model,
             f.before,
             before_loglik,
             attitude
@@ -479,6 +492,7 @@ fn finish(f: &Finish<'_>) -> Result<Closed, CloseError> {
                 .map(|a| attitude_rms(&a.before_arcsec, &a.outlier)),
         ),
         after: f.errors(
+            &model,
             &after,
             after_loglik,
             attitude

@@ -37,7 +37,7 @@ impl EffectKind for Kind {
         "the reference wanders: coloured noise common to all stars"
     }
     fn needs(&self) -> &'static str {
-        "stars and a reference, or an attitude and a reference"
+        "stars and a reference (of an attitude alone, its own slow error cannot be told from the reference's)"
     }
     fn acts_on(&self) -> ActsOn {
         ActsOn {
