@@ -16,6 +16,7 @@ use crate::evidence::{Amplitudes, Evidence, Residuals};
 use crate::figures;
 use crate::folds::Folds;
 use crate::hypothesis::{self, Grounds};
+use crate::instants;
 use crate::leftover;
 use crate::manoeuvre::attitudes::fly;
 use crate::motion::{self, Around};
@@ -410,6 +411,14 @@ fn finish(
             fly(flown, &confusion.candidates, step, sigma, noise)
         });
     }
+    instants::complete(
+        &evidence,
+        &data.bins.folds,
+        found,
+        &situation.surroundings(),
+        median_step(&data.t_s).unwrap_or(1.0),
+        &mut effects,
+    )?;
     let mut model = situation.model.clone();
     model.effects.extend(entries);
     let mut unattributed = figures::unattributed(found, last / whole);

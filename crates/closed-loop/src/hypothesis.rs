@@ -275,7 +275,7 @@ impl Grounds<'_> {
                         parameter: parameter.clone(),
                         unit: c.unit.clone().unwrap_or_default(),
                         detectable: c.detectable,
-                        needed: c.needed,
+                        needed: c.needed.filter(|_| self.left.is_some()),
                         ..HypothesisSize::default()
                     })
                     .collect(),

@@ -28,6 +28,7 @@ mod gram;
 mod hypothesis;
 mod image_level;
 mod images;
+mod instants;
 mod leftover;
 mod manoeuvre;
 mod motion;

@@ -27,6 +27,7 @@ use crate::frame_rotation::rotation_of;
 use crate::hypothesis::{self, Grounds};
 use crate::image_level::{self, ImageLevel, Side};
 use crate::images::{self, Formed};
+use crate::instants;
 use crate::leftover;
 use crate::manoeuvre::stars::Sky;
 use crate::motion::{self, Around};
@@ -387,6 +388,14 @@ fn finish(f: &Finish<'_>) -> Result<Closed, CloseError> {
     let (mut effects, mut entries) =
         figures::effects_found(f.found, &explained, &surroundings, f.situation.questions)?;
     tell_apart(f, &mut effects);
+    instants::complete(
+        f.level,
+        f.folds,
+        f.found,
+        &surroundings,
+        median_step(&f.data.frames.t_s).unwrap_or(1.0),
+        &mut effects,
+    )?;
     if let Some((level, formed)) = f.image {
         for (at, (effect, entry)) in image_level::effects(level, formed).into_iter().enumerate() {
             effects.insert(at, effect);

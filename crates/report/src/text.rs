@@ -85,6 +85,17 @@ fn figures(out: &mut String, report: &Report) {
             );
         }
     }
+    if let (Some(b), Some(a)) = (before.log_psd_cost, after.log_psd_cost) {
+        for (k, axis) in ["X", "Y", "Z"].into_iter().enumerate() {
+            line!(
+                out,
+                "{:<28}{:>12.3}{:>12.3}",
+                format!("log-PSD cost {axis}"),
+                b[k],
+                a[k]
+            );
+        }
+    }
     for (name, get) in [
         (
             "chi2 per degree of freedom",
@@ -126,7 +137,16 @@ fn effects(out: &mut String, report: &Report) {
                         number(sigma)
                     );
                 }
-                None => line!(out, "            {name} = {}{unit}", number(estimate.value)),
+                None => {
+                    let bounds = estimate.interval.map_or_else(String::new, |[low, high]| {
+                        format!(" (95 %: {} to {})", number(low), number(high))
+                    });
+                    line!(
+                        out,
+                        "            {name} = {}{unit}{bounds}",
+                        number(estimate.value)
+                    );
+                }
             }
         }
         let share = effect.variance_explained.map_or(String::new(), |v| {
