@@ -35,7 +35,6 @@ use telemetry::report::Manoeuvre;
 
 use crate::evidence::Evidence;
 use crate::folds::Folds;
-use crate::gram::BlockGrams;
 use crate::hypothesis::short;
 
 /// Sigmas that are wanted.
@@ -333,8 +332,7 @@ pub(crate) fn information(
             .map(|c| c.coefficients().len())
             .sum::<usize>(),
     );
-    let design = evidence.design(candidates);
-    let (gram, _) = BlockGrams::accumulate(design.as_ref(), folds).sum(|_| true);
+    let (gram, _) = evidence.grams(folds, candidates).sum(|_| true);
     let own = gram.view((n, n), (p, p)).into_owned();
     if n == 0 {
         return Some(own / variance);

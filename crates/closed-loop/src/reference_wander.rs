@@ -15,8 +15,8 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 use telemetry::report::{ConsideredEffect, Estimate, FoundEffect};
 use telemetry::{EffectEntry, EffectValue};
 
+use crate::frame_rotation::rotation_of;
 use crate::star_data::{StarData, median_step};
-use crate::star_design::rotation_of;
 use crate::star_search::{WIDENING, Wander};
 
 /// Identity in the catalogue.

@@ -430,7 +430,7 @@ fn finish(f: &Finish<'_>) -> Result<Closed, CloseError> {
     let excess = excess(f, last);
     let mut considered = figures::considered(f.found, excess);
     considered.retain(|c| !effects.iter().any(|e| e.id == c.id));
-    let unit = f.level.whitener.as_ref().map_or(1.0, |w| w.centroid);
+    let unit = f.level.noise.map_or(1.0, |n| n.centroid);
     let squares = excess * unit * unit;
     noise.need(f.situation, f.data, squares)?;
     noise.tell(&mut considered);
@@ -556,7 +556,7 @@ fn tell_apart(f: &Finish<'_>, effects: &mut [FoundEffect]) {
     let confusion = confusion::compare(f.found, effects);
     let set = columns_of(&f.found.fitted.groups, &f.found.selection.chosen);
     let sky = f.found.fitted.fits.variance(&set).and_then(|variance| {
-        let noise = f.wander.filter(|_| f.level.whitener.is_some());
+        let noise = f.wander.filter(|_| f.level.noise.is_some());
         Sky::of(f.data, f.situation.model, variance, noise.map(|w| w.noise))
     });
     if let (Some(sky), Some(&start)) = (sky, f.data.frames.t_s.first())
@@ -581,7 +581,7 @@ fn excess(f: &Finish<'_>, power: f64) -> f64 {
 /// [`excess`] where it stands out of the noise.
 fn remarkable(f: &Finish<'_>, power: f64) -> Option<f64> {
     let sigma = f.situation.model.noise.temporal_arcsec?;
-    let unit = f.level.whitener.as_ref().map_or(1.0, |w| w.centroid);
+    let unit = f.level.noise.map_or(1.0, |n| n.centroid);
     let variance = 0.5 * sigma * sigma / (unit * unit);
     hypothesis::beyond(excess(f, power), variance, f.found.fitted.scalars)
 }

@@ -17,7 +17,7 @@ use crate::declared;
 use crate::folds::Folds;
 use crate::nuisance::StarNuisance;
 use crate::star_data::{Inputs, Star, StarData, median_step};
-use crate::star_design::StarEvidence;
+use crate::star_evidence::StarEvidence;
 
 /// Far beyond any catalogue: what tells a repeated star from its original.
 const COPY: i64 = 1_000_000_007;
@@ -106,7 +106,7 @@ impl<'a> Sky<'a> {
             residuals: vec![[none(), none()]],
             motion: Some(flown),
             sigma_guess_arcsec: 1.0,
-            whitener: None,
+            noise: None,
         };
         let folds = Folds::cut(data.frames.frames());
         match &self.noise {
