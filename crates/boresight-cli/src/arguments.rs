@@ -69,6 +69,9 @@ pub(crate) struct Close {
     /// have to be, and what would have shown; may be given several times
     #[arg(long = "test", value_name = "EFFECT")]
     pub(crate) tests: Vec<String>,
+    /// Also add what the leftover follows most, as a term without a cause (it never counts as one)
+    #[arg(long)]
+    pub(crate) add_empirical: bool,
 }
 
 #[derive(Debug, Args)]

@@ -394,12 +394,21 @@ fn finish(
         explained.push((last - now) / whole);
         last = now;
     }
-    let (mut effects, entries) = figures::effects_found(
-        found,
-        &explained,
-        &situation.surroundings(),
-        situation.questions,
-    )?;
+    // what is left is judged before a term without a cause is added
+    let mut unattributed = figures::unattributed(found, last / whole);
+    let (surroundings, questions) = (situation.surroundings(), situation.questions);
+    let mut added = chosen.clone();
+    let plain = after;
+    let mut after = plain.clone();
+    if questions.empirical
+        && let Some(g) = figures::best_empirical(found, &unattributed, &surroundings)
+    {
+        added.push(g);
+        after = residuals(&evidence, folds, found, &added)?;
+        explained.push((last - power(&after)) / whole);
+    }
+    let (mut effects, entries) =
+        figures::effects_found(found, &added, &explained, &surroundings, questions)?;
     let confusion = confusion::compare(found, &mut effects);
     if let (false, Some(step), Some(&start)) = (
         confusion.is_empty(),
@@ -421,14 +430,13 @@ fn finish(
     )?;
     let mut model = situation.model.clone();
     model.effects.extend(entries);
-    let mut unattributed = figures::unattributed(found, last / whole);
     if situation.model.hem.is_none() {
-        slow_leftover(data, &after, &mut unattributed, last / whole);
+        slow_leftover(data, &plain, &mut unattributed, last / whole);
     }
     let inside = in_sample(&evidence, data.t_s.len(), found);
     let tracks = leftover::attitude_tracks(
         &data.t_s,
-        &inside.as_ref().unwrap_or(&after).axes,
+        &inside.as_ref().unwrap_or(&plain).axes,
         &data.outlier,
     );
     leftover::describe(&tracks).tell(&mut unattributed);
@@ -450,7 +458,7 @@ fn finish(
             surroundings: situation.surroundings(),
             information: &|c| lengths[c],
             alone: beyond_white(data, &before),
-            left: beyond_white(data, &after),
+            left: beyond_white(data, &plain),
             resolved: motion.is_some(),
             effects: &effects,
             considered: &considered,
@@ -462,7 +470,7 @@ fn finish(
     let count = outliers.iter().filter(|o| **o).count();
     let report = Report {
         format: telemetry::report::REPORT_FORMAT.to_owned(),
-        verdict: figures::verdict(!effects.is_empty(), unattributed.present),
+        verdict: figures::verdict(&effects, unattributed.present),
         folds: folds.count,
         rows: Rows {
             used: data.t_s.len() - count,

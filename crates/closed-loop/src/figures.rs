@@ -34,11 +34,11 @@ const CONFUSABLE: f64 = 0.3;
 /// `explained` is the share of the before variance of each.
 pub(crate) fn effects_found(
     found: &Found,
+    chosen: &[usize],
     explained: &[f64],
     surroundings: &Surroundings<'_>,
     questions: &Questions,
 ) -> Result<(Vec<FoundEffect>, Vec<EffectEntry>), CloseError> {
-    let chosen = &found.selection.chosen;
     let set = columns_of(&found.fitted.groups, chosen);
     let mut effects = Vec::new();
     let mut entries = Vec::new();
@@ -79,7 +79,11 @@ pub(crate) fn effects_found(
             delta_loglik: judged.delta_loglik,
             p_value: judged.p_value,
             variance_explained: explained.get(k).copied(),
-            confusable_with: confusable(found, g, questions),
+            confusable_with: if candidate.id() == EMPIRICAL {
+                Vec::new()
+            } else {
+                confusable(found, g, questions)
+            },
         });
         entries.push(EffectEntry::new(candidate.id(), written));
     }
@@ -243,9 +247,32 @@ pub(crate) fn unattributed(found: &Found, left: f64) -> Unattributed {
     }
 }
 
-/// The finding in one word.
-pub(crate) fn verdict(added: bool, left: bool) -> Verdict {
-    match (added, left) {
+/// The empirical term that explains most of what is left, if one that a model can declare does.
+pub(crate) fn best_empirical(
+    found: &Found,
+    unattributed: &Unattributed,
+    surroundings: &Surroundings<'_>,
+) -> Option<usize> {
+    let beyond_chance = |d: &&Dependence| d.p_value < FAMILY_ALPHA && d.variance_explained > 0.0;
+    unattributed
+        .depends_on
+        .iter()
+        .filter(beyond_chance)
+        .find_map(|d| {
+            let g = (0..found.candidates.len()).find(|&g| {
+                let candidate = found.candidates[g].as_ref();
+                candidate.id() == EMPIRICAL
+                    && candidate.selectors().get("variable") == Some(&d.variable)
+            })?;
+            let candidate = found.candidates[g].as_ref();
+            let one = vec![1.0; candidate.coefficients().len()];
+            candidate.realise(&one, surroundings).is_ok().then_some(g)
+        })
+}
+
+/// The finding in one word; empirical terms never count as explanation.
+pub(crate) fn verdict(effects: &[FoundEffect], left: bool) -> Verdict {
+    match (effects.iter().any(|e| e.id != EMPIRICAL), left) {
         (false, false) => Verdict::Consistent,
         (true, false) => Verdict::Explained,
         (true, true) => Verdict::PartlyExplained,

@@ -33,6 +33,8 @@ const PLAUSIBLE: f64 = 3.0;
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Questions {
     ids: Vec<String>,
+    /// Whether what is left is to be added as an empirical term.
+    pub(crate) empirical: bool,
 }
 
 impl Questions {
@@ -63,7 +65,20 @@ impl Questions {
                 all.push(id.to_owned());
             }
         }
-        Ok(Self { ids: all })
+        Ok(Self {
+            ids: all,
+            empirical: false,
+        })
+    }
+
+    /// Also add what the leftover follows most, as an empirical term: after the verdict, which it does
+    /// not change.
+    #[must_use]
+    pub fn adding_empirical(self, yes: bool) -> Self {
+        Self {
+            empirical: yes,
+            ..self
+        }
     }
 
     /// Whether this effect was asked about.

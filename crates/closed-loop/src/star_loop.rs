@@ -375,7 +375,7 @@ impl Finish<'_> {
 
 fn finish(f: &Finish<'_>) -> Result<Closed, CloseError> {
     let chosen = &f.found.selection.chosen;
-    let after = f.residuals(chosen)?;
+    let plain = f.residuals(chosen)?;
     let whole = f.power(f.before);
     let mut explained = Vec::new();
     let mut last = f.power(&f.residuals(&[])?);
@@ -385,8 +385,19 @@ fn finish(f: &Finish<'_>) -> Result<Closed, CloseError> {
         last = now;
     }
     let surroundings = f.situation.surroundings();
+    // what is left is judged before a term without a cause is added
+    let mut unattributed = figures::unattributed(f.found, last / whole);
+    let questions = f.situation.questions;
+    let mut added = chosen.clone();
+    if questions.empirical
+        && let Some(g) = figures::best_empirical(f.found, &unattributed, &surroundings)
+    {
+        added.push(g);
+        explained.push((last - f.power(&f.residuals(&added)?)) / whole);
+    }
+    let after = f.residuals(&added)?;
     let (mut effects, mut entries) =
-        figures::effects_found(f.found, &explained, &surroundings, f.situation.questions)?;
+        figures::effects_found(f.found, &added, &explained, &surroundings, questions)?;
     tell_apart(f, &mut effects);
     instants::complete(
         f.level,
@@ -412,21 +423,30 @@ fn finish(f: &Finish<'_>) -> Result<Closed, CloseError> {
         effects.push(effect);
         entries.push(entry);
     }
+<<<<<<< HEAD
     let (noise, leftover) = rayon::join(
-        || noise_effects::claim(f.situation, f.level, f.found, f.folds, &after.axes),
+        || noise_effects::claim(f.situation, f.level, f.found, f.folds, &plain.axes),
         || {
             let inside = noise_effects::in_sample(f.level, f.found);
-            let residual = inside.as_deref().unwrap_or(&after.axes);
+            let residual = inside.as_deref().unwrap_or(&plain.axes);
             leftover::describe(&leftover::star_tracks(f.data, residual))
         },
     );
     let mut noise = noise?;
+=======
+    let mut noise = noise_effects::claim(f.situation, f.level, f.found, f.folds, &plain.axes)?;
+>>>>>>> 5d4bfcc (Empirical terms: --add-empirical adds one after the verdict, models declare it, close and simulate read it; a switch is offered as one)
     effects.extend(noise.effects.iter().cloned());
     entries.extend(noise.entries.iter().cloned());
     model.effects.extend(entries);
 
-    let mut unattributed = figures::unattributed(f.found, last / whole);
+<<<<<<< HEAD
     leftover.tell(&mut unattributed);
+=======
+    let inside = noise_effects::in_sample(f.level, f.found);
+    let tracks = leftover::star_tracks(f.data, inside.as_deref().unwrap_or(&plain.axes));
+    leftover::describe(&tracks).tell(&mut unattributed);
+>>>>>>> 5d4bfcc (Empirical terms: --add-empirical adds one after the verdict, models declare it, close and simulate read it; a switch is offered as one)
     let excess = excess(f, last);
     let mut considered = figures::considered(f.found, excess);
     considered.retain(|c| !effects.iter().any(|e| e.id == c.id));
@@ -434,7 +454,7 @@ fn finish(f: &Finish<'_>) -> Result<Closed, CloseError> {
     let squares = excess * unit * unit;
     noise.need(f.situation, f.data, squares)?;
     noise.tell(&mut considered);
-    if let Some(wander) = reference_wander::consider(f.data, &after.axes, squares) {
+    if let Some(wander) = reference_wander::consider(f.data, &plain.axes, squares) {
         considered
             .iter_mut()
             .filter(|c| c.id == wander.id)
@@ -475,7 +495,7 @@ fn finish(f: &Finish<'_>) -> Result<Closed, CloseError> {
     };
     let before_fit = fit(f.measured, f.folds, &[])?;
     let before_loglik = before_fit.fits.out_of_fold(&[]).map(|o| o.total_loglik());
-    let set = columns_of(&f.found.fitted.groups, chosen);
+    let set = columns_of(&f.found.fitted.groups, &added);
     let after_loglik = f
         .found
         .fitted
@@ -485,7 +505,7 @@ fn finish(f: &Finish<'_>) -> Result<Closed, CloseError> {
     let outliers = f.data.outlier.iter().filter(|o| **o).count();
     let report = Report {
         format: telemetry::report::REPORT_FORMAT.to_owned(),
-        verdict: figures::verdict(!effects.is_empty(), unattributed.present),
+        verdict: figures::verdict(&effects, unattributed.present),
         folds: f.folds.count,
         rows: Rows {
             used: f.data.t_s.len() - outliers,

@@ -30,7 +30,8 @@ macro_rules! line {
 
 /// The verdict as a sentence.
 pub(crate) fn sentence(report: &Report) -> String {
-    let names: Vec<&str> = report.effects.iter().map(|e| e.id.as_str()).collect();
+    let causes = report.effects.iter().filter(|e| e.id != "empirical");
+    let names: Vec<&str> = causes.map(|e| e.id.as_str()).collect();
     match report.verdict {
         Verdict::Consistent => {
             "the data follows the declared model; nothing is left to explain".to_owned()

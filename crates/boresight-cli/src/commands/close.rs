@@ -14,7 +14,7 @@ use crate::console::Console;
 use crate::example;
 
 pub(crate) fn run(options: &Close, console: &Console) -> anyhow::Result<()> {
-    let questions = Questions::about(&options.tests)?;
+    let questions = Questions::about(&options.tests)?.adding_empirical(options.add_empirical);
     console.progress("reading");
     let (model, bundle, title) = match (&options.model, &options.bundle) {
         (Some(model), Some(bundle)) => {
