@@ -16,6 +16,7 @@ use telemetry::report::Report;
 use telemetry::{AttitudeResiduals, Bundle, DarkMap, Model, StarResiduals};
 
 use crate::attitude_loop;
+use crate::declared;
 use crate::error::CloseError;
 use crate::hypothesis::Questions;
 use crate::situation::Situation;
@@ -74,6 +75,7 @@ pub fn close_asking(
     progress: &dyn Fn(&str),
 ) -> Result<Closed, CloseError> {
     let situation = Situation::join(model, bundle, questions)?;
+    declared::refuse_on_images(&situation)?;
     if bundle.stars.is_some() {
         star_loop::run(&situation, progress)
     } else {

@@ -42,6 +42,14 @@ pub enum CloseError {
         /// Where the others went.
         why: &'static str,
     },
+    /// A declared effect on raw images that are there.
+    #[error(
+        "the model declares `{id}`, and the bundle has raw images: centroids with a declared map or spot taken off cannot be formed yet; leave the entry out of the model, and it is estimated anew, or the table `images` out of the bundle, whose centroids then stand as they are"
+    )]
+    DeclaredOnImages {
+        /// The effect.
+        id: String,
+    },
     /// A hypothesis that the catalogue does not have.
     #[error("`{id}` is no effect of the catalogue, which has: {known}")]
     UnknownHypothesis {

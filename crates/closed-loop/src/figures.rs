@@ -69,6 +69,14 @@ pub(crate) fn effects_found(
         for (key, value) in &selectors {
             written.insert(key.clone(), EffectValue::Text(value.clone()));
         }
+        if candidate.id() == EMPIRICAL {
+            // in a model they stand as one list
+            written.retain(|name, _| !name.starts_with('c') || name == "coefficients");
+            written.insert(
+                "coefficients".to_owned(),
+                EffectValue::Numbers(values.clone()),
+            );
+        }
         effects.push(FoundEffect {
             id: candidate.id().to_owned(),
             selectors: selectors

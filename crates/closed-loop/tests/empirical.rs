@@ -1,4 +1,5 @@
-//! A leftover without a cause: offered, added as an empirical term, and read again.
+//! What a model declares beside the catalogue: a leftover without a cause, offered, added as an empirical
+//! term, and read again.
 #![expect(clippy::unwrap_used, reason = "helpers of tests")]
 
 use std::collections::BTreeMap;
@@ -8,7 +9,7 @@ use focal_plane::{ARCSEC_PER_RAD, Series, rotation_from_vector};
 use nalgebra::Vector3;
 use scenarios::{Scenario, simulate};
 use telemetry::report::Verdict;
-use telemetry::{Bundle, Housekeeping, Model};
+use telemetry::{Bundle, Housekeeping, Model, WindowTable};
 
 /// A tracker at rest, without any effect.
 fn scenario(tables: &str) -> Scenario {
@@ -138,4 +139,25 @@ fn a_term_of_the_attitude() {
         *q = rotation_from_vector(&(Vector3::x() * angle)) * *q;
     }
     comes_and_goes(&scenario, &bundle, "c0", 0.6);
+}
+
+/// A dark map cannot be taken off windows yet: with windows the model is refused, without it is read.
+#[test]
+fn a_declared_map_is_not_passed_over() {
+    let scenario = scenario("[\"stars\", \"catalog\"]");
+    let mut bundle = simulate(&scenario).unwrap();
+    let text = format!(
+        "{}\n[[effect]]\nid = \"dark_map\"\ndark_map = \"dark_map.csv\"\n",
+        scenario.model.to_toml()
+    );
+    let model = Model::parse(&text, "model.toml", &[]).unwrap();
+    run(&model, &bundle);
+    bundle.images = Some(WindowTable::default());
+    let questions = Questions::default();
+    let error = close_asking(&model, &bundle, &questions, &|_| ()).unwrap_err();
+    let message = error.to_string();
+    assert!(
+        message.contains("`dark_map`") && message.contains("images"),
+        "{message}"
+    );
 }

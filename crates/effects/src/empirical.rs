@@ -9,7 +9,7 @@
 //! ```
 //!
 //! It predicts and never explains, so that the catalogue does not list it; a model may declare it.
-//! How many coefficients there are is how many are given.
+//! How many coefficients there are is how many are given, as a list or as c0, c1, ...
 //!
 //! Source: Legendre polynomials; the fields are the first-order terms of a similarity of the image.
 
@@ -122,7 +122,7 @@ impl EffectKind for Kind {
         parameters: &Parameters,
         surroundings: &Surroundings<'_>,
     ) -> Result<Box<dyn Effect>, EffectError> {
-        let mut known = vec!["variable", "acts_on", "middle", "half"];
+        let mut known = vec!["variable", "acts_on", "middle", "half", "coefficients"];
         known.extend(NAMES);
         let reader = Reader::new(ID, parameters, &known)?;
         let name = reader.text("variable")?;
@@ -152,8 +152,21 @@ impl EffectKind for Kind {
             });
         }
         let mut values = Vec::new();
-        for name in NAMES {
-            values.push(reader.number(name)?);
+        if let Some(list) = reader.text("coefficients")? {
+            reader.exclude("coefficients", NAMES)?;
+            for number in list.split(',') {
+                let value = number.trim().parse::<f64>().ok().filter(|v| v.is_finite());
+                let value = value.ok_or_else(|| EffectError::WrongType {
+                    effect: ID,
+                    name: "coefficients".to_owned(),
+                    expected: "an array of numbers",
+                })?;
+                values.push(Some(value));
+            }
+        } else {
+            for name in NAMES {
+                values.push(reader.number(name)?);
+            }
         }
         let count = values
             .iter()
@@ -175,7 +188,7 @@ impl EffectKind for Kind {
         if count > most || on_attitude && count % 3 != 0 {
             return Err(EffectError::OutOfRange {
                 effect: ID,
-                name: NAMES[count - 1].to_owned(),
+                name: "coefficients".to_owned(),
                 value: count as f64,
                 expected: "a number of coefficients that this variable has",
             });
