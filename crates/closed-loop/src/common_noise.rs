@@ -239,9 +239,7 @@ impl Filter {
         state: &mut [Vector3<f64>],
     ) -> DMatrix<f64> {
         let mut out = DMatrix::zeros(theta.nrows(), columns.len());
-        for ((&column, state), mut out) in
-            columns.iter().zip(state).zip(out.column_iter_mut())
-        {
+        for ((&column, state), mut out) in columns.iter().zip(state).zip(out.column_iter_mut()) {
             let theta = theta.column(column);
             for (bin, step) in self.steps[steps.clone()].iter().enumerate() {
                 let mut mean = state.component_mul(&step.decay);

@@ -28,9 +28,9 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 use crate::bins::{self, Bins};
 use crate::coloured::Coloured;
 use crate::folds::Folds;
+use crate::frame_rotation::{rotation_inverse, rotation_row};
 use crate::selection::FAMILY_ALPHA;
 use crate::star_data::{StarData, median_step};
-use crate::frame_rotation::{rotation_inverse, rotation_row};
 use crate::star_search::WIDENING;
 use telemetry::report::Unattributed;
 

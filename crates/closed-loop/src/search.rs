@@ -49,7 +49,12 @@ pub(crate) fn fit(
     folds: &Folds,
     candidates: &[&dyn Candidate],
 ) -> Result<Fitted, CloseError> {
-    fit_grams(evidence, &evidence.grams(folds, candidates), folds, candidates)
+    fit_grams(
+        evidence,
+        &evidence.grams(folds, candidates),
+        folds,
+        candidates,
+    )
 }
 
 /// As [`fit`], on columns that are there already.

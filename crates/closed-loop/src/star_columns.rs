@@ -166,10 +166,7 @@ impl StarColumns<'_> {
         for candidate in self.candidates.iter().filter(|c| !c.turns_camera()) {
             let p = candidate.coefficients().len();
             let at = column * n..(column + p) * n;
-            let (x, y) = (
-                &mut x.as_mut_slice()[at.clone()],
-                &mut y.as_mut_slice()[at],
-            );
+            let (x, y) = (&mut x.as_mut_slice()[at.clone()], &mut y.as_mut_slice()[at]);
             if candidate.star_columns(
                 &data.camera,
                 &seen,

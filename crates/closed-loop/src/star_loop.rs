@@ -423,7 +423,6 @@ fn finish(f: &Finish<'_>) -> Result<Closed, CloseError> {
         effects.push(effect);
         entries.push(entry);
     }
-<<<<<<< HEAD
     let (noise, leftover) = rayon::join(
         || noise_effects::claim(f.situation, f.level, f.found, f.folds, &plain.axes),
         || {
@@ -433,20 +432,11 @@ fn finish(f: &Finish<'_>) -> Result<Closed, CloseError> {
         },
     );
     let mut noise = noise?;
-=======
-    let mut noise = noise_effects::claim(f.situation, f.level, f.found, f.folds, &plain.axes)?;
->>>>>>> 5d4bfcc (Empirical terms: --add-empirical adds one after the verdict, models declare it, close and simulate read it; a switch is offered as one)
     effects.extend(noise.effects.iter().cloned());
     entries.extend(noise.entries.iter().cloned());
     model.effects.extend(entries);
 
-<<<<<<< HEAD
     leftover.tell(&mut unattributed);
-=======
-    let inside = noise_effects::in_sample(f.level, f.found);
-    let tracks = leftover::star_tracks(f.data, inside.as_deref().unwrap_or(&plain.axes));
-    leftover::describe(&tracks).tell(&mut unattributed);
->>>>>>> 5d4bfcc (Empirical terms: --add-empirical adds one after the verdict, models declare it, close and simulate read it; a switch is offered as one)
     let excess = excess(f, last);
     let mut considered = figures::considered(f.found, excess);
     considered.retain(|c| !effects.iter().any(|e| e.id == c.id));

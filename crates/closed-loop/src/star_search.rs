@@ -202,9 +202,7 @@ impl Trial<'_> {
         let fits = Fits::whole(&grams, &layout, self.variance)?;
         let all: Vec<usize> = (0..layout.candidates).collect();
         let solution = fits.solution(&all)?;
-        let rotations = self
-            .moments
-            .rotations(columns, &solution, solution.len())?;
+        let rotations = self.moments.rotations(columns, &solution, solution.len())?;
         Some(rotations.noise(None))
     }
 
@@ -258,9 +256,7 @@ impl Trial<'_> {
             let grams = self.moments.under(columns, &noise);
             let fits = Fits::whole(&grams, &layout, 1.0)?;
             let solution = fits.solution(&all)?;
-            let rotations = self
-                .moments
-                .rotations(columns, &solution, solution.len())?;
+            let rotations = self.moments.rotations(columns, &solution, solution.len())?;
             let better = rotations.noise(Some(&noise));
             if round < ALTERNATIONS && !better.is_like(&noise) {
                 noise = better;

@@ -5,7 +5,15 @@
 use telemetry::report::{Hypothesis, HypothesisSize, Report};
 
 use super::write::{Cell, Page, datum, escaped};
-use crate::number::{percent, short};
+use crate::number::percent;
+
+/// Numbers that the words beside them tell already.
+fn for_machines(at: &str, numbers: &[(&str, Option<f64>)]) -> String {
+    numbers
+        .iter()
+        .filter_map(|(name, value)| Some(datum(&format!("{at}/{name}"), (*value)?, "")))
+        .collect()
+}
 
 /// The motion for each pair of effects.
 pub(super) fn apart(page: &mut Page, report: &Report) {
@@ -16,12 +24,24 @@ pub(super) fn apart(page: &mut Page, report: &Report) {
                 continue;
             };
             let key = |name: &str| format!("/effects/{k}/confusable_with/{i}/{name}");
+            let numbers = [
+                ("axis/0", Some(manoeuvre.axis[0])),
+                ("axis/1", Some(manoeuvre.axis[1])),
+                ("axis/2", Some(manoeuvre.axis[2])),
+                ("rate_deg_s", Some(manoeuvre.rate_deg_s)),
+                ("duration_s", Some(manoeuvre.duration_s)),
+                ("ramp_s", Some(manoeuvre.ramp_s)),
+            ];
             rows.push(vec![
                 Cell::text(&effect.id),
                 Cell::text(&c.id),
                 Cell::maybe(&key("delta_loglik"), c.delta_loglik),
                 Cell::maybe(&key("separation_sigma"), c.separation_sigma),
-                Cell::text(&manoeuvre.text),
+                Cell::words(format!(
+                    "{}{}",
+                    escaped(&manoeuvre.text),
+                    for_machines(&key("manoeuvre"), &numbers)
+                )),
                 Cell::datum(&key("manoeuvre/sigma"), manoeuvre.sigma),
             ]);
         }
@@ -45,11 +65,18 @@ pub(super) fn hypotheses(page: &mut Page, report: &Report) {
     }
     page.section("hypotheses", "Asked by name", |page| {
         page.raw("<ul>");
-        for h in &report.hypotheses {
+        for (k, h) in report.hypotheses.iter().enumerate() {
+            let numbers = [
+                ("delta_loglik", h.delta_loglik),
+                ("p_value", h.p_value),
+                ("variance_share", h.variance_share),
+                ("variance_share_at_most", h.variance_share_at_most),
+            ];
             page.raw(&format!(
-                "<li><strong>{}</strong>: {}.</li>",
+                "<li><strong>{}</strong>: {}.{}</li>",
                 escaped(&h.id),
-                escaped(&h.finding)
+                escaped(&h.finding),
+                for_machines(&format!("/hypotheses/{k}"), &numbers)
             ));
         }
         page.raw("</ul>");
@@ -76,13 +103,9 @@ fn row(k: usize, i: usize, h: &Hypothesis, size: &HypothesisSize) -> Vec<Cell> {
     } else {
         format!("{}, {}", size.parameter, size.unit)
     };
-    let most = h.variance_share_at_most.map_or_else(
-        || Cell::number("–"),
-        |v| {
-            let key = format!("/hypotheses/{k}/variance_share_at_most");
-            Cell::html(datum(&key, v, &percent(v)))
-        },
-    );
+    let most = h
+        .variance_share_at_most
+        .map_or_else(|| Cell::number("–"), |v| Cell::number(&percent(v)));
     vec![
         Cell::text(&h.id),
         Cell::text(&named),
@@ -91,8 +114,7 @@ fn row(k: usize, i: usize, h: &Hypothesis, size: &HypothesisSize) -> Vec<Cell> {
         Cell::maybe(&of("detectable"), size.detectable),
         Cell::maybe(&of("needed"), size.needed),
         Cell::maybe(&of("needed_alone"), size.needed_alone),
-        size.plausible
-            .map_or_else(|| Cell::number("–"), |p| Cell::number(&short(p))),
+        Cell::maybe(&of("plausible"), size.plausible),
         most,
     ]
 }
