@@ -208,6 +208,7 @@ impl Assessment {
                     unit: None,
                 })
                 .collect(),
+            hypotheses: Vec::new(),
             unattributed: Unattributed {
                 present: coloured,
                 variance_fraction: coloured.then(|| rest / whole),

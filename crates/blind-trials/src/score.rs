@@ -222,6 +222,7 @@ mod tests {
             after: errors(1.5),
             effects,
             considered: Vec::new(),
+            hypotheses: Vec::new(),
             unattributed: Unattributed {
                 present: follows.is_some(),
                 depends_on: follows.map(depends).into_iter().collect(),

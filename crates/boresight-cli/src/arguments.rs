@@ -29,7 +29,7 @@ pub(crate) struct Arguments {
 pub(crate) enum Command {
     /// Find what the model misses, add it, and report the error before and after
     #[command(
-        after_help = "Examples:\n  boresight close\n  boresight close fixtures/models/aa-str.toml telemetry/ --out results/"
+        after_help = "Examples:\n  boresight close\n  boresight close fixtures/models/aa-str.toml telemetry/ --out results/\n  boresight close model.toml telemetry/ --test rolling_shutter --test exposure_smear"
     )]
     Close(Close),
     /// Make the bundle that a tracker would have sent
@@ -65,6 +65,13 @@ pub(crate) struct Close {
     /// Folder for report, model and residuals; nothing is written without it
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
+    /// Also say of this effect of the catalogue whether it could be the cause, how large it would
+    /// have to be, and what would have shown; may be given several times
+    #[arg(long = "test", value_name = "EFFECT")]
+    pub(crate) tests: Vec<String>,
+    /// Also add what the leftover follows most, as a term without a cause (it never counts as one)
+    #[arg(long)]
+    pub(crate) add_empirical: bool,
 }
 
 #[derive(Debug, Args)]

@@ -1,9 +1,14 @@
 //! The command as a user meets it: exit codes, streams, files.
 
+#[path = "../../telemetry/tests/common/flight_data.rs"]
+mod flight_data;
+
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use assert_cmd::Command;
+use flight_data::flight_data;
+use serde_json::Value;
 
 type Done = Result<(), Box<dyn std::error::Error>>;
 
@@ -13,6 +18,14 @@ fn boresight() -> Command {
 
 fn fixtures() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fixtures")
+}
+
+/// Runs a command that has to succeed; what it says for machines.
+fn answer(command: &mut Command) -> Result<Value, Box<dyn std::error::Error>> {
+    let done = command.arg("--json").output()?;
+    let said = String::from_utf8_lossy(&done.stderr);
+    assert!(done.status.success(), "{said}");
+    Ok(serde_json::from_slice(&done.stdout)?)
 }
 
 /// A copy of the example's bundle that a test may break.
@@ -30,9 +43,7 @@ fn example_bundle(to: &Path) -> std::io::Result<PathBuf> {
 /// estimate on either side; the model file does not declare it.
 #[test]
 fn without_arguments_the_example_is_explained() -> Done {
-    let out = boresight().args(["close", "--json"]).output()?;
-    assert!(out.status.success());
-    let report: serde_json::Value = serde_json::from_slice(&out.stdout)?;
+    let report = answer(boresight().arg("close"))?;
     assert_eq!(report["format"], "boresight-report/1");
     assert_eq!(report["verdict"], "explained");
     let effects = report["effects"].as_array().ok_or("effects")?;
@@ -81,12 +92,8 @@ fn results_are_whole_and_the_model_can_be_used_again() -> Done {
     the_page_is_true_to_the_report(&out)?;
     // with what was found declared, nothing is left to find
     let bundle = example_bundle(dir.path())?;
-    let again = boresight()
-        .args(["close", "--json"])
-        .arg(out.join("model.toml"))
-        .arg(&bundle)
-        .output()?;
-    let report: serde_json::Value = serde_json::from_slice(&again.stdout)?;
+    let model = out.join("model.toml");
+    let report = answer(boresight().arg("close").args([&model, &bundle]))?;
     assert_eq!(report["verdict"], "consistent");
     Ok(())
 }
@@ -94,13 +101,13 @@ fn results_are_whole_and_the_model_can_be_used_again() -> Done {
 /// The page of a real run, with ensembles of both models, says what its `report.json` says.
 fn the_page_is_true_to_the_report(out: &Path) -> Done {
     let page = fs::read_to_string(out.join("report.html"))?;
-    let report: serde_json::Value = serde_json::from_slice(&fs::read(out.join("report.json"))?)?;
+    let report: Value = serde_json::from_slice(&fs::read(out.join("report.json"))?)?;
     let mut numbers = 0;
     for piece in page.split("<data value=\"").skip(1) {
         let mut parts = piece.split('"');
         let value: f64 = parts.next().ok_or("value")?.parse()?;
         let key = parts.nth(1).ok_or("key")?;
-        let wanted = report.pointer(key).and_then(serde_json::Value::as_f64);
+        let wanted = report.pointer(key).and_then(Value::as_f64);
         let wanted = wanted.ok_or_else(|| format!("no {key}"))?;
         // text is read back to within a unit of the last place
         assert!((wanted - value).abs() <= 4e-16 * value.abs(), "{key}");
@@ -190,6 +197,65 @@ fn an_empty_folder_is_no_bundle() -> Done {
     refuses(&bundle, &["bundle.toml"])
 }
 
+/// Effects that were asked about are answered in the order asked, one that the bundle cannot show with
+/// what is missing; an id that does not exist is one message with all that do.
+#[test]
+fn hypotheses_are_answered_by_name() -> Done {
+    let asked = ["velocity_aberration", "exposure_smear", "rolling_shutter"];
+    let mut command = boresight();
+    command.arg("close");
+    for id in asked {
+        command.args(["--test", id]);
+    }
+    let report = answer(&mut command)?;
+    let answers = report["hypotheses"].as_array().ok_or("hypotheses")?;
+    let ids: Vec<&str> = answers.iter().filter_map(|h| h["id"].as_str()).collect();
+    assert_eq!(ids, asked);
+    let [aberration, smear, shutter] = answers.as_slice() else {
+        return Err("three".into());
+    };
+    assert_eq!(aberration["observable"], false);
+    let reason = aberration["reason"].as_str().ok_or("reason")?;
+    assert!(reason.contains("velocity channels"), "{reason}");
+    assert_eq!(
+        (&smear["observable"], &smear["added"]),
+        (&true.into(), &false.into())
+    );
+    let size = &smear["sizes"][0];
+    assert_eq!(size["parameter"], "exposure_s");
+    // 0.58 s: three quarters of an hour of slews of some 0.1 deg/s
+    let seen = size["detectable"].as_f64().ok_or("detectable")?;
+    assert!((0.1..2.0).contains(&seen), "{seen}");
+    assert_eq!(
+        (&shutter["added"], &shutter["significant"]),
+        (&true.into(), &true.into())
+    );
+    let pointer = "/parameters/line_time_s/value";
+    assert_eq!(
+        Some(&shutter["sizes"][0]["value"]),
+        report["effects"][0].pointer(pointer)
+    );
+    // the declared model's residual holds nothing else: what was added explains it at its own size
+    let share = shutter["variance_share"].as_f64().ok_or("share")?;
+    let most = shutter["variance_share_at_most"].as_f64().ok_or("most")?;
+    assert!(
+        0.03 < share && share < most && most < 0.06,
+        "{share} {most}"
+    );
+
+    let unknown = boresight()
+        .args(["close", "--test", "turn-around"])
+        .output()?;
+    let message = String::from_utf8(unknown.stderr)?;
+    assert_eq!(unknown.status.code(), Some(2));
+    assert!(unknown.stdout.is_empty());
+    assert!(
+        message.contains("`turn-around`") && message.contains("exposure_smear"),
+        "{message}"
+    );
+    Ok(())
+}
+
 #[test]
 fn usage_errors_exit_with_two() -> Done {
     for arguments in [
@@ -231,12 +297,8 @@ fn a_simulated_bundle_closes() -> Done {
         String::from_utf8_lossy(&done.stderr)
     );
     assert!(done.stdout.is_empty());
-    let done = boresight()
-        .args(["close", "--json"])
-        .arg(fixtures().join("example/model.toml"))
-        .arg(&bundle)
-        .output()?;
-    let report: serde_json::Value = serde_json::from_slice(&done.stdout)?;
+    let model = fixtures().join("example/model.toml");
+    let report = answer(boresight().arg("close").args([&model, &bundle]))?;
     assert_eq!(report["effects"][0]["id"], "rolling_shutter");
     Ok(())
 }
@@ -293,16 +355,7 @@ fn assess_reads_quaternions_under_any_name() -> Done {
         table.push_str(&format!("{t},0,0,{:.12},{:.12}\n", half.sin(), half.cos()));
     }
     fs::write(bundle.join("attitude.csv"), table)?;
-    let done = boresight()
-        .args(["assess", "--json"])
-        .arg(&bundle)
-        .output()?;
-    assert!(
-        done.status.success(),
-        "{}",
-        String::from_utf8_lossy(&done.stderr)
-    );
-    let got: serde_json::Value = serde_json::from_slice(&done.stdout)?;
+    let got = answer(boresight().arg("assess").arg(&bundle))?;
     assert_eq!(got["format"], "boresight-assess/1");
     assert_eq!(got["method"], "rigid_rotator");
     let total = got["total_arcsec"][2].as_f64().ok_or("total")?;
@@ -342,13 +395,13 @@ fn the_assessment_of_the_page_is_that_of_the_command() -> Done {
     ] {
         assert!(fs::metadata(results.join(file))?.len() > 0, "{file}");
     }
-    let got: serde_json::Value = serde_json::from_slice(&fs::read(results.join("assess.json"))?)?;
+    let got: Value = serde_json::from_slice(&fs::read(results.join("assess.json"))?)?;
     let text = page
         .split("```json")
         .nth(1)
         .and_then(|t| t.split("```").next())
         .ok_or("json")?;
-    let shown: serde_json::Value = serde_json::from_str(text)?;
+    let shown: Value = serde_json::from_str(text)?;
     for (key, value) in shown.as_object().ok_or("object")? {
         let Some(values) = value.as_array() else {
             assert_eq!(&got[key], value, "{key}");
@@ -372,20 +425,10 @@ fn the_assessment_of_the_page_is_that_of_the_command() -> Done {
 /// Recorded quaternions of two cameras, where the data are.
 #[test]
 fn assess_takes_the_recorded_cameras() -> Done {
-    let Some(data) = std::env::var_os("BORESIGHT_DATA") else {
+    let Some(bundle) = flight_data("tess-s1-cam1-vs-cam4") else {
         return Ok(());
     };
-    let bundle = Path::new(&data).join("tess-s1-cam1-vs-cam4");
-    let done = boresight()
-        .args(["assess", "--json"])
-        .arg(&bundle)
-        .output()?;
-    assert!(
-        done.status.success(),
-        "{}",
-        String::from_utf8_lossy(&done.stderr)
-    );
-    let got: serde_json::Value = serde_json::from_slice(&done.stdout)?;
+    let got = answer(boresight().arg("assess").arg(&bundle))?;
     assert_eq!(got["method"], "reference");
     assert_eq!(got["frames"]["frames"], 19227);
     for axis in 0..3 {

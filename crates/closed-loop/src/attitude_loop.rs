@@ -8,20 +8,24 @@ use crate::attitude_data::{AttitudeData, AttitudeEvidence};
 use crate::attitude_search;
 use crate::close::{Closed, Rival, catalogue_candidates};
 use crate::coloured::Coloured;
+use crate::confusion;
 use crate::declared;
 use crate::empirical::{Empirical, Variable};
 use crate::error::CloseError;
 use crate::evidence::{Amplitudes, Evidence, Residuals};
 use crate::figures;
 use crate::folds::Folds;
+use crate::hypothesis::{self, Grounds};
+use crate::instants;
 use crate::leftover;
+use crate::manoeuvre::attitudes::fly;
 use crate::motion::{self, Around};
 use crate::search::{Found, amplitudes, borrowed, fit};
 use crate::selection::columns_of;
 use crate::situation::Situation;
 use crate::star_data::median_step;
 use focal_plane::{AttitudeSource, Series};
-use nalgebra::DVector;
+use nalgebra::{DVector, UnitQuaternion};
 use spectra::robust;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use telemetry::AttitudeResiduals;
@@ -326,6 +330,43 @@ fn in_sample(evidence: &AttitudeEvidence<'_>, rows: usize, found: &Found) -> Opt
     Some(evidence.residuals(&Folds::whole(rows), &list, &amplitudes))
 }
 
+/// Squared length of each candidate column about its mean on every axis, arcsec^2.
+fn column_lengths(evidence: &AttitudeEvidence<'_>, found: &Found) -> Vec<f64> {
+    let data = evidence.data;
+    let binned = evidence.binned(&borrowed(&found.candidates));
+    let m = data.bins.rows.len();
+    let length = |column: &[f64]| -> f64 {
+        (0..3)
+            .map(|axis| {
+                let (values, count) = (&column[axis * m..(axis + 1) * m], &data.count[axis]);
+                let all = || values.iter().zip(count);
+                let rows: f64 = count.iter().sum();
+                let mean = all().map(|(v, n)| v * n).sum::<f64>() / rows.max(1.0);
+                all().map(|(v, n)| n * (v - mean) * (v - mean)).sum::<f64>()
+            })
+            .sum()
+    };
+    binned
+        .column_iter()
+        .skip(3)
+        .map(|column| length(column.as_slice()))
+        .collect()
+}
+
+/// Squared residual beyond the white noise of each axis, arcsec^2.
+fn beyond_white(data: &AttitudeData, residual: &Residuals) -> Option<f64> {
+    let noise = fit_noise(data, residual);
+    let (mut excess, mut scatter) = (0.0, 0.0);
+    for axis in 0..3 {
+        let rows: f64 = data.count[axis].iter().sum();
+        let white = noise[axis].white * noise[axis].white;
+        let square = figures::rms(&residual.axes[axis], &data.outlier[axis])?.powi(2);
+        excess += (rows * (square - white)).max(0.0);
+        scatter += rows * white * white;
+    }
+    hypothesis::beyond(excess, scatter.sqrt(), 1.0)
+}
+
 fn finish(
     situation: &Situation<'_>,
     data: &AttitudeData,
@@ -353,17 +394,49 @@ fn finish(
         explained.push((last - now) / whole);
         last = now;
     }
-    let (effects, entries) = figures::effects_found(found, &explained, &situation.surroundings())?;
+    // what is left is judged before a term without a cause is added
+    let mut unattributed = figures::unattributed(found, last / whole);
+    let (surroundings, questions) = (situation.surroundings(), situation.questions);
+    let mut added = chosen.clone();
+    let plain = after;
+    let mut after = plain.clone();
+    if questions.empirical
+        && let Some(g) = figures::best_empirical(found, &unattributed, &surroundings)
+    {
+        added.push(g);
+        after = residuals(&evidence, folds, found, &added)?;
+        explained.push((last - power(&after)) / whole);
+    }
+    let (mut effects, entries) =
+        figures::effects_found(found, &added, &explained, &surroundings, questions)?;
+    let confusion = confusion::compare(found, &mut effects);
+    if let (false, Some(step), Some(&start)) = (
+        confusion.is_empty(),
+        median_step(&data.t_s),
+        data.t_s.first(),
+    ) {
+        let sigma = evidence.constant_sigma;
+        confusion.tell(&mut effects, start, UnitQuaternion::identity(), &|flown| {
+            fly(flown, &confusion.candidates, step, sigma, noise)
+        });
+    }
+    instants::complete(
+        &evidence,
+        &data.bins.folds,
+        found,
+        &situation.surroundings(),
+        median_step(&data.t_s).unwrap_or(1.0),
+        &mut effects,
+    )?;
     let mut model = situation.model.clone();
     model.effects.extend(entries);
-    let mut unattributed = figures::unattributed(found, last / whole);
     if situation.model.hem.is_none() {
-        slow_leftover(data, &after, &mut unattributed, last / whole);
+        slow_leftover(data, &plain, &mut unattributed, last / whole);
     }
     let inside = in_sample(&evidence, data.t_s.len(), found);
     let tracks = leftover::attitude_tracks(
         &data.t_s,
-        &inside.as_ref().unwrap_or(&after).axes,
+        &inside.as_ref().unwrap_or(&plain).axes,
         &data.outlier,
     );
     leftover::describe(&tracks).tell(&mut unattributed);
@@ -376,13 +449,28 @@ fn finish(
         chi2_per_dof: None,
         loglik_per_frame: Some(loglik_per_frame(data, r)),
     };
+    let considered = figures::considered(found, 0.0);
+    let lengths = column_lengths(&evidence, found);
+    let hypotheses = hypothesis::answer(
+        situation.questions,
+        &Grounds {
+            found,
+            surroundings: situation.surroundings(),
+            information: &|c| lengths[c],
+            alone: beyond_white(data, &before),
+            left: beyond_white(data, &plain),
+            resolved: motion.is_some(),
+            effects: &effects,
+            considered: &considered,
+        },
+    );
     let outliers: Vec<bool> = (0..data.t_s.len())
         .map(|k| (0..3).any(|a| data.outlier[a][k]))
         .collect();
     let count = outliers.iter().filter(|o| **o).count();
     let report = Report {
         format: telemetry::report::REPORT_FORMAT.to_owned(),
-        verdict: figures::verdict(!effects.is_empty(), unattributed.present),
+        verdict: figures::verdict(&effects, unattributed.present),
         folds: folds.count,
         rows: Rows {
             used: data.t_s.len() - count,
@@ -392,7 +480,8 @@ fn finish(
         before: errors(&before),
         after: errors(&after),
         effects,
-        considered: figures::considered(found, 0.0),
+        considered,
+        hypotheses,
         unattributed,
     };
     let [bx, by, bz]: [Vec<f64>; 3] = before.axes.try_into().unwrap_or_default();

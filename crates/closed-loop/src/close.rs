@@ -16,7 +16,9 @@ use telemetry::report::Report;
 use telemetry::{AttitudeResiduals, Bundle, DarkMap, Model, StarResiduals};
 
 use crate::attitude_loop;
+use crate::declared;
 use crate::error::CloseError;
+use crate::hypothesis::Questions;
 use crate::situation::Situation;
 use crate::star_loop;
 
@@ -59,7 +61,21 @@ pub fn close(
     bundle: &Bundle,
     progress: &dyn Fn(&str),
 ) -> Result<Closed, CloseError> {
-    let situation = Situation::join(model, bundle)?;
+    close_asking(model, bundle, &Questions::default(), progress)
+}
+
+/// As [`close`], and answers `questions` about effects of the catalogue: `hypotheses` of the report.
+///
+/// # Errors
+/// Those of [`close`].
+pub fn close_asking(
+    model: &Model,
+    bundle: &Bundle,
+    questions: &Questions,
+    progress: &dyn Fn(&str),
+) -> Result<Closed, CloseError> {
+    let situation = Situation::join(model, bundle, questions)?;
+    declared::refuse_on_images(&situation)?;
     if bundle.stars.is_some() {
         star_loop::run(&situation, progress)
     } else {

@@ -48,3 +48,18 @@ pub(crate) fn effects(situation: &Situation<'_>) -> Result<Vec<Arc<dyn Effect>>,
     }
     Ok(built)
 }
+
+/// Refuses a declared effect on raw images where these are there: to go on as if it were not declared
+/// would be wrong. Without images centroids stand as they are, and there is nothing to take it off from.
+pub(crate) fn refuse_on_images(situation: &Situation<'_>) -> Result<(), CloseError> {
+    if situation.bundle.images.is_none() || situation.bundle.stars.is_none() {
+        return Ok(());
+    }
+    for entry in &situation.model.effects {
+        if effects::kind(&entry.id)?.acts_on().images {
+            let id = entry.id.clone();
+            return Err(CloseError::DeclaredOnImages { id });
+        }
+    }
+    Ok(())
+}

@@ -71,6 +71,8 @@ pub(crate) struct Empirical {
     /// Middle and half range of the variable: scales it to -1..1.
     middle: f64,
     half: f64,
+    /// Whether it moves stars, or attitudes.
+    stars: bool,
     coefficients: Vec<Coefficient>,
 }
 
@@ -90,14 +92,15 @@ impl Empirical {
             Variable::Time if stars => 4,
             Variable::Time => 3,
             Variable::Rate | Variable::Acceleration => 4,
-            _ if stars => 4 * ORDERS,
-            _ => 3 * ORDERS,
+            _ if stars => 4 * orders(&variable),
+            _ => 3 * orders(&variable),
         };
         let coefficients = (0..count)
             .map(|k| Coefficient::new(format!("c{k}"), "arcsec", f64::INFINITY))
             .collect();
         Some(Self {
             variable,
+            stars,
             middle: 0.5 * (range[0] + range[1]),
             half,
             coefficients,
@@ -108,6 +111,23 @@ impl Empirical {
         let z = (value - self.middle) / self.half;
         if z.is_finite() { z } else { 0.0 }
     }
+}
+
+/// Orders that a variable can tell apart: a switch has two values, and all its polynomials are one.
+fn orders(variable: &Variable) -> usize {
+    let Variable::Housekeeping(_, series) = variable else {
+        return ORDERS;
+    };
+    let mut known: Vec<f64> = Vec::new();
+    for value in series.value().iter().filter(|v| v.is_finite()) {
+        if known.iter().all(|k| k.to_bits() != value.to_bits()) {
+            known.push(*value);
+        }
+        if known.len() > ORDERS {
+            break;
+        }
+    }
+    known.len().saturating_sub(1).clamp(1, ORDERS)
 }
 
 /// Legendre polynomials `P_1`..`P_3`.
@@ -261,10 +281,18 @@ impl Candidate for Empirical {
         true
     }
 
-    fn realise(&self, _: &[f64], _: &Surroundings<'_>) -> Result<Box<dyn Effect>, EffectError> {
-        Err(EffectError::UnknownEffect {
-            id: EMPIRICAL.to_owned(),
-            nearest: String::new(),
-        })
+    /// Terms in motion or in single stars predict only where they were fitted: they cannot be declared.
+    fn realise(
+        &self,
+        values: &[f64],
+        surroundings: &Surroundings<'_>,
+    ) -> Result<Box<dyn Effect>, EffectError> {
+        let parameters = effects::empirical_parameters(
+            &self.variable.name(),
+            !self.stars,
+            [self.middle, if self.half > 0.0 { self.half } else { 1.0 }],
+            values,
+        );
+        effects::build(EMPIRICAL, &parameters, surroundings)
     }
 }

@@ -42,6 +42,22 @@ pub enum CloseError {
         /// Where the others went.
         why: &'static str,
     },
+    /// A declared effect on raw images that are there.
+    #[error(
+        "the model declares `{id}`, and the bundle has raw images: centroids with a declared map or spot taken off cannot be formed yet; leave the entry out of the model, and it is estimated anew, or the table `images` out of the bundle, whose centroids then stand as they are"
+    )]
+    DeclaredOnImages {
+        /// The effect.
+        id: String,
+    },
+    /// A hypothesis that the catalogue does not have.
+    #[error("`{id}` is no effect of the catalogue, which has: {known}")]
+    UnknownHypothesis {
+        /// What was asked about.
+        id: String,
+        /// All ids.
+        known: String,
+    },
     /// The declared unknowns cannot be solved for.
     #[error(
         "the declared unknowns cannot be estimated from this data: the normal equations are singular"

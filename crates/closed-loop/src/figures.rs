@@ -22,6 +22,7 @@ use telemetry::{EffectEntry, EffectValue};
 use crate::empirical::EMPIRICAL;
 use crate::error::CloseError;
 use crate::evidence::Residuals;
+use crate::hypothesis::Questions;
 use crate::search::Found;
 use crate::selection::{FAMILY_ALPHA, columns_of};
 use crate::star_data::StarData;
@@ -33,10 +34,11 @@ const CONFUSABLE: f64 = 0.3;
 /// `explained` is the share of the before variance of each.
 pub(crate) fn effects_found(
     found: &Found,
+    chosen: &[usize],
     explained: &[f64],
     surroundings: &Surroundings<'_>,
+    questions: &Questions,
 ) -> Result<(Vec<FoundEffect>, Vec<EffectEntry>), CloseError> {
-    let chosen = &found.selection.chosen;
     let set = columns_of(&found.fitted.groups, chosen);
     let mut effects = Vec::new();
     let mut entries = Vec::new();
@@ -67,6 +69,14 @@ pub(crate) fn effects_found(
         for (key, value) in &selectors {
             written.insert(key.clone(), EffectValue::Text(value.clone()));
         }
+        if candidate.id() == EMPIRICAL {
+            // in a model they stand as one list
+            written.retain(|name, _| !name.starts_with('c') || name == "coefficients");
+            written.insert(
+                "coefficients".to_owned(),
+                EffectValue::Numbers(values.clone()),
+            );
+        }
         effects.push(FoundEffect {
             id: candidate.id().to_owned(),
             selectors: selectors
@@ -77,7 +87,11 @@ pub(crate) fn effects_found(
             delta_loglik: judged.delta_loglik,
             p_value: judged.p_value,
             variance_explained: explained.get(k).copied(),
-            confusable_with: confusable(found, g),
+            confusable_with: if candidate.id() == EMPIRICAL {
+                Vec::new()
+            } else {
+                confusable(found, g, questions)
+            },
         });
         entries.push(EffectEntry::new(candidate.id(), written));
     }
@@ -86,7 +100,7 @@ pub(crate) fn effects_found(
 
 /// Amplitudes of candidate `g` (zero for columns that the data cannot show) and
 /// their covariance, out of a joint estimate on `set`.
-fn amplitudes_of(
+pub(crate) fn amplitudes_of(
     found: &Found,
     g: usize,
     set: &[usize],
@@ -112,8 +126,8 @@ fn amplitudes_of(
     (values, covariance)
 }
 
-/// Other catalogue effects whose columns resemble those of `g`.
-fn confusable(found: &Found, g: usize) -> Vec<Confusable> {
+/// Other catalogue effects whose columns resemble those of `g`, or that were asked about.
+fn confusable(found: &Found, g: usize, questions: &Questions) -> Vec<Confusable> {
     let mut best: BTreeMap<&str, f64> = BTreeMap::new();
     for (other, group) in found.fitted.groups.iter().enumerate() {
         let id = found.candidates[other].id();
@@ -132,10 +146,13 @@ fn confusable(found: &Found, g: usize) -> Vec<Confusable> {
     }
     let mut list: Vec<Confusable> = best
         .into_iter()
-        .filter(|(_, c)| c.abs() >= CONFUSABLE)
+        .filter(|(id, c)| c.abs() >= CONFUSABLE || questions.include(id))
         .map(|(id, correlation)| Confusable {
             id: id.to_owned(),
             correlation,
+            delta_loglik: None,
+            separation_sigma: None,
+            manoeuvre: None,
         })
         .collect();
     list.sort_by(|a, b| b.correlation.abs().total_cmp(&a.correlation.abs()));
@@ -238,9 +255,32 @@ pub(crate) fn unattributed(found: &Found, left: f64) -> Unattributed {
     }
 }
 
-/// The finding in one word.
-pub(crate) fn verdict(added: bool, left: bool) -> Verdict {
-    match (added, left) {
+/// The empirical term that explains most of what is left, if one that a model can declare does.
+pub(crate) fn best_empirical(
+    found: &Found,
+    unattributed: &Unattributed,
+    surroundings: &Surroundings<'_>,
+) -> Option<usize> {
+    let beyond_chance = |d: &&Dependence| d.p_value < FAMILY_ALPHA && d.variance_explained > 0.0;
+    unattributed
+        .depends_on
+        .iter()
+        .filter(beyond_chance)
+        .find_map(|d| {
+            let g = (0..found.candidates.len()).find(|&g| {
+                let candidate = found.candidates[g].as_ref();
+                candidate.id() == EMPIRICAL
+                    && candidate.selectors().get("variable") == Some(&d.variable)
+            })?;
+            let candidate = found.candidates[g].as_ref();
+            let one = vec![1.0; candidate.coefficients().len()];
+            candidate.realise(&one, surroundings).is_ok().then_some(g)
+        })
+}
+
+/// The finding in one word; empirical terms never count as explanation.
+pub(crate) fn verdict(effects: &[FoundEffect], left: bool) -> Verdict {
+    match (effects.iter().any(|e| e.id != EMPIRICAL), left) {
         (false, false) => Verdict::Consistent,
         (true, false) => Verdict::Explained,
         (true, true) => Verdict::PartlyExplained,

@@ -484,7 +484,7 @@ impl Fits {
     }
 
     /// Squared error of all data at the best amplitudes of `set`.
-    fn error(&self, set: &[usize]) -> Option<f64> {
+    pub(crate) fn error(&self, set: &[usize]) -> Option<f64> {
         let (beta, _) = self.all.amplitudes(set)?;
         let last = self.all.train.ncols() - 1;
         let explained: f64 = (0..set.len())

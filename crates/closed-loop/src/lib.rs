@@ -14,6 +14,7 @@ mod bins;
 mod close;
 mod coloured;
 mod common_noise;
+mod confusion;
 mod declared;
 mod directions;
 mod empirical;
@@ -24,9 +25,12 @@ mod fit;
 mod folds;
 mod frame_rotation;
 mod gram;
+mod hypothesis;
 mod image_level;
 mod images;
+mod instants;
 mod leftover;
+mod manoeuvre;
 mod motion;
 mod noise_effects;
 mod nuisance;
@@ -42,8 +46,9 @@ mod star_loop;
 mod star_moments;
 mod star_search;
 
-pub use close::{Closed, Rival, close};
+pub use close::{Closed, Rival, close, close_asking};
 pub use error::CloseError;
+pub use hypothesis::Questions;
 
 /// Seeds of a trial of alarms and the most of them that may raise one: `seeds` and
 /// `most`, or as many as `BORESIGHT_SEEDS` says and 5 sigma above one in `rarity`.

@@ -44,6 +44,10 @@ const RATE: &str = "rate_noise";
 const OUTLIERS: &str = "outliers";
 /// Sigmas that a size takes to be seen.
 const SEEN: f64 = 5.0;
+/// Size of the spikes, in sigmas of the noise, for which their share is given.
+const SPIKE: f64 = 10.0;
+/// Slopes beyond this are none.
+const STEEPEST: f64 = 20.0;
 
 /// What was found, and what was only considered.
 #[derive(Clone, Debug, Default)]
@@ -54,6 +58,43 @@ pub(crate) struct NoiseEffects {
 }
 
 impl NoiseEffects {
+    /// Sizes at which each effect that was not claimed would explain `excess` by itself: squared
+    /// residual beyond the noise, arcsec^2, over all rows. Of spikes, those of [`SPIKE`] sigmas.
+    pub(crate) fn need(
+        &mut self,
+        situation: &Situation<'_>,
+        data: &StarData,
+        excess: f64,
+    ) -> Result<(), CloseError> {
+        let declared = declared_variance(situation, data)?;
+        let rows: Vec<usize> = (0..data.t_s.len()).filter(|&r| !data.outlier[r]).collect();
+        // two axes a row
+        let wanted = excess / (2.0 * rows.len().max(1) as f64);
+        if wanted <= 0.0 {
+            return Ok(());
+        }
+        let mean = |of: &dyn Fn(usize) -> f64| {
+            let all = rows.iter().map(|&r| of(r)).filter(|v| v.is_finite());
+            all.sum::<f64>() / rows.len().max(1) as f64
+        };
+        let degrees = data.camera.arcsec_per_px().map(|s| s / 3600.0);
+        let square = |r: usize| {
+            (data.velocity[0][r] * degrees[0]).powi(2) + (data.velocity[1][r] * degrees[1]).powi(2)
+        };
+        for entry in &mut self.considered {
+            entry.needed = match entry.id.as_str() {
+                MAGNITUDE => steepest(wanted, &|slope| {
+                    mean(&|r| declared[r] * (10_f64.powf(0.4 * slope * (data.mag[r] - 5.0)) - 1.0))
+                }),
+                RATE => Some((wanted / mean(&square)).sqrt()),
+                OUTLIERS => Some(wanted / (SPIKE * SPIKE * mean(&|r| declared[r]))),
+                _ => None,
+            }
+            .filter(|n| n.is_finite());
+        }
+        Ok(())
+    }
+
     /// Puts what is known of the effects that were not claimed into the list.
     pub(crate) fn tell(&self, considered: &mut [ConsideredEffect]) {
         for known in &self.considered {
@@ -164,6 +205,29 @@ pub(crate) fn claim(
     Ok(out)
 }
 
+/// The gentlest slope of either sign at which `gain` reaches `wanted`, by halving.
+fn steepest(wanted: f64, gain: &dyn Fn(f64) -> f64) -> Option<f64> {
+    let side = |sign: f64| {
+        if gain(sign * STEEPEST) < wanted {
+            return None;
+        }
+        let (mut low, mut high) = (0.0, STEEPEST);
+        for _ in 0..60 {
+            let middle = 0.5 * (low + high);
+            if gain(sign * middle) < wanted {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        Some(sign * high)
+    };
+    [side(1.0), side(-1.0)]
+        .into_iter()
+        .flatten()
+        .min_by(|a, b| a.abs().total_cmp(&b.abs()))
+}
+
 impl NoiseEffects {
     fn add(&mut self, id: &str, names: &[(&str, &str)], judged: &Judged) {
         if !judged.observable {
@@ -176,8 +240,9 @@ impl NoiseEffects {
                 delta_loglik: Some(judged.gain),
                 p_value: Some(judged.p_value),
                 observable: true,
-                // a rate adds in square, and a share of spikes has no size at which it shows
+                // a rate adds in square; of spikes, the fewest that make a share
                 detectable: match id {
+                    OUTLIERS => judged.fewest,
                     MAGNITUDE => Some(SEEN * sigma),
                     RATE if value > 0.0 => Some((2.0 * SEEN * value * sigma).sqrt()),
                     _ => None,

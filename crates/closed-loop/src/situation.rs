@@ -9,6 +9,7 @@ use focal_plane::{AttitudeSeries, Camera, Series};
 use telemetry::{Bundle, Model};
 
 use crate::error::CloseError;
+use crate::hypothesis::Questions;
 use crate::star_data::Star;
 
 /// Focal lengths that differ by more than this share are different trackers;
@@ -16,7 +17,7 @@ use crate::star_data::Star;
 const FOCAL_TOLERANCE: f64 = 2e-3;
 
 /// What the loop works on.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Situation<'a> {
     pub(crate) model: &'a Model,
     pub(crate) bundle: &'a Bundle,
@@ -24,13 +25,19 @@ pub(crate) struct Situation<'a> {
     pub(crate) channels: BTreeMap<String, Series>,
     pub(crate) frames: Option<FrameGeometry>,
     pub(crate) reference: Option<AttitudeSeries>,
+    /// Effects that are to be tested by name.
+    pub(crate) questions: &'a Questions,
     /// Year at which catalogue directions are wanted.
     year: f64,
     span_s: [f64; 2],
 }
 
 impl<'a> Situation<'a> {
-    pub(crate) fn join(model: &'a Model, bundle: &'a Bundle) -> Result<Self, CloseError> {
+    pub(crate) fn join(
+        model: &'a Model,
+        bundle: &'a Bundle,
+        questions: &'a Questions,
+    ) -> Result<Self, CloseError> {
         let t_s = bundle
             .stars
             .as_ref()
@@ -67,12 +74,21 @@ impl<'a> Situation<'a> {
                 quaternion_signs: f.quaternion_signs.known(),
             }),
             reference: reference(bundle),
+            questions,
             year: bundle
                 .meta
                 .julian_year(0.5 * (span_s[0] + span_s[1]))
                 .unwrap_or(2000.0),
             span_s,
         })
+    }
+
+    /// The same under another model of the same tracker.
+    pub(crate) fn believing<'b>(&'b self, model: &'b Model) -> Situation<'b> {
+        Situation {
+            model,
+            ..self.clone()
+        }
     }
 
     /// What effects may look at.

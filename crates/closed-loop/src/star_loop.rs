@@ -11,11 +11,12 @@ use std::collections::BTreeMap;
 
 use effects::{Candidate, Scene, StarFacts, StarRows};
 use focal_plane::{AttitudeSource, Points, rotation_vector};
-use telemetry::report::{Errors, Report, Rows};
-use telemetry::{AttitudeResiduals, DarkMap, StarResiduals};
+use telemetry::report::{Errors, FoundEffect, Report, Rows};
+use telemetry::{AttitudeResiduals, DarkMap, Model, StarResiduals};
 
 use crate::attitude_loop::{channels_of_interest, resolved_motion};
 use crate::close::{Closed, catalogue_candidates};
+use crate::confusion;
 use crate::declared;
 use crate::empirical::{EMPIRICAL, Empirical, Variable};
 use crate::error::CloseError;
@@ -23,9 +24,12 @@ use crate::evidence::{Amplitudes, Evidence, Residuals};
 use crate::figures;
 use crate::folds::Folds;
 use crate::frame_rotation::rotation_of;
+use crate::hypothesis::{self, Grounds};
 use crate::image_level::{self, ImageLevel, Side};
 use crate::images::{self, Formed};
+use crate::instants;
 use crate::leftover;
+use crate::manoeuvre::stars::Sky;
 use crate::motion::{self, Around};
 use crate::noise_effects;
 use crate::nuisance::StarNuisance;
@@ -339,8 +343,10 @@ impl Finish<'_> {
             .sum()
     }
 
+    /// `model` is the declared one, or that with what was added.
     fn errors(
         &self,
+        model: &Model,
         residual: &Residuals,
         loglik: Option<f64>,
         attitude: Option<[f64; 3]>,
@@ -358,8 +364,8 @@ impl Finish<'_> {
             log_psd_cost: None,
             // with free attitudes three of each frame's numbers are spent
             chi2_per_dof: declared.and_then(|_| {
-                let square =
-                    noise_effects::in_declared_sigmas(self.situation, self.data, residual)?;
+                let situation = self.situation.believing(model);
+                let square = noise_effects::in_declared_sigmas(&situation, self.data, residual)?;
                 Some(square / self.found.fitted.scalars)
             }),
             loglik_per_frame: loglik.map(|l| l / self.data.frames.frames() as f64),
@@ -369,7 +375,7 @@ impl Finish<'_> {
 
 fn finish(f: &Finish<'_>) -> Result<Closed, CloseError> {
     let chosen = &f.found.selection.chosen;
-    let after = f.residuals(chosen)?;
+    let plain = f.residuals(chosen)?;
     let whole = f.power(f.before);
     let mut explained = Vec::new();
     let mut last = f.power(&f.residuals(&[])?);
@@ -379,7 +385,28 @@ fn finish(f: &Finish<'_>) -> Result<Closed, CloseError> {
         last = now;
     }
     let surroundings = f.situation.surroundings();
-    let (mut effects, mut entries) = figures::effects_found(f.found, &explained, &surroundings)?;
+    // what is left is judged before a term without a cause is added
+    let mut unattributed = figures::unattributed(f.found, last / whole);
+    let questions = f.situation.questions;
+    let mut added = chosen.clone();
+    if questions.empirical
+        && let Some(g) = figures::best_empirical(f.found, &unattributed, &surroundings)
+    {
+        added.push(g);
+        explained.push((last - f.power(&f.residuals(&added)?)) / whole);
+    }
+    let after = f.residuals(&added)?;
+    let (mut effects, mut entries) =
+        figures::effects_found(f.found, &added, &explained, &surroundings, questions)?;
+    tell_apart(f, &mut effects);
+    instants::complete(
+        f.level,
+        f.folds,
+        f.found,
+        &surroundings,
+        median_step(&f.data.frames.t_s).unwrap_or(1.0),
+        &mut effects,
+    )?;
     if let Some((level, formed)) = f.image {
         for (at, (effect, entry)) in image_level::effects(level, formed).into_iter().enumerate() {
             effects.insert(at, effect);
@@ -397,24 +424,32 @@ fn finish(f: &Finish<'_>) -> Result<Closed, CloseError> {
         entries.push(entry);
     }
     let (noise, leftover) = rayon::join(
-        || noise_effects::claim(f.situation, f.level, f.found, f.folds, &after.axes),
+        || noise_effects::claim(f.situation, f.level, f.found, f.folds, &plain.axes),
         || {
             let inside = noise_effects::in_sample(f.level, f.found);
-            let residual = inside.as_deref().unwrap_or(&after.axes);
+            let residual = inside.as_deref().unwrap_or(&plain.axes);
             leftover::describe(&leftover::star_tracks(f.data, residual))
         },
     );
-    let noise = noise?;
+    let mut noise = noise?;
     effects.extend(noise.effects.iter().cloned());
     entries.extend(noise.entries.iter().cloned());
     model.effects.extend(entries);
 
-    let mut unattributed = figures::unattributed(f.found, last / whole);
     leftover.tell(&mut unattributed);
     let excess = excess(f, last);
     let mut considered = figures::considered(f.found, excess);
     considered.retain(|c| !effects.iter().any(|e| e.id == c.id));
+    let unit = f.level.noise.map_or(1.0, |n| n.centroid);
+    let squares = excess * unit * unit;
+    noise.need(f.situation, f.data, squares)?;
     noise.tell(&mut considered);
+    if let Some(wander) = reference_wander::consider(f.data, &plain.axes, squares) {
+        considered
+            .iter_mut()
+            .filter(|c| c.id == wander.id)
+            .for_each(|c| c.clone_from(&wander));
+    }
     if let Some((level, _)) = f.image {
         for (id, step) in [
             (images::DARK_MAP, &level.dark_map),
@@ -429,13 +464,28 @@ fn finish(f: &Finish<'_>) -> Result<Closed, CloseError> {
         }
     }
 
+    let fits = &f.found.fitted.fits;
+    let hypotheses = hypothesis::answer(
+        f.situation.questions,
+        &Grounds {
+            found: f.found,
+            surroundings,
+            information: &|c| fits.information(c),
+            alone: remarkable(f, whole),
+            left: remarkable(f, last),
+            resolved: f.level.motion.is_some(),
+            effects: &effects,
+            considered: &considered,
+        },
+    );
+
     let attitude = attitude_residuals(f, &after);
     let attitude_rms = |series: &[Vec<f64>; 3], outlier: &[bool]| {
         std::array::from_fn(|a| figures::rms(&series[a], outlier).unwrap_or(f64::NAN))
     };
     let before_fit = fit(f.measured, f.folds, &[])?;
     let before_loglik = before_fit.fits.out_of_fold(&[]).map(|o| o.total_loglik());
-    let set = columns_of(&f.found.fitted.groups, chosen);
+    let set = columns_of(&f.found.fitted.groups, &added);
     let after_loglik = f
         .found
         .fitted
@@ -445,7 +495,7 @@ fn finish(f: &Finish<'_>) -> Result<Closed, CloseError> {
     let outliers = f.data.outlier.iter().filter(|o| **o).count();
     let report = Report {
         format: telemetry::report::REPORT_FORMAT.to_owned(),
-        verdict: figures::verdict(!effects.is_empty(), unattributed.present),
+        verdict: figures::verdict(&effects, unattributed.present),
         folds: f.folds.count,
         rows: Rows {
             used: f.data.t_s.len() - outliers,
@@ -453,6 +503,7 @@ fn finish(f: &Finish<'_>) -> Result<Closed, CloseError> {
             outside_reference: f.data.outside_reference,
         },
         before: f.errors(
+            f.situation.model,
             f.before,
             before_loglik,
             attitude
@@ -460,6 +511,7 @@ fn finish(f: &Finish<'_>) -> Result<Closed, CloseError> {
                 .map(|a| attitude_rms(&a.before_arcsec, &a.outlier)),
         ),
         after: f.errors(
+            &model,
             &after,
             after_loglik,
             attitude
@@ -468,6 +520,7 @@ fn finish(f: &Finish<'_>) -> Result<Closed, CloseError> {
         ),
         effects,
         considered,
+        hypotheses,
         unattributed,
     };
     let [ax, ay]: [Vec<f64>; 2] = after.axes.try_into().unwrap_or_default();
@@ -508,6 +561,23 @@ fn finish(f: &Finish<'_>) -> Result<Closed, CloseError> {
     })
 }
 
+/// What else each effect could have been, and the motion that would tell.
+fn tell_apart(f: &Finish<'_>, effects: &mut [FoundEffect]) {
+    let confusion = confusion::compare(f.found, effects);
+    let set = columns_of(&f.found.fitted.groups, &f.found.selection.chosen);
+    let sky = f.found.fitted.fits.variance(&set).and_then(|variance| {
+        let noise = f.wander.filter(|_| f.level.noise.is_some());
+        Sky::of(f.data, f.situation.model, variance, noise.map(|w| w.noise))
+    });
+    if let (Some(sky), Some(&start)) = (sky, f.data.frames.t_s.first())
+        && !confusion.is_empty()
+    {
+        confusion.tell(effects, start, sky.attitude(), &|flown| {
+            sky.fly(flown, &confusion.candidates)
+        });
+    }
+}
+
 /// Squared residual over what the declared noise accounts for, in the unit of the
 /// fit's scalars (arcsec, or the centroids' noise where they are whitened); 0 where no noise is declared.
 fn excess(f: &Finish<'_>, power: f64) -> f64 {
@@ -516,6 +586,14 @@ fn excess(f: &Finish<'_>, power: f64) -> f64 {
         let unit = f.level.noise.map_or(1.0, |n| n.centroid);
         (rows * power - 0.5 * s * s * f.found.fitted.scalars).max(0.0) / (unit * unit)
     })
+}
+
+/// [`excess`] where it stands out of the noise.
+fn remarkable(f: &Finish<'_>, power: f64) -> Option<f64> {
+    let sigma = f.situation.model.noise.temporal_arcsec?;
+    let unit = f.level.noise.map_or(1.0, |n| n.centroid);
+    let variance = 0.5 * sigma * sigma / (unit * unit);
+    hypothesis::beyond(excess(f, power), variance, f.found.fitted.scalars)
 }
 
 /// The tracker's own attitude beside the stars: its error against the reference,

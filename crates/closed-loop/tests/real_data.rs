@@ -7,9 +7,13 @@
 //! Source: `bundle.toml` of each bundle for where the data come from.
 #![expect(clippy::unwrap_used, reason = "helpers of tests")]
 
+#[path = "../../telemetry/tests/common/flight_data.rs"]
+mod flight_data;
+
 use std::path::{Path, PathBuf};
 
 use closed_loop::{Closed, close};
+use flight_data::flight_data;
 use focal_plane::StarFrames;
 use telemetry::report::{Report, Selector, Verdict};
 use telemetry::{Bundle, Housekeeping, Model, WindowTable};
@@ -21,22 +25,9 @@ fn workspace() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
 }
 
-/// A bundle of flight data, or `None` and a line that says where it was looked for.
-#[expect(clippy::print_stderr, reason = "a test that has not run must say so")]
+/// A bundle of flight data.
 fn flight(name: &str) -> Option<Bundle> {
-    let folder = std::env::var_os("BORESIGHT_DATA")
-        .map_or_else(|| workspace().join("../shared/data"), PathBuf::from)
-        .join(name);
-    if folder.join("bundle.toml").is_file() {
-        return Some(Bundle::read(&folder).unwrap());
-    }
-    let required = std::env::var_os("BORESIGHT_REQUIRE_DATA").is_some_and(|v| v == "1");
-    assert!(!required, "no flight data in {}", folder.display());
-    eprintln!(
-        "SKIPPED: no flight data in {}; set BORESIGHT_DATA",
-        folder.display()
-    );
-    None
+    Some(Bundle::read(&flight_data(name)?).unwrap())
 }
 
 fn model(name: &str) -> Model {

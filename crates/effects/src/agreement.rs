@@ -238,7 +238,7 @@ fn ids_are_those_of_the_documentation() {
     sorted.dedup();
     assert_eq!(sorted.len(), got.len(), "no id twice");
     for kind in catalogue() {
-        assert!(!kind.summary().is_empty());
+        assert!(!kind.summary().is_empty() && !kind.needs().is_empty());
         let on = kind.acts_on();
         assert!(
             on.images || on.stars || on.attitude || on.noise,

@@ -5,7 +5,7 @@
 use crate::parameters::nearest;
 use crate::{
     Effect, EffectError, EffectKind, Parameters, Surroundings, catalogue_position, chromatic_shift,
-    exposure_smear, focal_length_drift, hot_pixel, image_effects, magnitude_noise,
+    empirical, exposure_smear, focal_length_drift, hot_pixel, image_effects, magnitude_noise,
     optical_distortion, outliers, periodic_misalignment, pixel_phase_harmonics, rate_noise,
     reference_error, rolling_shutter, step_misalignment, thermal_misalignment, time_tag_offset,
     velocity_aberration,
@@ -38,7 +38,8 @@ pub fn catalogue() -> &'static [&'static dyn EffectKind] {
     &CATALOGUE
 }
 
-/// The kind of that id.
+/// The kind of that id; beside those of the catalogue there is `empirical`, a term without a cause that
+/// a model may declare.
 ///
 /// # Errors
 /// [`EffectError::UnknownEffect`] with the nearest id.
@@ -46,6 +47,7 @@ pub fn kind(id: &str) -> Result<&'static dyn EffectKind, EffectError> {
     catalogue()
         .iter()
         .copied()
+        .chain([&empirical::Kind as &'static dyn EffectKind])
         .find(|kind| kind.id() == id)
         .ok_or_else(|| EffectError::UnknownEffect {
             id: id.to_owned(),

@@ -41,6 +41,9 @@ impl EffectKind for Kind {
     fn summary(&self) -> &'static str {
         "one star is not where the catalogue says"
     }
+    fn needs(&self) -> &'static str {
+        "stars and a catalogue"
+    }
     fn acts_on(&self) -> ActsOn {
         ActsOn {
             stars: true,

@@ -32,6 +32,9 @@ impl EffectKind for Kind {
     fn summary(&self) -> &'static str {
         "radial shift that follows the star's colour"
     }
+    fn needs(&self) -> &'static str {
+        "stars, and a catalogue with the colours of at least two of them"
+    }
     fn acts_on(&self) -> ActsOn {
         ActsOn {
             stars: true,

@@ -56,6 +56,8 @@ pub trait EffectKind: core::fmt::Debug + Sync {
     fn summary(&self) -> &'static str;
     /// What it moves.
     fn acts_on(&self) -> ActsOn;
+    /// What a bundle has to hold before this effect can be looked for, as words that follow "it needs".
+    fn needs(&self) -> &'static str;
     /// The effect with the given parameters.
     ///
     /// # Errors

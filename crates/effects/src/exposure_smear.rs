@@ -43,6 +43,9 @@ impl EffectKind for Kind {
     fn summary(&self) -> &'static str {
         "the centroid is averaged over an exposure of exposure_s, centred on t"
     }
+    fn needs(&self) -> &'static str {
+        "stars, or an attitude with a reference, and a motion that the samples resolve"
+    }
     fn acts_on(&self) -> ActsOn {
         ActsOn {
             stars: true,

@@ -40,6 +40,9 @@ impl EffectKind for Kind {
     fn summary(&self) -> &'static str {
         "the scale follows a temperature channel or time"
     }
+    fn needs(&self) -> &'static str {
+        "stars, and time or a temperature channel (_c, _k)"
+    }
     fn acts_on(&self) -> ActsOn {
         ActsOn {
             stars: true,

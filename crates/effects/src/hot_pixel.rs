@@ -41,6 +41,9 @@ impl EffectKind for Kind {
     fn summary(&self) -> &'static str {
         "a warm pixel pulls the centroid of a star near it"
     }
+    fn needs(&self) -> &'static str {
+        "stars that dwell on a pixel, and no raw windows (with them it is dark_map)"
+    }
     fn acts_on(&self) -> ActsOn {
         ActsOn {
             stars: true,

@@ -34,6 +34,9 @@ impl EffectKind for Kind {
     fn summary(&self) -> &'static str {
         self.summary
     }
+    fn needs(&self) -> &'static str {
+        "stars and their raw windows (table images)"
+    }
     fn acts_on(&self) -> ActsOn {
         ActsOn {
             images: true,

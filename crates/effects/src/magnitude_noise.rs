@@ -27,6 +27,9 @@ impl EffectKind for Kind {
     fn summary(&self) -> &'static str {
         "noise grows with magnitude as 10^(0.2 slope (m - 5))"
     }
+    fn needs(&self) -> &'static str {
+        "at least four stars of different magnitudes, three or more in a frame"
+    }
     fn acts_on(&self) -> ActsOn {
         ActsOn {
             noise: true,

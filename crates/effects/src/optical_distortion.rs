@@ -43,6 +43,9 @@ impl EffectKind for Kind {
     fn summary(&self) -> &'static str {
         "radial and decentring distortion outside the declared prior"
     }
+    fn needs(&self) -> &'static str {
+        "stars"
+    }
     fn acts_on(&self) -> ActsOn {
         ActsOn {
             stars: true,
@@ -141,8 +144,12 @@ impl Shift for Brown {
             .zip(values)
             .map(|(&k, &v)| Parameter::new(TERMS[k], v, ""))
             .collect();
-        all.push(Parameter::new("cx_px", self.centre.x, "px"));
-        all.push(Parameter::new("cy_px", self.centre.y, "px"));
+        // a centre at the boresight is what is meant without one
+        for (name, at) in [("cx_px", self.centre.x), ("cy_px", self.centre.y)] {
+            if at.abs() > 0.0 {
+                all.push(Parameter::new(name, at, "px"));
+            }
+        }
         all
     }
 }

@@ -30,6 +30,9 @@ impl EffectKind for Kind {
     fn summary(&self) -> &'static str {
         "spikes of single rows: particle hits, star mix-ups"
     }
+    fn needs(&self) -> &'static str {
+        "three or more stars in a frame"
+    }
     fn acts_on(&self) -> ActsOn {
         ActsOn {
             noise: true,

@@ -43,6 +43,9 @@ impl EffectKind for Kind {
     fn summary(&self) -> &'static str {
         "the tracker swings against the reference at frequency_hz"
     }
+    fn needs(&self) -> &'static str {
+        "a reference, and more than one cycle of the line"
+    }
     fn acts_on(&self) -> ActsOn {
         ActsOn {
             attitude: true,

@@ -36,6 +36,9 @@ impl EffectKind for Kind {
     fn summary(&self) -> &'static str {
         "the centroid error has harmonics in the pixel phase beside the declared one"
     }
+    fn needs(&self) -> &'static str {
+        "stars"
+    }
     fn acts_on(&self) -> ActsOn {
         ActsOn {
             stars: true,

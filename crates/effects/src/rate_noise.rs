@@ -26,6 +26,9 @@ impl EffectKind for Kind {
     fn summary(&self) -> &'static str {
         "noise grows with the star's rate across the detector"
     }
+    fn needs(&self) -> &'static str {
+        "three or more stars in a frame, and a rate that changes"
+    }
     fn acts_on(&self) -> ActsOn {
         ActsOn {
             noise: true,

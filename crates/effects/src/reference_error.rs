@@ -36,6 +36,9 @@ impl EffectKind for Kind {
     fn summary(&self) -> &'static str {
         "the reference wanders: coloured noise common to all stars"
     }
+    fn needs(&self) -> &'static str {
+        "stars and a reference (of an attitude alone, its own slow error cannot be told from the reference's)"
+    }
     fn acts_on(&self) -> ActsOn {
         ActsOn {
             attitude: true,

@@ -34,6 +34,9 @@ impl EffectKind for Kind {
     fn summary(&self) -> &'static str {
         "row y is exposed at t + line_time_s y"
     }
+    fn needs(&self) -> &'static str {
+        "stars, and a motion that the samples resolve"
+    }
     fn acts_on(&self) -> ActsOn {
         ActsOn {
             stars: true,

@@ -29,6 +29,9 @@ impl EffectKind for Kind {
     fn summary(&self) -> &'static str {
         "the tracker shifts against the reference at at_s"
     }
+    fn needs(&self) -> &'static str {
+        "a reference"
+    }
     fn acts_on(&self) -> ActsOn {
         ActsOn {
             attitude: true,

@@ -59,6 +59,9 @@ impl EffectKind for Kind {
     fn summary(&self) -> &'static str {
         "the frame to the reference bends with a temperature channel or a heater cycle"
     }
+    fn needs(&self) -> &'static str {
+        "a reference, and a housekeeping channel that varies and whose name ends in _c, _k or _on"
+    }
     fn acts_on(&self) -> ActsOn {
         ActsOn {
             attitude: true,

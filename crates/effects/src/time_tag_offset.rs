@@ -35,6 +35,9 @@ impl EffectKind for Kind {
     fn summary(&self) -> &'static str {
         "a frame stamped t shows the sky of t + offset_s"
     }
+    fn needs(&self) -> &'static str {
+        "stars, or an attitude with a reference, and a motion that the samples resolve"
+    }
     fn acts_on(&self) -> ActsOn {
         ActsOn {
             stars: true,

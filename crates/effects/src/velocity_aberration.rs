@@ -77,6 +77,9 @@ impl EffectKind for Kind {
     fn summary(&self) -> &'static str {
         "the apparent direction is u + v/c, and nobody corrected it"
     }
+    fn needs(&self) -> &'static str {
+        "velocity channels (vx_km_s, vy_km_s, vz_km_s or in m/s), and for an attitude the boresights of [frames]"
+    }
     fn acts_on(&self) -> ActsOn {
         ActsOn {
             stars: true,

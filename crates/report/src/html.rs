@@ -3,6 +3,7 @@
 //! The document is well-formed XML as well. A number out of `report.json` stands in an element
 //! `<data value="..." data-key="...">`: the value as it is there, and the JSON pointer to it.
 
+mod asked;
 mod dark;
 mod data;
 mod field;
@@ -57,6 +58,8 @@ pub fn html(run: &Run<'_>) -> String {
     field::pixel_phase(&mut page, run);
     dark::map(&mut page, run);
     findings::effects(&mut page, &run.closed.report);
+    asked::apart(&mut page, &run.closed.report);
+    asked::hypotheses(&mut page, &run.closed.report);
     findings::rivals(&mut page, run.closed);
     findings::considered(&mut page, &run.closed.report);
     findings::leftover(&mut page, &run.closed.report);

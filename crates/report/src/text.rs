@@ -15,6 +15,7 @@ pub fn summary(closed: &Closed) -> String {
     verdict(&mut out, report);
     figures(&mut out, report);
     effects(&mut out, report);
+    hypotheses(&mut out, report);
     rivals(&mut out, closed);
     considered(&mut out, report);
     leftover(&mut out, report);
@@ -29,7 +30,8 @@ macro_rules! line {
 
 /// The verdict as a sentence.
 pub(crate) fn sentence(report: &Report) -> String {
-    let names: Vec<&str> = report.effects.iter().map(|e| e.id.as_str()).collect();
+    let causes = report.effects.iter().filter(|e| e.id != "empirical");
+    let names: Vec<&str> = causes.map(|e| e.id.as_str()).collect();
     match report.verdict {
         Verdict::Consistent => {
             "the data follows the declared model; nothing is left to explain".to_owned()
@@ -84,6 +86,17 @@ fn figures(out: &mut String, report: &Report) {
             );
         }
     }
+    if let (Some(b), Some(a)) = (before.log_psd_cost, after.log_psd_cost) {
+        for (k, axis) in ["X", "Y", "Z"].into_iter().enumerate() {
+            line!(
+                out,
+                "{:<28}{:>12.3}{:>12.3}",
+                format!("log-PSD cost {axis}"),
+                b[k],
+                a[k]
+            );
+        }
+    }
     for (name, get) in [
         (
             "chi2 per degree of freedom",
@@ -125,7 +138,16 @@ fn effects(out: &mut String, report: &Report) {
                         number(sigma)
                     );
                 }
-                None => line!(out, "            {name} = {}{unit}", number(estimate.value)),
+                None => {
+                    let bounds = estimate.interval.map_or_else(String::new, |[low, high]| {
+                        format!(" (95 %: {} to {})", number(low), number(high))
+                    });
+                    line!(
+                        out,
+                        "            {name} = {}{unit}{bounds}",
+                        number(estimate.value)
+                    );
+                }
             }
         }
         let share = effect.variance_explained.map_or(String::new(), |v| {
@@ -146,10 +168,47 @@ fn effects(out: &mut String, report: &Report) {
         if !alike.is_empty() {
             line!(out, "            looks like {}", alike.join(", "));
         }
+        for c in effect.confusable_with.iter().take(3) {
+            if let Some(here) = c.separation_sigma {
+                let here = format!("this data tells it from {} at {here:.1} sigma", c.id);
+                wrapped(out, "            ", &here);
+            }
+            if let Some(manoeuvre) = &c.manoeuvre {
+                wrapped(out, "            ", &manoeuvre.text);
+            }
+        }
     }
     if !report.effects.is_empty() {
         line!(out);
     }
+}
+
+/// The answers to what was asked by name.
+fn hypotheses(out: &mut String, report: &Report) {
+    for h in &report.hypotheses {
+        line!(out, "Asked     {}", h.id);
+        wrapped(out, "            ", &h.finding);
+    }
+    if !report.hypotheses.is_empty() {
+        line!(out);
+    }
+}
+
+/// Lines of at most 98 columns, each behind `indent`.
+fn wrapped(out: &mut String, indent: &str, text: &str) {
+    let mut row = indent.to_owned();
+    for word in text.split(' ') {
+        if row.len() > indent.len() && row.chars().count() + word.chars().count() + 1 > 98 {
+            line!(out, "{row}");
+            row = format!("{indent}  ");
+        }
+        if row.trim().is_empty() {
+            row.push_str(word);
+        } else {
+            let _ = write!(row, " {word}");
+        }
+    }
+    line!(out, "{row}");
 }
 
 pub(crate) fn selectors(effect: &FoundEffect) -> String {

@@ -7,8 +7,8 @@ use focal_plane::Camera;
 use report::{Run, html};
 use serde_json::Value;
 use telemetry::report::{
-    Confusable, ConsideredEffect, Dependence, Errors, Estimate, FoundEffect, REPORT_FORMAT, Report,
-    Rows, Selector, Unattributed, Verdict,
+    Confusable, ConsideredEffect, Dependence, Errors, Estimate, FoundEffect, Hypothesis,
+    HypothesisSize, Manoeuvre, REPORT_FORMAT, Report, Rows, Selector, Unattributed, Verdict,
 };
 use telemetry::{AttitudeResiduals, Bundle, DarkMap, Model, StarResiduals};
 
@@ -108,6 +108,17 @@ fn findings(stars: bool, attitude: bool) -> Report {
         confusable_with: vec![Confusable {
             id: HOSTILE.to_owned(),
             correlation: -0.31,
+            delta_loglik: Some(12.5),
+            separation_sigma: Some(4.25),
+            manoeuvre: Some(Manoeuvre {
+                kind: "slew".to_owned(),
+                axis: [0.0, 0.0, 1.0],
+                rate_deg_s: 0.2,
+                duration_s: 60.0,
+                ramp_s: 12.0,
+                sigma: 5.625,
+                text: HOSTILE.to_owned(),
+            }),
         }],
     };
     let tried = |id: &str, observable: bool| ConsideredEffect {
@@ -137,6 +148,20 @@ fn findings(stars: bool, attitude: bool) -> Report {
             tried(HOSTILE, true),
             tried("hot_pixel", false),
         ],
+        hypotheses: vec![Hypothesis {
+            id: "exposure_smear".to_owned(),
+            observable: true,
+            sizes: vec![HypothesisSize {
+                parameter: HOSTILE.to_owned(),
+                unit: HOSTILE.to_owned(),
+                value: Some(0.0625),
+                detectable: Some(0.53),
+                ..HypothesisSize::default()
+            }],
+            variance_share_at_most: Some(0.0123),
+            finding: HOSTILE.to_owned(),
+            ..Hypothesis::default()
+        }],
         unattributed: Unattributed {
             present: true,
             variance_fraction: Some(0.017),
@@ -308,6 +333,8 @@ fn every_kind_has_its_sections_and_is_well_formed() {
         "models",
         "time",
         "effects",
+        "apart",
+        "hypotheses",
         "rivals",
         "considered",
         "leftover",

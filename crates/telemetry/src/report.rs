@@ -46,6 +46,9 @@ pub struct Report {
     pub effects: Vec<FoundEffect>,
     /// What was not added.
     pub considered: Vec<ConsideredEffect>,
+    /// What was asked about by name, in the order asked.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub hypotheses: Vec<Hypothesis>,
     /// What is left.
     pub unattributed: Unattributed,
 }
@@ -155,6 +158,87 @@ pub struct Confusable {
     /// Largest correlation of the two estimates.
     #[serde(deserialize_with = "nan")]
     pub correlation: f64,
+    /// What it gains in place of the effect, nats, out of fold.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub delta_loglik: Option<f64>,
+    /// Sigmas by which this data tells the two apart.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub separation_sigma: Option<f64>,
+    /// A motion that would tell them apart.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub manoeuvre: Option<Manoeuvre>,
+}
+
+/// A motion, and how far it tells two effects apart.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Manoeuvre {
+    /// `slew`, `to_and_fro` or `drift`.
+    pub kind: String,
+    /// Axis in the tracker, unit.
+    pub axis: [f64; 3],
+    /// Greatest rate, deg/s.
+    pub rate_deg_s: f64,
+    /// From rest to rest, s.
+    pub duration_s: f64,
+    /// Of each rise and fall of the rate, s; 0: the rate is constant.
+    pub ramp_s: f64,
+    /// Sigmas by which it tells the two apart; below 5 it is the best of those tried.
+    #[serde(deserialize_with = "nan")]
+    pub sigma: f64,
+    /// The same as a sentence.
+    pub text: String,
+}
+
+/// One effect that was asked about.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Hypothesis {
+    /// Name in the catalogue.
+    pub id: String,
+    /// Of its forms the one that fits best.
+    pub selectors: BTreeMap<String, Selector>,
+    /// Whether it was added.
+    pub added: bool,
+    /// Whether it stands beside what was added.
+    pub significant: bool,
+    /// Whether this data can show it at all.
+    pub observable: bool,
+    /// Why not.
+    pub reason: Option<String>,
+    /// Gain in out-of-fold log-likelihood beside the other effects added, nats.
+    pub delta_loglik: Option<f64>,
+    /// Chance of such a gain without the effect, the whole search paid for.
+    pub p_value: Option<f64>,
+    /// Its sizes, one a coefficient.
+    pub sizes: Vec<HypothesisSize>,
+    /// Share of the squared residual beside the other effects added that its best fit takes away, in sample.
+    pub variance_share: Option<f64>,
+    /// The most that it could take away, with 95 %.
+    pub variance_share_at_most: Option<f64>,
+    /// The answer as a sentence.
+    pub finding: String,
+}
+
+/// One size of an effect that was asked about, in `unit`.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct HypothesisSize {
+    /// The parameter whose size is meant.
+    pub parameter: String,
+    /// Its unit.
+    pub unit: String,
+    /// Best fit.
+    pub value: Option<f64>,
+    /// 1 sigma of it; where the size enters in square, half the interval of 1 sigma.
+    pub sigma: Option<f64>,
+    /// What this data would have shown at 5 sigma.
+    pub detectable: Option<f64>,
+    /// At which it would explain by itself what is left beyond the noise beside the other effects added.
+    pub needed: Option<f64>,
+    /// At which it would explain by itself all that the declared model leaves beyond the noise.
+    pub needed_alone: Option<f64>,
+    /// 1 sigma of the sizes that nature makes.
+    pub plausible: Option<f64>,
+    /// Whether `needed` (or `needed_alone`) is within three of those.
+    pub needed_is_plausible: Option<bool>,
 }
 
 /// An effect that was not added.

@@ -2,40 +2,15 @@
 //! folder (default: `../shared/data` beside the workspace). Without it these tests pass with a
 //! word on stderr, or fail if `BORESIGHT_REQUIRE_DATA=1`.
 
-use std::path::PathBuf;
+#[path = "common/flight_data.rs"]
+mod flight_data;
 
+use flight_data::flight_data;
 use telemetry::{Bundle, MemoryFiles, TableFormat};
-
-#[expect(
-    clippy::print_stderr,
-    reason = "a test that checks nothing must say so"
-)]
-/// A folder of the real data, or `None` with a warning.
-fn data(name: &str) -> Option<PathBuf> {
-    let root = std::env::var_os("BORESIGHT_DATA").map_or_else(
-        || PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data")),
-        PathBuf::from,
-    );
-    let path = root.join(name);
-    if path.is_dir() {
-        return Some(path);
-    }
-    let required = std::env::var_os("BORESIGHT_REQUIRE_DATA").is_some_and(|value| value == "1");
-    assert!(
-        !required,
-        "BORESIGHT_REQUIRE_DATA=1, but there is no {}",
-        path.display()
-    );
-    eprintln!(
-        "SKIPPED: no real data at {} (BORESIGHT_DATA)",
-        path.display()
-    );
-    None
-}
 
 #[test]
 fn chandra_windows_and_stars() {
-    let Some(path) = data("chandra-aca-2019-272") else {
+    let Some(path) = flight_data("chandra-aca-2019-272") else {
         return;
     };
     let bundle = Bundle::read(&path).unwrap();
@@ -68,7 +43,7 @@ fn chandra_windows_and_stars() {
 
 #[test]
 fn tess_attitudes_and_velocity() {
-    let Some(path) = data("tess-s1-cam1-vs-cam4") else {
+    let Some(path) = flight_data("tess-s1-cam1-vs-cam4") else {
         return;
     };
     let bundle = Bundle::read(&path).unwrap();
@@ -86,7 +61,9 @@ fn tess_attitudes_and_velocity() {
 #[test]
 fn real_bundles_go_round() {
     for name in ["chandra-aca-2019-272", "tess-s1-cam1-vs-cam4"] {
-        let Some(path) = data(name) else { return };
+        let Some(path) = flight_data(name) else {
+            return;
+        };
         let bundle = Bundle::read(&path).unwrap();
         for format in TableFormat::ALL {
             let dir = tempfile::tempdir().unwrap();
@@ -100,7 +77,7 @@ fn real_bundles_go_round() {
 /// Every cut through a compressed table is noticed: no shorter table passes for the whole one.
 #[test]
 fn cut_gzip_is_never_a_shorter_table() {
-    let Some(path) = data("chandra-aca-2019-272") else {
+    let Some(path) = flight_data("chandra-aca-2019-272") else {
         return;
     };
     let whole = std::fs::read(path.join("stars.csv.gz")).unwrap();

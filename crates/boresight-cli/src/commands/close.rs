@@ -3,9 +3,10 @@
 use std::io::Write as _;
 
 use anyhow::Context as _;
-use boresight::closed_loop::{Closed, close};
-use boresight::comparison::{CompareSettings, compare};
+use boresight::closed_loop::{Closed, Questions, close_asking};
+use boresight::comparison::{CompareSettings, Compared, compare};
 use boresight::report::{Run, html, summary};
+use boresight::telemetry::report::ComparedModel;
 use boresight::telemetry::{Bundle, Model, Output};
 
 use crate::arguments::Close;
@@ -13,6 +14,7 @@ use crate::console::Console;
 use crate::example;
 
 pub(crate) fn run(options: &Close, console: &Console) -> anyhow::Result<()> {
+    let questions = Questions::about(&options.tests)?.adding_empirical(options.add_empirical);
     console.progress("reading");
     let (model, bundle, title) = match (&options.model, &options.bundle) {
         (Some(model), Some(bundle)) => {
@@ -25,7 +27,9 @@ pub(crate) fn run(options: &Close, console: &Console) -> anyhow::Result<()> {
             (example::model()?, example::bundle()?, title.to_owned())
         }
     };
-    let closed = close(&model, &bundle, &|what| console.progress(what))?;
+    let mut closed = close_asking(&model, &bundle, &questions, &|what| console.progress(what))?;
+    let compared = (options.out.is_some() || console.json())
+        .then(|| flown(&model, &bundle, &mut closed, console));
     let text = summary(&closed);
     if let Some(dir) = &options.out {
         console.progress("writing results");
@@ -37,7 +41,16 @@ pub(crate) fn run(options: &Close, console: &Console) -> anyhow::Result<()> {
             interrupted();
         });
         write(&closed, &text, &output)?;
-        let page = page(&model, &bundle, &closed, &title, console);
+        let page = html(&Run {
+            closed: &closed,
+            bundle: &bundle,
+            input: &title,
+            compared: match &compared {
+                Some(Ok(compared)) => Ok(compared),
+                Some(Err(reason)) => Err(reason),
+                None => Err("it was not asked for"),
+            },
+        });
         output.write("report.html", |to| to.write_all(page.as_bytes()))?;
         output.commit()?;
     }
@@ -60,8 +73,14 @@ pub(crate) fn interrupted() {
 /// Draws of each model behind its spectrum: enough for a mean and its 3 sigma.
 const DRAWS: u64 = 40;
 
-/// `report.html`; where no ensemble can be had, it says why.
-fn page(model: &Model, bundle: &Bundle, closed: &Closed, title: &str, console: &Console) -> String {
+/// Ensembles of the declared model and of the better one beside the measured attitude error, and
+/// their `log_psd_cost` in the report; or why they cannot be had.
+fn flown(
+    model: &Model,
+    bundle: &Bundle,
+    closed: &mut Closed,
+    console: &Console,
+) -> Result<Compared, String> {
     let settings = CompareSettings {
         draws: DRAWS,
         ..CompareSettings::default()
@@ -71,13 +90,15 @@ fn page(model: &Model, bundle: &Bundle, closed: &Closed, title: &str, console: &
     let compared = compare(model, &others, bundle, &settings, &|what| {
         console.progress(what);
     })
-    .map_err(|error| error.to_string());
-    html(&Run {
-        closed,
-        bundle,
-        input: title,
-        compared: compared.as_ref().map_err(String::as_str),
-    })
+    .map_err(|error| error.to_string())?;
+    let cost = |model: &ComparedModel| {
+        let axes = &model.axes;
+        Some([&axes.x, &axes.y, &axes.z].map(|axis| axis.log_psd_cost))
+    };
+    let told = &compared.report;
+    closed.report.before.log_psd_cost = cost(&told.model);
+    closed.report.after.log_psd_cost = cost(told.others.first().unwrap_or(&told.model));
+    Ok(compared)
 }
 
 fn write(closed: &Closed, text: &str, output: &Output) -> anyhow::Result<()> {

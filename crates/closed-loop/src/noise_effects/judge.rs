@@ -60,6 +60,8 @@ pub(super) struct Judged {
     pub(super) p_value: f64,
     pub(super) observable: bool,
     pub(super) stands: bool,
+    /// The share of rows that the fewest spikes are which make one.
+    pub(super) fewest: Option<f64>,
     /// Values with sigmas: slope; rate; share and size.
     pub(super) values: [[f64; 2]; 2],
 }
@@ -69,6 +71,7 @@ const UNSEEN: Judged = Judged {
     p_value: 1.0,
     observable: false,
     stands: false,
+    fewest: None,
     values: [[0.0; 2]; 2],
 };
 
@@ -274,6 +277,7 @@ impl Bench<'_> {
             p_value,
             observable: true,
             stands: credible && gain > 0.0 && p_value < FAMILY_ALPHA,
+            fewest: None,
             values: [values, [0.0; 2]],
         }
     }
@@ -336,6 +340,7 @@ impl Bench<'_> {
             p_value,
             observable: true,
             stands: enough && gain > 0.0 && p_value < FAMILY_ALPHA,
+            fewest: Some(MIN_SPIKES / rows.len().max(1) as f64),
             values: [
                 [share, sigma(SHARE) * share * (1.0 - share)],
                 [size, 0.5 * sigma(SIZE) * size],

@@ -1,0 +1,265 @@
+//! How sure the parameters are that columns follow non-linearly: a frequency, a lag, an instant.
+//!
+//! Where the columns change smoothly with the parameter p, its error is that of one more linear
+//! coefficient beside all others,
+//!
+//! ```text
+//! column_p = sum_j c_j (column_j(p + h) - column_j(p - h)) / 2h
+//! ```
+//!
+//! An instant has no slope and no Gaussian error. Its interval holds every instant at which the data
+//! is not less likely than at the best by the 95 % point of chi-squared, amplitudes fitted anew:
+//!
+//! ```text
+//! n ln (E(t) / E(best)) < 1.3 * 3.84
+//! ```
+//!
+//! tried at distances that grow from one step to the span, 1.3 being what the ratio of noise that is
+//! only nearly right runs wider than chi-squared.
+//!
+//! Source: Gauss-Newton linearisation; Venzon & Moolgavkar 1988 (profile likelihood).
+
+use effects::{AttitudeRows, Candidate, Coefficient, Effect, EffectError, StarRows, Surroundings};
+use focal_plane::{Camera, PointsMut, VectorsMut};
+use telemetry::report::FoundEffect;
+
+use crate::error::CloseError;
+use crate::evidence::Evidence;
+use crate::folds::Folds;
+use crate::search::{Found, fit};
+use crate::selection::columns_of;
+
+/// Parameters that are instants.
+const INSTANT: &str = "at_s";
+/// Difference for a slope, in the step within which columns hardly change.
+const SHARE: f64 = 0.02;
+/// 95 % of chi-squared with one degree of freedom, as wide as ratios really run.
+const DROP: f64 = 1.3 * 3.841;
+/// Each distance tried is about this many times the last.
+const GROWTH: f64 = 1.5;
+
+/// Completes sigmas and intervals of the effects of the selection, in its order. `step_s` is the step
+/// between rows.
+pub(crate) fn complete(
+    evidence: &dyn Evidence,
+    folds: &Folds,
+    found: &Found,
+    surroundings: &Surroundings<'_>,
+    step_s: f64,
+    effects: &mut [FoundEffect],
+) -> Result<(), CloseError> {
+    let chosen = &found.selection.chosen;
+    let mut slopes: Vec<(usize, &'static str, Slope)> = Vec::new();
+    let set = columns_of(&found.fitted.groups, chosen);
+    let Some(estimate) = found.fitted.fits.estimate(&set) else {
+        return Ok(());
+    };
+    for (k, &g) in chosen.iter().enumerate() {
+        let candidate = found.candidates[g].as_ref();
+        for (j, parameter) in candidate.nonlinear().into_iter().enumerate() {
+            if parameter.name == INSTANT {
+                let interval = instant(evidence, folds, found, g, surroundings, step_s)?;
+                if let Some(told) = effects[k].parameters.get_mut(INSTANT) {
+                    told.interval = interval;
+                }
+                continue;
+            }
+            let (values, _) = crate::figures::amplitudes_of(found, g, &set, &estimate);
+            let slope = Slope::of(candidate, j, SHARE * parameter.step, values);
+            slopes.extend(slope.map(|s| (k, parameter.name, s)));
+        }
+    }
+    if slopes.is_empty() {
+        return Ok(());
+    }
+    let mut list: Vec<&dyn Candidate> = chosen
+        .iter()
+        .map(|&g| found.candidates[g].as_ref())
+        .collect();
+    list.extend(slopes.iter().map(|s| &s.2 as &dyn Candidate));
+    let fitted = fit(evidence, folds, &list)?;
+    let all: Vec<usize> = (0..list.len()).collect();
+    let Some(estimate) = fitted.fits.estimate(&columns_of(&fitted.groups, &all)) else {
+        return Ok(());
+    };
+    let mut at: usize = fitted.groups[..chosen.len()]
+        .iter()
+        .map(|group| group.columns.len())
+        .sum();
+    for (group, (k, name, _)) in fitted.groups[chosen.len()..].iter().zip(&slopes) {
+        if group.columns.is_empty() {
+            continue;
+        }
+        if let Some(told) = effects[*k].parameters.get_mut(*name) {
+            told.sigma = Some(estimate.sigma(at));
+        }
+        at += 1;
+    }
+    Ok(())
+}
+
+/// Bounds of the instant of candidate `g`, beside the others that were chosen.
+fn instant(
+    evidence: &dyn Evidence,
+    folds: &Folds,
+    found: &Found,
+    g: usize,
+    surroundings: &Surroundings<'_>,
+    step_s: f64,
+) -> Result<Option<[f64; 2]>, CloseError> {
+    let candidate = found.candidates[g].as_ref();
+    let now: Vec<f64> = candidate.nonlinear().iter().map(|n| n.value).collect();
+    let Some(j) = candidate.nonlinear().iter().position(|n| n.name == INSTANT) else {
+        return Ok(None);
+    };
+    let span = surroundings.span_s;
+    let mut times = vec![now[j]];
+    for sign in [-1.0, 1.0] {
+        let mut distance = step_s;
+        while (span[0]..=span[1]).contains(&(now[j] + sign * distance)) {
+            times.push(now[j] + sign * distance);
+            distance = (distance + step_s).max(GROWTH * distance);
+        }
+    }
+    times.sort_by(f64::total_cmp);
+    let variants: Vec<(f64, Box<dyn Candidate>)> = times
+        .into_iter()
+        .filter_map(|t| {
+            let mut values = now.clone();
+            values[j] = t;
+            Some((t, candidate.with_nonlinear(&values)?))
+        })
+        .collect();
+    let count = variants.len();
+    let mut list: Vec<&dyn Candidate> = variants.iter().map(|v| v.1.as_ref()).collect();
+    let others = found.selection.chosen.iter().filter(|&&c| c != g);
+    list.extend(others.map(|&c| found.candidates[c].as_ref()));
+    let fitted = fit(evidence, folds, &list)?;
+    let errors: Vec<(f64, f64)> = (0..count)
+        .filter_map(|v| {
+            let set: Vec<usize> = std::iter::once(v).chain(count..list.len()).collect();
+            let error = fitted.fits.error(&columns_of(&fitted.groups, &set))?;
+            Some((variants[v].0, error))
+        })
+        .collect();
+    let Some(best) = errors
+        .iter()
+        .map(|e| e.1)
+        .min_by(f64::total_cmp)
+        .filter(|e| *e > 0.0)
+    else {
+        return Ok(None);
+    };
+    let possible = |e: &(f64, f64)| fitted.scalars * (e.1 / best).ln() < DROP;
+    let (Some(first), Some(last)) = (
+        errors.iter().position(possible),
+        errors.iter().rposition(possible),
+    ) else {
+        return Ok(None);
+    };
+    // the drop lies somewhere between the last that is possible and the next
+    let low = errors[first.saturating_sub(1)].0;
+    let high = errors[(last + 1).min(errors.len() - 1)].0;
+    Ok(Some([low, high]))
+}
+
+/// The slope of a candidate's shift along one non-linear parameter, as a candidate of its own.
+#[derive(Debug)]
+struct Slope {
+    /// The candidate on both sides, and how far apart they are.
+    sides: [Box<dyn Candidate>; 2],
+    width: f64,
+    values: Vec<f64>,
+    coefficient: [Coefficient; 1],
+}
+
+impl Slope {
+    fn of(candidate: &dyn Candidate, j: usize, h: f64, values: Vec<f64>) -> Option<Self> {
+        let now: Vec<f64> = candidate.nonlinear().iter().map(|n| n.value).collect();
+        let side = |shift: f64| {
+            let mut moved = now.clone();
+            moved[j] += shift;
+            candidate.with_nonlinear(&moved)
+        };
+        // at the edge of its range a parameter has one side
+        let (low, below) = side(-h).map_or((0.0, side(0.0)?), |c| (-h, c));
+        let (high, above) = side(h).map_or((0.0, side(0.0)?), |c| (h, c));
+        (high > low).then(|| Self {
+            sides: [below, above],
+            width: high - low,
+            values,
+            coefficient: [Coefficient::new("slope", "", f64::INFINITY)],
+        })
+    }
+
+    /// Combines the columns of both sides: `columns[side][axis]` into `out[axis]`.
+    fn combine(&self, n: usize, columns: &[Vec<Vec<f64>>; 2], out: &mut [&mut [f64]]) {
+        for (axis, out) in out.iter_mut().enumerate() {
+            out.fill(0.0);
+            for (sign, side) in [-1.0, 1.0].into_iter().zip(columns) {
+                for (j, value) in self.values.iter().enumerate() {
+                    let factor = sign * value / self.width;
+                    for (o, c) in out.iter_mut().zip(&side[axis][j * n..(j + 1) * n]) {
+                        *o += factor * c;
+                    }
+                }
+            }
+        }
+    }
+}
+
+impl Candidate for Slope {
+    fn id(&self) -> &'static str {
+        self.sides[0].id()
+    }
+
+    fn coefficients(&self) -> &[Coefficient] {
+        &self.coefficient
+    }
+
+    fn acts_on_stars(&self) -> bool {
+        self.sides[0].acts_on_stars()
+    }
+
+    fn acts_on_attitude(&self) -> bool {
+        self.sides[0].acts_on_attitude()
+    }
+
+    fn star_columns(&self, camera: &Camera, rows: &StarRows<'_>, out: PointsMut<'_>) -> bool {
+        let n = rows.len();
+        let mut columns = [(); 2].map(|()| vec![vec![0.0; self.values.len() * n]; 2]);
+        for (side, columns) in self.sides.iter().zip(&mut columns) {
+            let [x, y] = columns.as_mut_slice() else {
+                return false;
+            };
+            if !side.star_columns(camera, rows, PointsMut { x, y }) {
+                return false;
+            }
+        }
+        self.combine(n, &columns, &mut [out.x, out.y]);
+        true
+    }
+
+    fn attitude_columns(&self, rows: &AttitudeRows<'_>, out: VectorsMut<'_>) -> bool {
+        let n = rows.len();
+        let mut columns = [(); 2].map(|()| vec![vec![0.0; self.values.len() * n]; 3]);
+        for (side, columns) in self.sides.iter().zip(&mut columns) {
+            let [x, y, z] = columns.as_mut_slice() else {
+                return false;
+            };
+            if !side.attitude_columns(rows, VectorsMut { x, y, z }) {
+                return false;
+            }
+        }
+        self.combine(n, &columns, &mut [out.x, out.y, out.z]);
+        true
+    }
+
+    fn realise(
+        &self,
+        _: &[f64],
+        surroundings: &Surroundings<'_>,
+    ) -> Result<Box<dyn Effect>, EffectError> {
+        self.sides[0].realise(&self.values, surroundings)
+    }
+}

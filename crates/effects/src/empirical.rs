@@ -1,0 +1,344 @@
+//! Empirical terms: a smooth function of one variable in place of a cause that nobody knows.
+//!
+//! ```text
+//! stars     dP = sum_k c_k field_k(v)   arcsec over arcsec per pixel,   z = (v - middle) / half
+//!   smooth  (g, 0)  (0, g)  (-y g, x g)  (x g, y g)        g = P_1(z), P_2(z), P_3(z), x and y over half the detector
+//!   x_px    (g, 0)  (0, g)                                 v the position
+//!   phase   sin, cos of the pixel phase and of twice it, along its axis
+//! attitude  theta = sum_k c_k g_k(z) about x, then y, then z    arcsec, tracker axes
+//! ```
+//!
+//! It predicts and never explains, so that the catalogue does not list it; a model may declare it.
+//! How many coefficients there are is how many are given, as a list or as c0, c1, ...
+//!
+//! Source: Legendre polynomials; the fields are the first-order terms of a similarity of the image.
+
+use std::collections::BTreeMap;
+
+use focal_plane::{ARCSEC_PER_RAD, Camera, Series};
+use nalgebra::Vector3;
+use star_tracker::{Disturbance, Stages, StarView};
+
+use crate::parameters::Reader;
+use crate::{
+    ActsOn, Effect, EffectError, EffectKind, Parameter, ParameterValue, Parameters, Surroundings,
+};
+
+const ID: &str = "empirical";
+/// Orders of the polynomials.
+const ORDERS: usize = 3;
+/// Most coefficients: four fields of each order.
+const MOST: usize = 4 * ORDERS;
+const NAMES: [&str; MOST] = [
+    "c0", "c1", "c2", "c3", "c4", "c5", "c6", "c7", "c8", "c9", "c10", "c11",
+];
+const CHANNEL: &str = "housekeeping:";
+
+/// The kind; it has no candidates of its own.
+#[derive(Debug)]
+pub(crate) struct Kind;
+
+#[derive(Clone, Debug)]
+enum Variable {
+    Position(usize),
+    Phase(usize),
+    Time,
+    Magnitude,
+    Colour,
+    Channel(String, Series),
+}
+
+impl Variable {
+    fn read(name: &str, surroundings: &Surroundings<'_>) -> Result<Self, EffectError> {
+        Ok(match name {
+            "x_px" => Self::Position(0),
+            "y_px" => Self::Position(1),
+            "pixel_phase_x" => Self::Phase(0),
+            "pixel_phase_y" => Self::Phase(1),
+            "time" => Self::Time,
+            "mag" => Self::Magnitude,
+            "colour" => Self::Colour,
+            _ => {
+                let Some(channel) = name.strip_prefix(CHANNEL) else {
+                    return Err(EffectError::WrongType {
+                        effect: ID,
+                        name: "variable".to_owned(),
+                        expected: "x_px, y_px, pixel_phase_x, pixel_phase_y, time, mag, colour or housekeeping:<channel>",
+                    });
+                };
+                let series = surroundings.channels.get(channel);
+                let series = series.ok_or_else(|| EffectError::NoChannel {
+                    effect: ID,
+                    channel: channel.to_owned(),
+                })?;
+                Self::Channel(channel.to_owned(), series.clone())
+            }
+        })
+    }
+
+    fn name(&self) -> String {
+        match self {
+            Self::Position(0) => "x_px".to_owned(),
+            Self::Position(_) => "y_px".to_owned(),
+            Self::Phase(0) => "pixel_phase_x".to_owned(),
+            Self::Phase(_) => "pixel_phase_y".to_owned(),
+            Self::Time => "time".to_owned(),
+            Self::Magnitude => "mag".to_owned(),
+            Self::Colour => "colour".to_owned(),
+            Self::Channel(channel, _) => format!("{CHANNEL}{channel}"),
+        }
+    }
+}
+
+#[derive(Clone, Debug)]
+struct Empirical {
+    variable: Variable,
+    camera: Camera,
+    on_attitude: bool,
+    middle: f64,
+    half: f64,
+    values: Vec<f64>,
+}
+
+impl EffectKind for Kind {
+    fn id(&self) -> &'static str {
+        ID
+    }
+    fn summary(&self) -> &'static str {
+        "a smooth function of one variable, without a cause"
+    }
+    fn needs(&self) -> &'static str {
+        "the variable that it follows"
+    }
+    fn acts_on(&self) -> ActsOn {
+        ActsOn {
+            stars: true,
+            attitude: true,
+            ..ActsOn::default()
+        }
+    }
+    fn build(
+        &self,
+        parameters: &Parameters,
+        surroundings: &Surroundings<'_>,
+    ) -> Result<Box<dyn Effect>, EffectError> {
+        let mut known = vec!["variable", "acts_on", "middle", "half", "coefficients"];
+        known.extend(NAMES);
+        let reader = Reader::new(ID, parameters, &known)?;
+        let name = reader.text("variable")?;
+        let name = name.ok_or(EffectError::MissingParameter {
+            effect: ID,
+            name: "variable",
+        })?;
+        let variable = Variable::read(name, surroundings)?;
+        let on_attitude = match reader.text("acts_on")? {
+            None | Some("stars") => false,
+            Some("attitude") if matches!(variable, Variable::Time | Variable::Channel(..)) => true,
+            Some(_) => {
+                return Err(EffectError::WrongType {
+                    effect: ID,
+                    name: "acts_on".to_owned(),
+                    expected: "\"stars\", or of time and channels \"attitude\"",
+                });
+            }
+        };
+        let half = reader.number("half")?.unwrap_or(1.0);
+        if half <= 0.0 {
+            return Err(EffectError::OutOfRange {
+                effect: ID,
+                name: "half".to_owned(),
+                value: half,
+                expected: "positive",
+            });
+        }
+        let mut values = Vec::new();
+        if let Some(list) = reader.text("coefficients")? {
+            reader.exclude("coefficients", NAMES)?;
+            for number in list.split(',') {
+                let value = number.trim().parse::<f64>().ok().filter(|v| v.is_finite());
+                let value = value.ok_or_else(|| EffectError::WrongType {
+                    effect: ID,
+                    name: "coefficients".to_owned(),
+                    expected: "an array of numbers",
+                })?;
+                values.push(Some(value));
+            }
+        } else {
+            for name in NAMES {
+                values.push(reader.number(name)?);
+            }
+        }
+        let count = values
+            .iter()
+            .rposition(Option::is_some)
+            .map_or(0, |k| k + 1);
+        let most = match (&variable, on_attitude) {
+            (Variable::Phase(_), _) => 4,
+            (Variable::Position(_), _) => 2 * ORDERS,
+            (_, true) => 3 * ORDERS,
+            (_, false) => 4 * ORDERS,
+        };
+        if count == 0 {
+            return Err(EffectError::MissingParameter {
+                effect: ID,
+                name: "c0",
+            });
+        }
+        // of an attitude the coefficients are axis by axis: as many orders each
+        if count > most || on_attitude && count % 3 != 0 {
+            return Err(EffectError::OutOfRange {
+                effect: ID,
+                name: "coefficients".to_owned(),
+                value: count as f64,
+                expected: "a number of coefficients that this variable has",
+            });
+        }
+        Ok(Box::new(Empirical {
+            variable,
+            camera: surroundings.camera.clone(),
+            on_attitude,
+            middle: reader.number("middle")?.unwrap_or(0.0),
+            half,
+            values: values[..count].iter().map(|v| v.unwrap_or(0.0)).collect(),
+        }))
+    }
+}
+
+impl Empirical {
+    /// `P_1`..`P_3` of a value; zero where it is unknown.
+    fn orders(&self, value: f64) -> [f64; ORDERS] {
+        let z = (value - self.middle) / self.half;
+        let z = if z.is_finite() { z } else { 0.0 };
+        [z, 1.5 * z * z - 0.5, z * (2.5 * z * z - 1.5)]
+    }
+
+    fn at_time(&self, t_s: f64) -> [f64; ORDERS] {
+        match &self.variable {
+            Variable::Channel(_, series) => series
+                .at(t_s)
+                .map_or_else(|| self.orders(self.middle), |v| self.orders(v)),
+            _ => self.orders(t_s),
+        }
+    }
+
+    fn shift_px(&self, star: &StarView) -> [f64; 2] {
+        let half = self.camera.half_size_px();
+        let (x, y) = (star.at.x / half[0], star.at.y / half[1]);
+        let mut sum = [0.0; 2];
+        let mut put = |k: usize, dx: f64, dy: f64| {
+            if let Some(c) = self.values.get(k) {
+                sum[0] += c * dx;
+                sum[1] += c * dy;
+            }
+        };
+        match &self.variable {
+            Variable::Position(axis) => {
+                let p = [star.at.x, star.at.y][*axis];
+                for (k, g) in self.orders(p).into_iter().enumerate() {
+                    put(2 * k, g, 0.0);
+                    put(2 * k + 1, 0.0, g);
+                }
+            }
+            Variable::Phase(axis) => {
+                let phase = self.camera.phase_rad([star.at.x, star.at.y][*axis]);
+                let along = [1.0 - *axis as f64, *axis as f64];
+                let waves = [
+                    phase.sin(),
+                    phase.cos(),
+                    (2.0 * phase).sin(),
+                    (2.0 * phase).cos(),
+                ];
+                for (k, g) in waves.into_iter().enumerate() {
+                    put(k, g * along[0], g * along[1]);
+                }
+            }
+            smooth => {
+                let orders = match smooth {
+                    Variable::Magnitude => self.orders(star.mag),
+                    Variable::Colour => self.orders(star.bv),
+                    _ => self.at_time(star.t_s),
+                };
+                for (k, g) in orders.into_iter().enumerate() {
+                    put(4 * k, g, 0.0);
+                    put(4 * k + 1, 0.0, g);
+                    put(4 * k + 2, -y * g, x * g);
+                    put(4 * k + 3, x * g, y * g);
+                }
+            }
+        }
+        let scale = self.camera.arcsec_per_px();
+        [sum[0] / scale[0], sum[1] / scale[1]]
+    }
+}
+
+impl Disturbance for Empirical {
+    fn stages(&self) -> Stages {
+        Stages {
+            attitude: self.on_attitude,
+            centroid: !self.on_attitude,
+            ..Stages::NONE
+        }
+    }
+    fn misalignment_rad(&self, t_s: f64) -> Vector3<f64> {
+        if !self.on_attitude {
+            return Vector3::zeros();
+        }
+        let orders = self.at_time(t_s);
+        let each = self.values.len() / 3;
+        let axis = |a: usize| -> f64 {
+            let own = &self.values[a..];
+            (0..each).map(|k| own[3 * k] * orders[k]).sum()
+        };
+        Vector3::new(axis(0), axis(1), axis(2)) / ARCSEC_PER_RAD
+    }
+    fn centroid_shift_px(&self, star: &StarView) -> [f64; 2] {
+        self.shift_px(star)
+    }
+}
+
+impl Effect for Empirical {
+    fn id(&self) -> &'static str {
+        ID
+    }
+    fn parameters(&self) -> Vec<Parameter> {
+        let mut all: Vec<Parameter> = NAMES
+            .iter()
+            .zip(&self.values)
+            .map(|(name, &value)| Parameter::new(*name, value, "arcsec"))
+            .collect();
+        all.push(Parameter::new("middle", self.middle, ""));
+        all.push(Parameter::new("half", self.half, ""));
+        all
+    }
+    fn selectors(&self) -> BTreeMap<String, String> {
+        let on = if self.on_attitude {
+            "attitude"
+        } else {
+            "stars"
+        };
+        BTreeMap::from([
+            ("variable".to_owned(), self.variable.name()),
+            ("acts_on".to_owned(), on.to_owned()),
+        ])
+    }
+}
+
+/// What a term with these coefficients is declared by.
+pub fn empirical_parameters(
+    variable: &str,
+    on_attitude: bool,
+    [middle, half]: [f64; 2],
+    values: &[f64],
+) -> Parameters {
+    let on = if on_attitude { "attitude" } else { "stars" };
+    let mut all = Parameters::from([
+        ("variable".to_owned(), ParameterValue::from(variable)),
+        ("acts_on".to_owned(), ParameterValue::from(on)),
+        ("middle".to_owned(), ParameterValue::from(middle)),
+        ("half".to_owned(), ParameterValue::from(half)),
+    ]);
+    for (k, &value) in values.iter().enumerate() {
+        all.insert(format!("c{k}"), ParameterValue::from(value));
+    }
+    all
+}
