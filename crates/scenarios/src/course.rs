@@ -4,10 +4,11 @@
 
 use std::path::{Path, PathBuf};
 
-use focal_plane::AttitudeSeries;
+use focal_plane::{AttitudeSeries, AttitudeSource};
 use serde::Deserialize;
+use star_tracker::{Purpose, stream};
 
-use crate::simulate::truth_and_times;
+use crate::simulate::{span_s, times, truth_and_times};
 use crate::{Motion, Run, Scenario, ScenarioError};
 
 /// Where a tracker points, and when it looks.
@@ -70,6 +71,34 @@ impl Course {
             rate_hz,
             self.run.draw,
         )
+    }
+
+    /// As [`truth`](Self::truth), in memory that does not depend on the duration: the attitude, the time
+    /// of the first frame, s, and how many frames there are, `1/rate` apart.
+    ///
+    /// # Errors
+    /// As [`truth`](Self::truth).
+    ///
+    /// ```
+    /// let text = "[motion]\nkind = \"hold\"\n[run]\nduration_s = 1e7\n";
+    /// let course = scenarios::Course::parse(text, "world.toml", ".".as_ref())?;
+    /// let (truth, first_s, frames) = course.long_truth(2.0)?;
+    /// assert_eq!((frames, first_s, truth.span_s()), (20_000_000, 0.0, [-5.0, 1e7 + 5.0]));
+    /// # Ok::<(), scenarios::ScenarioError>(())
+    /// ```
+    pub fn long_truth(
+        &self,
+        rate_hz: f64,
+    ) -> Result<(Box<dyn AttitudeSource>, f64, u64), ScenarioError> {
+        let run = &self.run;
+        run.check(telemetry::ModelKind::Pbm)?;
+        let rate_hz = run.rate_hz.unwrap_or(rate_hz);
+        ScenarioError::check_positive("rate_hz", rate_hz)?;
+        let rng = stream(run.seed, run.draw, Purpose::Motion);
+        let span_s = span_s(&self.motion, run)?;
+        let truth = self.motion.long_truth(span_s, &self.folder, &rng)?;
+        let (first_s, frames) = times(&self.motion, run, truth.span_s(), rate_hz);
+        Ok((truth, first_s, frames))
     }
 }
 

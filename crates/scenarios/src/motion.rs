@@ -1,6 +1,6 @@
 //! Motion of the tracker: the truth that everything else of a simulation follows.
 //!
-//! Every kind gives the body rate as a function of time; [`integrate`](integrate::integrate) turns it
+//! Every kind gives the body rate as a function of time; [`whole`](integrate::whole) turns it
 //! into an attitude that starts, at t = 0, from the pointing
 //!
 //! ```text
@@ -15,19 +15,24 @@
 mod hold;
 mod integrate;
 mod jitter;
+mod long;
 pub(crate) mod phase_plane;
 mod recorded;
 mod rotator;
 mod slews;
+mod turning;
 
 use std::path::Path;
 
-use focal_plane::{Angle, AttitudeSeries, unit_vector};
+use focal_plane::{Angle, AttitudeSeries, AttitudeSource, unit_vector};
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
-use rand_core::Rng;
+use rand_xoshiro::Xoshiro256PlusPlus;
 use serde::Deserialize;
 
 use crate::ScenarioError;
+use integrate::whole;
+use long::Long;
+use turning::Turning;
 
 pub use hold::Hold;
 pub use jitter::{ClosedLoop, Sinusoid};
@@ -64,18 +69,50 @@ impl Motion {
     /// # Errors
     /// A number outside its range, or a recorded attitude that cannot be read. A recording shorter
     /// than the span is no error: its own span is returned.
-    pub fn truth<R: Rng + ?Sized>(
+    pub fn truth(
         &self,
         span_s: [f64; 2],
         folder: &Path,
-        rng: &mut R,
+        rng: &Xoshiro256PlusPlus,
     ) -> Result<AttitudeSeries, ScenarioError> {
+        let from_s = span_s[0];
         match self {
-            Self::Hold(hold) => hold.truth(span_s, rng),
-            Self::Slews(slews) => slews.truth(span_s, rng),
-            Self::PhasePlane(cycle) => cycle.truth(span_s, rng),
+            Self::Hold(hold) => whole(hold.turning(from_s, rng)?, hold.start.attitude()?, span_s),
+            Self::Slews(slews) => {
+                whole(slews.turning(from_s, rng)?, slews.start.attitude()?, span_s)
+            }
+            Self::PhasePlane(cycle) => {
+                whole(cycle.turning(from_s, rng)?, cycle.start.attitude()?, span_s)
+            }
             Self::Rotator(rotator) => rotator.truth(span_s),
             Self::Recorded(recorded) => recorded.truth(folder),
+        }
+    }
+
+    /// The same attitude, to the last bit, in memory that does not depend on the span: for whoever goes
+    /// through it once. A rotator and a recording are held whole.
+    ///
+    /// # Errors
+    /// As [`truth`](Self::truth).
+    pub fn long_truth(
+        &self,
+        span_s: [f64; 2],
+        folder: &Path,
+        rng: &Xoshiro256PlusPlus,
+    ) -> Result<Box<dyn AttitudeSource>, ScenarioError> {
+        fn long<T: Turning + Sync>(
+            turning: T,
+            start: Pointing,
+            span_s: [f64; 2],
+        ) -> Result<Box<dyn AttitudeSource>, ScenarioError> {
+            Ok(Box::new(Long::new(turning, start.attitude()?, span_s)?))
+        }
+        let from_s = span_s[0];
+        match self {
+            Self::Hold(hold) => long(hold.turning(from_s, rng)?, hold.start, span_s),
+            Self::Slews(slews) => long(slews.turning(from_s, rng)?, slews.start, span_s),
+            Self::PhasePlane(cycle) => long(cycle.turning(from_s, rng)?, cycle.start, span_s),
+            Self::Rotator(_) | Self::Recorded(_) => Ok(Box::new(self.truth(span_s, folder, rng)?)),
         }
     }
 }

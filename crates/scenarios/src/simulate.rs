@@ -178,34 +178,42 @@ pub(crate) fn truth_and_times(
     rate_hz: f64,
     draw: u64,
 ) -> Result<(AttitudeSeries, Vec<f64>), ScenarioError> {
-    let mut rng = stream(run.seed, draw, Purpose::Motion);
-    let recorded = matches!(motion, Motion::Recorded(_));
+    let rng = stream(run.seed, draw, Purpose::Motion);
+    let truth = motion.truth(span_s(motion, run)?, folder, &rng)?;
+    let (start_s, frames) = times(motion, run, truth.span_s(), rate_hz);
+    let t_s = (0..frames).map(|k| start_s + k as f64 / rate_hz).collect();
+    Ok((truth, t_s))
+}
+
+/// Over which the motion has to be known, s.
+pub(crate) fn span_s(motion: &Motion, run: &Run) -> Result<[f64; 2], ScenarioError> {
     let duration_s = match run.duration_s {
         Some(duration_s) => duration_s,
-        None if recorded => 0.0,
+        None if matches!(motion, Motion::Recorded(_)) => 0.0,
         None => {
             return Err(ScenarioError::Missing {
                 name: "run.duration_s",
             });
         }
     };
-    let span_s = [-run.margin_s, duration_s + run.margin_s];
-    let truth = motion.truth(span_s, folder, &mut rng)?;
-    let [first_s, last_s] = truth.span_s();
-    let (start_s, end_s) = match (recorded, run.duration_s) {
-        (true, Some(duration_s)) => (first_s, last_s.min(first_s + duration_s)),
+    Ok([-run.margin_s, duration_s + run.margin_s])
+}
+
+/// Time of the first frame, s, and how many there are; the attitude is known over `known_s`.
+pub(crate) fn times(motion: &Motion, run: &Run, known_s: [f64; 2], rate_hz: f64) -> (f64, u64) {
+    let [first_s, last_s] = known_s;
+    let (start_s, end_s) = match (motion, run.duration_s) {
+        (Motion::Recorded(_), Some(duration_s)) => (first_s, last_s.min(first_s + duration_s)),
         // its last sample is a frame too
-        (true, None) => (first_s, last_s + 0.5 / rate_hz),
-        (false, _) => (0.0, duration_s),
+        (Motion::Recorded(_), None) => (first_s, last_s + 0.5 / rate_hz),
+        (_, duration_s) => (0.0, duration_s.unwrap_or(0.0)),
     };
-    let mut t_s = Vec::new();
-    let mut k = 0.0;
+    let mut frames = 0;
     // half a millionth of a step: a duration that is a whole number of steps must not gain a frame
-    while k / rate_hz < end_s - start_s - 5e-7 / rate_hz || t_s.is_empty() {
-        t_s.push(start_s + k / rate_hz);
-        k += 1.0;
+    while frames == 0 || frames as f64 / rate_hz < end_s - start_s - 5e-7 / rate_hz {
+        frames += 1;
     }
-    Ok((truth, t_s))
+    (start_s, frames)
 }
 
 /// The unknown constant misalignment of this draw.

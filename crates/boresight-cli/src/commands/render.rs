@@ -88,12 +88,12 @@ fn render(
     console: &Console,
 ) -> anyhow::Result<()> {
     let settings = &course.run;
-    let (truth, t_s) = course.truth(rate_hz)?;
+    let (truth, first_s, frames) = course.long_truth(rate_hz)?;
     let year = settings.epoch.map_or(YEAR, |epoch| epoch.julian_year(0.0));
     let run = Run {
         title: settings.title.clone(),
-        first_s: t_s[0],
-        frames: t_s.len() as u64,
+        first_s,
+        frames,
         rate_hz: settings.rate_hz.unwrap_or(rate_hz),
         seed: settings.seed,
         draw: settings.draw,
@@ -110,7 +110,7 @@ fn render(
     });
     let done = imager::write(
         instrument,
-        &truth,
+        truth.as_ref(),
         &hipparcos(year)?,
         &run,
         writer,

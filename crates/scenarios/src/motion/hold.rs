@@ -6,13 +6,13 @@
 //!
 //! Source: [M23] Section 4.1, the quasi-inertial hold that drifts by some pixels in hours.
 
-use focal_plane::{Angle, AttitudeSeries};
+use focal_plane::Angle;
 use nalgebra::Vector3;
-use rand_core::Rng;
+use rand_xoshiro::Xoshiro256PlusPlus;
 use serde::Deserialize;
 
-use super::integrate::integrate;
 use super::jitter::Jitter;
+use super::turning::Turning;
 use super::{ClosedLoop, Pointing, STEP_S, Sinusoid};
 use crate::ScenarioError;
 
@@ -30,22 +30,55 @@ pub struct Hold {
     pub closed_loop: Option<ClosedLoop>,
 }
 
+/// Drift and jitter.
+#[derive(Clone, Debug)]
+pub(super) struct Drifting {
+    drift_rad_s: Vector3<f64>,
+    jitter: Jitter,
+    step_s: f64,
+}
+
 impl Hold {
-    pub(super) fn truth<R: Rng + ?Sized>(
+    pub(super) fn turning(
         &self,
-        span_s: [f64; 2],
-        rng: &mut R,
-    ) -> Result<AttitudeSeries, ScenarioError> {
-        let drift = drift_rad_s(self.drift_arcsec_s)?;
+        from_s: f64,
+        rng: &Xoshiro256PlusPlus,
+    ) -> Result<Drifting, ScenarioError> {
+        let drift_rad_s = drift_rad_s(self.drift_arcsec_s)?;
         let (jitter, step_s) = Jitter::new(
             &self.sinusoid,
             self.closed_loop.as_ref(),
-            span_s,
+            from_s,
             STEP_S,
             rng,
         )?;
-        let rate = |t| drift + jitter.rate_rad_s(t);
-        integrate(rate, self.start.attitude()?, span_s, step_s, &[])
+        Ok(Drifting {
+            drift_rad_s,
+            jitter,
+            step_s,
+        })
+    }
+}
+
+impl Turning for Drifting {
+    fn rate_rad_s(&self, t_s: f64) -> Vector3<f64> {
+        self.drift_rad_s + self.jitter.rate_rad_s(t_s)
+    }
+
+    fn step_s(&self) -> f64 {
+        self.step_s
+    }
+
+    fn next_break_s(&self, _from_s: f64, _backwards: bool) -> Option<f64> {
+        None
+    }
+
+    fn extend(&mut self, to_s: f64) {
+        self.jitter.extend(to_s);
+    }
+
+    fn forget(&mut self, before_s: f64) {
+        self.jitter.forget(before_s);
     }
 }
 
@@ -64,6 +97,7 @@ mod tests {
     use focal_plane::{AttitudeSource, rotation_vector};
     use star_tracker::{Purpose, stream};
 
+    use super::super::integrate::whole;
     use super::*;
 
     /// A drift about one axis with a line about the same axis: the angle is the sum in closed form,
@@ -80,10 +114,9 @@ mod tests {
             }],
             ..Hold::default()
         };
-        let truth = hold
-            .truth([-3.0, 600.0], &mut stream(1, 0, Purpose::Motion))
-            .unwrap();
         let at_zero = hold.start.attitude().unwrap();
+        let turning = hold.turning(-3.0, &stream(1, 0, Purpose::Motion));
+        let truth = whole(turning.unwrap(), at_zero, [-3.0, 600.0]).unwrap();
         for t in [-2.987_f64, 0.0, 0.013, 99.2, 599.999] {
             let phase = 30_f64.to_radians();
             let line = (core::f64::consts::TAU * 0.5 * t + phase).sin() - phase.sin();

@@ -17,89 +17,116 @@
 use focal_plane::{AttitudeSeries, rotation_from_vector};
 use nalgebra::{UnitQuaternion, Vector3};
 
+use super::turning::Turning;
 use crate::ScenarioError;
 
-/// Attitude that is `start` at t = 0 and moves at `rate` (rad/s, tracker axes), sampled with its rates
-/// at steps of at most `step_s` over `span_s`. `breaks_s` are the times where the rate is not smooth.
+/// Attitude that is `start` at t = 0 and turns as given, sampled with its rates over `span_s`.
 ///
 /// # Panics
-/// Unless the span holds 0 and the step is positive.
-pub(crate) fn integrate(
-    rate: impl Fn(f64) -> Vector3<f64>,
+/// Unless the span holds 0.
+pub(crate) fn whole<T: Turning>(
+    mut turning: T,
     start: UnitQuaternion<f64>,
     span_s: [f64; 2],
-    step_s: f64,
-    breaks_s: &[f64],
+) -> Result<AttitudeSeries, ScenarioError> {
+    turning.extend(span_s[1]);
+    integrate(&turning, start, span_s)
+}
+
+/// The same of a motion that is known throughout.
+pub(super) fn integrate<T: Turning>(
+    turning: &T,
+    start: UnitQuaternion<f64>,
+    span_s: [f64; 2],
 ) -> Result<AttitudeSeries, ScenarioError> {
     assert!(
         span_s[0] <= 0.0 && span_s[1] >= 0.0,
         "span {span_s:?} holds t = 0"
     );
-    assert!(step_s > 0.0, "step {step_s} s is positive");
-    let mut t_s = Vec::new();
-    let mut q = Vec::new();
-    for (t, attitude) in walk(&rate, start, &grid(span_s[0], step_s, breaks_s))
-        .into_iter()
-        .rev()
-    {
-        t_s.push(t);
-        q.push(attitude);
-    }
-    for (t, attitude) in walk(&rate, start, &grid(span_s[1], step_s, breaks_s))
-        .into_iter()
-        .skip(1)
-    {
-        t_s.push(t);
-        q.push(attitude);
-    }
-    let rates = t_s.iter().map(|&t| rate(t)).collect();
+    let walk = |end_s| {
+        let mut walker = Walker::new(start, end_s);
+        core::iter::from_fn(move || walker.next(turning))
+    };
+    let mut samples: Vec<_> = walk(span_s[0]).collect();
+    samples.reverse();
+    samples.push((0.0, start));
+    samples.extend(walk(span_s[1]));
+    series(turning, samples)
+}
+
+/// Samples with their rates.
+pub(super) fn series<T: Turning>(
+    turning: &T,
+    samples: Vec<(f64, UnitQuaternion<f64>)>,
+) -> Result<AttitudeSeries, ScenarioError> {
+    let rates = samples
+        .iter()
+        .map(|&(t, _)| turning.rate_rad_s(t))
+        .collect();
+    let (t_s, q) = samples.into_iter().unzip();
     Ok(AttitudeSeries::new(t_s, q, Some(rates))?)
 }
 
-/// Times from 0 to `end`, either way, at most a step apart, with every break between them.
-fn grid(end_s: f64, step_s: f64, breaks_s: &[f64]) -> Vec<f64> {
-    let inside = |t: f64| t * end_s > 0.0 && t.abs() < end_s.abs();
-    let mut knots: Vec<f64> = breaks_s.iter().copied().filter(|&t| inside(t)).collect();
-    knots.push(end_s);
-    knots.sort_by(|a, b| a.abs().total_cmp(&b.abs()));
-    let mut times = vec![0.0];
-    let mut from = 0.0;
-    for to in knots {
-        let length = f64::abs(to - from);
-        // a sliver shorter than this would only be two samples at one time
-        if length < 1e-9 {
-            continue;
-        }
-        let steps = (length / step_s).ceil();
-        let mut k = 1.0;
-        while k < steps {
-            times.push(from + (to - from) * (k / steps));
-            k += 1.0;
-        }
-        times.push(to);
-        from = to;
-    }
-    times
+/// An attitude on its way from t = 0 to an end on either side.
+#[derive(Clone, Debug)]
+pub(super) struct Walker {
+    pub(super) t_s: f64,
+    pub(super) q: UnitQuaternion<f64>,
+    end_s: f64,
+    /// Steps between two breaks: from, to, how many, how many are done.
+    leg: Option<(f64, f64, f64, f64)>,
 }
 
-fn walk(
-    rate: &impl Fn(f64) -> Vector3<f64>,
-    start: UnitQuaternion<f64>,
-    times: &[f64],
-) -> Vec<(f64, UnitQuaternion<f64>)> {
-    let mut q = start;
-    let mut path = Vec::with_capacity(times.len());
-    path.push((times[0], q));
-    for pair in times.windows(2) {
-        let step = rotation_from_vector(&magnus(rate, pair[0], pair[1] - pair[0]));
-        q = UnitQuaternion::new_normalize((step * q).into_inner());
-        path.push((pair[1], q));
+/// A sliver shorter than this, s, would only be two samples at one time.
+const SLIVER_S: f64 = 1e-9;
+
+impl Walker {
+    pub(super) fn new(start: UnitQuaternion<f64>, end_s: f64) -> Self {
+        Self {
+            t_s: 0.0,
+            q: start,
+            end_s,
+            leg: None,
+        }
     }
-    path
+
+    /// The next sample; none at the end.
+    pub(super) fn next<T: Turning>(&mut self, turning: &T) -> Option<(f64, UnitQuaternion<f64>)> {
+        let (from, to, steps, done) = match self.leg {
+            Some(leg) if leg.3 < leg.2 => leg,
+            _ => self.next_leg(turning)?,
+        };
+        let done = done + 1.0;
+        let t_s = if done < steps {
+            from + (to - from) * (done / steps)
+        } else {
+            to
+        };
+        self.leg = Some((from, to, steps, done));
+        let step = magnus(|t| turning.rate_rad_s(t), self.t_s, t_s - self.t_s);
+        self.q = UnitQuaternion::new_normalize((rotation_from_vector(&step) * self.q).into_inner());
+        self.t_s = t_s;
+        Some((t_s, self.q))
+    }
+
+    /// From here to the next time where the rate is not smooth, or to the end.
+    fn next_leg<T: Turning>(&self, turning: &T) -> Option<(f64, f64, f64, f64)> {
+        let (from, backwards) = (self.t_s, self.end_s < 0.0);
+        let mut after = from;
+        let to = loop {
+            match turning.next_break_s(after, backwards) {
+                Some(at) if (at - from).abs() < SLIVER_S => after = at,
+                Some(at) if at.abs() < self.end_s.abs() => break at,
+                _ => break self.end_s,
+            }
+        };
+        let length = (to - from).abs();
+        (length >= SLIVER_S).then(|| (from, to, (length / turning.step_s()).ceil(), 0.0))
+    }
 }
 
 /// Rotation vector of one step.
-fn magnus(rate: &impl Fn(f64) -> Vector3<f64>, t_s: f64, h_s: f64) -> Vector3<f64> {
+fn magnus(rate: impl Fn(f64) -> Vector3<f64>, t_s: f64, h_s: f64) -> Vector3<f64> {
     let node = 15_f64.sqrt() / 10.0;
     let a = [0.5 - node, 0.5, 0.5 + node].map(|c| -rate(t_s + c * h_s));
     let alpha1 = a[1] * h_s;
@@ -114,6 +141,7 @@ fn magnus(rate: &impl Fn(f64) -> Vector3<f64>, t_s: f64, h_s: f64) -> Vector3<f6
 mod tests {
     use focal_plane::{AttitudeSource, rotation_vector};
 
+    use super::super::turning::neighbour;
     use super::*;
 
     /// Coning: `q(t) = exp(-b z t) exp(-a n0 t)` turns at `omega = b z + exp(-b z t) a n0`, which no
@@ -125,15 +153,56 @@ mod tests {
         (outer * inner, Vector3::z() * b + outer * (n0 * a))
     }
 
+    /// A rate that is known.
+    #[derive(Clone)]
+    struct Known<F> {
+        rate: F,
+        step_s: f64,
+        breaks_s: Vec<f64>,
+    }
+
+    impl<F: Fn(f64) -> Vector3<f64> + Clone + Send + 'static> Turning for Known<F> {
+        fn rate_rad_s(&self, t_s: f64) -> Vector3<f64> {
+            (self.rate)(t_s)
+        }
+
+        fn step_s(&self) -> f64 {
+            self.step_s
+        }
+
+        fn next_break_s(&self, from_s: f64, backwards: bool) -> Option<f64> {
+            neighbour(&self.breaks_s, from_s, backwards)
+        }
+
+        fn extend(&mut self, _to_s: f64) {}
+
+        fn forget(&mut self, _before_s: f64) {}
+    }
+
+    fn path(
+        rate: impl Fn(f64) -> Vector3<f64> + Clone + Send + 'static,
+        span_s: [f64; 2],
+        step_s: f64,
+        breaks_s: &[f64],
+    ) -> AttitudeSeries {
+        let breaks_s = breaks_s.to_vec();
+        let known = Known {
+            rate,
+            step_s,
+            breaks_s,
+        };
+        whole(known, UnitQuaternion::identity(), span_s).unwrap()
+    }
+
     /// Over 300 s of a cone at 1 deg/s about an axis that itself turns once in 60 s, at the step of the
     /// simulation: rounding of 12 000 products (each below 4e-16, random: 5e-14) and the error of the
     /// method (below 1e-13) stay far under 1e-9 rad.
     #[test]
     fn a_cone_is_followed_to_rounding_both_ways() {
         let (a, b) = (1_f64.to_radians(), core::f64::consts::TAU / 60.0);
-        let rate = |t| coning(a, b, t).1;
+        let rate = move |t| coning(a, b, t).1;
         let span = [-300.0, 300.0];
-        let path = integrate(rate, UnitQuaternion::identity(), span, 0.05, &[]).unwrap();
+        let path = path(rate, span, 0.05, &[]);
         for &t in &[-300.0, -77.7, 0.0, 41.3, 123.456, 300.0] {
             let error = rotation_vector(&path.attitude(t).unwrap(), &coning(a, b, t).0).norm();
             assert!(error < 1e-11, "{error:.1e} rad at {t} s");
@@ -146,8 +215,8 @@ mod tests {
     fn the_method_is_of_sixth_order() {
         let (a, b) = (0.8, 1.3);
         let error = |step| {
-            let rate = |t| coning(a, b, t).1;
-            let path = integrate(rate, UnitQuaternion::identity(), [0.0, 8.0], step, &[]).unwrap();
+            let rate = move |t| coning(a, b, t).1;
+            let path = path(rate, [0.0, 8.0], step, &[]);
             rotation_vector(&path.attitude(8.0).unwrap(), &coning(a, b, 8.0).0).norm()
         };
         let ratio = error(0.5) / error(0.25);
@@ -156,8 +225,12 @@ mod tests {
 
     #[test]
     fn steps_end_at_breaks() {
-        assert_eq!(grid(1.0, 0.5, &[0.75, -0.3, 2.0]), [0.0, 0.375, 0.75, 1.0]);
-        assert_eq!(grid(-1.0, 0.5, &[0.75, -0.25]), [0.0, -0.25, -0.625, -1.0]);
-        assert_eq!(grid(0.0, 0.5, &[0.75]), [0.0]);
+        let at = |span, breaks: &[f64]| path(|_| Vector3::z(), span, 0.5, breaks).t_s().to_vec();
+        assert_eq!(
+            at([0.0, 1.0], &[-0.3, 0.75, 0.75 + 5e-10, 2.0]),
+            [0.0, 0.375, 0.75, 1.0]
+        );
+        assert_eq!(at([-1.0, 0.0], &[-0.25, 0.75]), [-1.0, -0.625, -0.25, 0.0]);
+        assert_eq!(at([0.0, 0.0], &[0.75]), [0.0]);
     }
 }

@@ -22,10 +22,11 @@
 
 use focal_plane::Angle;
 use nalgebra::{Matrix2, Vector2, Vector3};
-use rand_core::Rng;
 use rand_distr::{Distribution, StandardNormal};
+use rand_xoshiro::Xoshiro256PlusPlus;
 use serde::Deserialize;
 
+use super::turning::Samples;
 use crate::ScenarioError;
 
 /// One line of the jitter: `[[motion.sinusoid]]`.
@@ -74,13 +75,16 @@ struct Line {
     phase_rad: f64,
 }
 
-/// Angle and rate of the loop at equal steps.
+/// Angle and rate of the loop at equal steps, drawn as they are asked for.
 #[derive(Clone, Debug)]
 struct Path {
-    start_s: f64,
-    step_s: f64,
-    angle_rad: Vec<Vector3<f64>>,
-    rate_rad_s: Vec<Vector3<f64>>,
+    samples: Samples<[Vector3<f64>; 2]>,
+    transition: Matrix2<f64>,
+    factor: Matrix2<f64>,
+    /// Angle and rate of each axis at the next sample, in sigmas of the angle.
+    state: [Vector2<f64>; 3],
+    sigma_rad: [f64; 3],
+    rng: Xoshiro256PlusPlus,
 }
 
 /// Steps a period of the fastest jitter: the cubic between samples is then right to 1e-6 of the
@@ -88,13 +92,13 @@ struct Path {
 const STEPS_PER_PERIOD: f64 = 50.0;
 
 impl Jitter {
-    /// The jitter over `span_s`, and the step that resolves it (at most `step_s`).
-    pub(crate) fn new<R: Rng + ?Sized>(
+    /// The jitter from `from_s` on, and the step that resolves it (at most `step_s`).
+    pub(crate) fn new(
         sinusoids: &[Sinusoid],
         closed_loop: Option<&ClosedLoop>,
-        span_s: [f64; 2],
+        from_s: f64,
         step_s: f64,
-        rng: &mut R,
+        rng: &Xoshiro256PlusPlus,
     ) -> Result<(Self, f64), ScenarioError> {
         let mut step_s = step_s;
         let mut lines = Vec::with_capacity(sinusoids.len());
@@ -106,7 +110,7 @@ impl Jitter {
             closed_loop.check()?;
             step_s = step_s.min(1.0 / (STEPS_PER_PERIOD * closed_loop.frequency_hz));
         }
-        let path = closed_loop.map(|closed_loop| closed_loop.path(span_s, step_s, rng));
+        let path = closed_loop.map(|closed_loop| closed_loop.path(from_s, step_s, rng.clone()));
         Ok((
             Self {
                 lines,
@@ -126,6 +130,20 @@ impl Jitter {
             rate += path.rate_rad_s(t_s);
         }
         rate
+    }
+
+    /// Draws the loop's noise up to this time.
+    pub(crate) fn extend(&mut self, to_s: f64) {
+        if let Some(path) = &mut self.closed_loop {
+            path.extend(to_s);
+        }
+    }
+
+    /// Lets go of what is needed before this time alone.
+    pub(crate) fn forget(&mut self, before_s: f64) {
+        if let Some(path) = &mut self.closed_loop {
+            path.samples.forget(before_s);
+        }
     }
 }
 
@@ -174,34 +192,27 @@ impl ClosedLoop {
         )
     }
 
-    fn path<R: Rng + ?Sized>(&self, [from_s, to_s]: [f64; 2], step_s: f64, rng: &mut R) -> Path {
+    fn path(&self, from_s: f64, step_s: f64, mut rng: Xoshiro256PlusPlus) -> Path {
         let w0 = core::f64::consts::TAU * self.frequency_hz;
         let transition = transition(w0, self.damping, step_s);
         let stationary = Matrix2::new(1.0, 0.0, 0.0, w0 * w0);
         let factor = cholesky(&(stationary - transition * stationary * transition.transpose()));
-        let sigma = self
-            .sigma_arcsec
-            .map(|sigma| Angle::from_arcsec(sigma).rad());
-        let mut normal = || -> f64 { StandardNormal.sample(&mut *rng) };
-        let mut state: [Vector2<f64>; 3] = [(); 3].map(|()| Vector2::new(normal(), w0 * normal()));
-        let mut path = Path {
-            start_s: from_s,
-            step_s,
-            angle_rad: Vec::new(),
-            rate_rad_s: Vec::new(),
-        };
-        let mut t_s = from_s;
-        // one sample beyond the end, for the last cubic
-        while t_s < to_s + 2.0 * step_s {
-            path.angle_rad
-                .push(Vector3::from_fn(|axis, _| sigma[axis] * state[axis].x));
-            path.rate_rad_s
-                .push(Vector3::from_fn(|axis, _| sigma[axis] * state[axis].y));
-            state = state.map(|x| transition * x + factor * Vector2::new(normal(), normal()));
-            t_s = from_s + path.angle_rad.len() as f64 * step_s;
+        let state = [(); 3].map(|()| Vector2::new(normal(&mut rng), w0 * normal(&mut rng)));
+        Path {
+            samples: Samples::new(from_s, step_s),
+            transition,
+            factor,
+            state,
+            sigma_rad: self
+                .sigma_arcsec
+                .map(|sigma| Angle::from_arcsec(sigma).rad()),
+            rng,
         }
-        path
     }
+}
+
+fn normal(rng: &mut Xoshiro256PlusPlus) -> f64 {
+    StandardNormal.sample(rng)
 }
 
 /// `exp(A h)` of the undriven oscillator, states angle and rate.
@@ -225,21 +236,25 @@ fn cholesky(q: &Matrix2<f64>) -> Matrix2<f64> {
 }
 
 impl Path {
+    /// One sample beyond the end, for the last cubic.
+    fn extend(&mut self, to_s: f64) {
+        while self.samples.end_s() < to_s + 2.0 * self.samples.step_s() {
+            let (state, sigma) = (&self.state, self.sigma_rad);
+            let [angle, rate] =
+                [0, 1].map(|k| Vector3::from_fn(|axis, _| sigma[axis] * state[axis][k]));
+            self.samples.push([angle, rate]);
+            let (transition, factor) = (self.transition, self.factor);
+            for state in &mut self.state {
+                let noise = Vector2::new(normal(&mut self.rng), normal(&mut self.rng));
+                *state = transition * *state + factor * noise;
+            }
+        }
+    }
+
     /// Derivative of the cubic through the states on either side.
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "the quotient is clamped to the index range"
-    )]
     fn rate_rad_s(&self, t_s: f64) -> Vector3<f64> {
-        let last = self.angle_rad.len() - 2;
-        let k = ((t_s - self.start_s) / self.step_s)
-            .floor()
-            .clamp(0.0, last as f64) as usize;
-        let h = self.step_s;
-        let s = (t_s - self.start_s) / h - k as f64;
-        let rise = (self.angle_rad[k + 1] - self.angle_rad[k]) / h;
-        let (v0, v1) = (self.rate_rad_s[k], self.rate_rad_s[k + 1]);
+        let ([angle0, v0], [angle1, v1], s) = self.samples.around(t_s);
+        let rise = (angle1 - angle0) / self.samples.step_s();
         v0 + (rise * 6.0 - v0 * 4.0 - v1 * 2.0) * s + (v0 + v1 - rise * 2.0) * (3.0 * s * s)
     }
 }
@@ -270,26 +285,17 @@ mod tests {
             frequency_hz: 0.036,
             damping: 0.3,
         };
-        let mut rng = stream(5, 0, Purpose::Motion);
         let length = 100_000.0;
-        let path = given.path([0.0, length], 0.5, &mut rng);
+        let mut path = given.path(0.0, 0.5, stream(5, 0, Purpose::Motion));
+        path.extend(length);
+        let samples: Vec<_> = path.samples.iter().collect();
         let w0 = core::f64::consts::TAU * 0.036;
         let tolerance = 5.0 * (2.0 * 3.0 / (2.0 * 0.3 * w0) / length).sqrt();
-        let n = path.angle_rad.len() as f64;
+        let n = samples.len() as f64;
         for axis in 0..3 {
             let sigma = Angle::from_arcsec(given.sigma_arcsec[axis]).rad();
-            let angle = path
-                .angle_rad
-                .iter()
-                .map(|v| v[axis] * v[axis])
-                .sum::<f64>()
-                / n;
-            let rate = path
-                .rate_rad_s
-                .iter()
-                .map(|v| v[axis] * v[axis])
-                .sum::<f64>()
-                / n;
+            let square = |k: usize| samples.iter().map(|v| v[k][axis].powi(2)).sum::<f64>() / n;
+            let (angle, rate) = (square(0), square(1));
             assert!(
                 (angle / (sigma * sigma) - 1.0).abs() < tolerance,
                 "axis {axis}"
@@ -314,9 +320,11 @@ mod tests {
         let w0 = core::f64::consts::TAU * 0.036;
         let (mut angle, mut rate) = (0.0, 0.0);
         for draw in 0..1000 {
-            let path = given.path([0.0, 1.0], 0.5, &mut stream(5, draw, Purpose::Motion));
-            angle += path.angle_rad[0].norm_squared() / (3000.0 * sigma * sigma);
-            rate += path.rate_rad_s[0].norm_squared() / (3000.0 * (w0 * sigma).powi(2));
+            let mut path = given.path(0.0, 0.5, stream(5, draw, Purpose::Motion));
+            path.extend(1.0);
+            let ([first, slope], ..) = path.samples.around(0.0);
+            angle += first.norm_squared() / (3000.0 * sigma * sigma);
+            rate += slope.norm_squared() / (3000.0 * (w0 * sigma).powi(2));
         }
         let tolerance = 5.0 * (2.0_f64 / 3000.0).sqrt();
         assert!((angle - 1.0).abs() < tolerance, "angle {angle}");
@@ -331,14 +339,16 @@ mod tests {
             frequency_hz: 0.1,
             damping: 0.5,
         };
-        let path = given.path([-1.0, 20.0], 0.2, &mut stream(2, 0, Purpose::Motion));
+        let mut path = given.path(-1.0, 0.2, stream(2, 0, Purpose::Motion));
+        path.extend(20.0);
+        let angles: Vec<_> = path.samples.iter().map(|v| v[0]).collect();
         for k in 0..100 {
-            let t = path.start_s + 0.2 * k as f64;
+            let t = -1.0 + 0.2 * k as f64;
             let simpson = (path.rate_rad_s(t + 1e-12)
                 + path.rate_rad_s(t + 0.1) * 4.0
                 + path.rate_rad_s(t + 0.2 - 1e-12))
                 * (0.2 / 6.0);
-            let rise = path.angle_rad[k + 1] - path.angle_rad[k];
+            let rise = angles[k + 1] - angles[k];
             assert!((simpson - rise).norm() < 1e-15);
         }
     }

@@ -19,15 +19,15 @@
 //! boresight, stars that cross it in short tracks of random direction and migrate by some pixels. Rates,
 //! spread and coupling are not printed: assumptions of the scenario that uses it.
 
-use focal_plane::{Angle, AttitudeSeries};
+use focal_plane::Angle;
 use nalgebra::{Rotation3, Unit, Vector3};
-use rand_core::Rng;
 use rand_distr::{Distribution, StandardNormal, StandardUniform};
+use rand_xoshiro::Xoshiro256PlusPlus;
 use serde::Deserialize;
 
 use super::hold::drift_rad_s;
-use super::integrate::integrate;
 use super::jitter::unit_axis;
+use super::turning::{Samples, Turning};
 use super::{Pointing, STEP_S};
 use crate::ScenarioError;
 
@@ -94,21 +94,18 @@ pub(crate) fn cant(
 }
 
 impl PhasePlane {
-    pub(super) fn truth<R: Rng + ?Sized>(
+    pub(super) fn turning(
         &self,
-        span_s: [f64; 2],
-        rng: &mut R,
-    ) -> Result<AttitudeSeries, ScenarioError> {
+        from_s: f64,
+        rng: &Xoshiro256PlusPlus,
+    ) -> Result<Cycling, ScenarioError> {
         self.check()?;
         let names = ["motion.cant_axis", "motion.cant_deg"];
-        let to_tracker = cant(names, self.cant_axis, self.cant_deg)?;
-        let drift = drift_rad_s(self.drift_arcsec_s)?;
-        let track = self.track(span_s, rng);
-        let rate = |t| drift + to_tracker * track.rate_rad_s(t);
-        let breaks: Vec<f64> = (0..track.rate_rad_s.len())
-            .map(|k| track.start_s + k as f64 * self.cycle_s)
-            .collect();
-        integrate(rate, self.start.attitude()?, span_s, STEP_S, &breaks)
+        Ok(Cycling {
+            to_tracker: cant(names, self.cant_axis, self.cant_deg)?,
+            drift_rad_s: drift_rad_s(self.drift_arcsec_s)?,
+            track: self.track(from_s, rng.clone()),
+        })
     }
 
     fn check(&self) -> Result<(), ScenarioError> {
@@ -124,73 +121,126 @@ impl PhasePlane {
         ScenarioError::check_positive("motion.cycle_s", self.cycle_s)
     }
 
-    /// Runs the controller through the span, one cycle beyond its end.
-    fn track<R: Rng + ?Sized>(&self, [from_s, to_s]: [f64; 2], rng: &mut R) -> Track {
+    /// The controller before its first cycle.
+    fn track(&self, from_s: f64, mut rng: Xoshiro256PlusPlus) -> Track {
         let deadband = self.deadband_deg.map(|deg| Angle::from_deg(deg).rad());
         let arcsec = |values: [f64; 3]| values.map(|v| Angle::from_arcsec(v).rad());
         let (mean, torque) = (arcsec(self.rate_arcsec_s), arcsec(self.torque_arcsec_s2));
         let cycle_s = self.cycle_s;
-        let mut theta = Vector3::from_fn(|a, _| deadband[a] * symmetric(rng));
-        let mut w = Vector3::from_fn(|a, _| {
-            let size = mean[a] * (1.0 + self.rate_spread * symmetric(rng));
-            size * symmetric(rng).signum()
+        let theta = Vector3::from_fn(|a, _| deadband[a] * symmetric(&mut rng));
+        let w = Vector3::from_fn(|a, _| {
+            let size = mean[a] * (1.0 + self.rate_spread * symmetric(&mut rng));
+            size * symmetric(&mut rng).signum()
         });
-        let mut track = Track {
-            start_s: (from_s / cycle_s).floor() * cycle_s,
-            cycle_s,
-            rate_rad_s: vec![w],
-        };
-        while track.start_s + (track.rate_rad_s.len() as f64 - 2.0) * cycle_s < to_s {
-            let mut next = w + Vector3::from(torque) * cycle_s;
+        let start_s = (from_s / cycle_s).floor() * cycle_s;
+        let mut samples = Samples::new(start_s, cycle_s);
+        samples.push(w);
+        Track {
+            start_s,
+            samples,
+            theta,
+            w,
+            deadband,
+            mean,
+            torque: Vector3::from(torque),
+            rate_spread: self.rate_spread,
+            coupling: self.coupling,
+            rng,
+        }
+    }
+}
+
+/// Evenly spread over -1 to 1.
+fn symmetric(rng: &mut Xoshiro256PlusPlus) -> f64 {
+    let u: f64 = StandardUniform.sample(rng);
+    2.0 * u - 1.0
+}
+
+/// Rate about the control axes at each cycle, and the controller behind it.
+#[derive(Clone, Debug)]
+struct Track {
+    start_s: f64,
+    samples: Samples<Vector3<f64>>,
+    theta: Vector3<f64>,
+    w: Vector3<f64>,
+    deadband: [f64; 3],
+    mean: [f64; 3],
+    torque: Vector3<f64>,
+    rate_spread: f64,
+    coupling: f64,
+    rng: Xoshiro256PlusPlus,
+}
+
+impl Track {
+    /// Runs the controller one cycle beyond this time.
+    fn extend(&mut self, to_s: f64) {
+        let cycle_s = self.samples.step_s();
+        while self.samples.end_s() - 2.0 * cycle_s < to_s {
+            let mut next = self.w + self.torque * cycle_s;
             for a in 0..3 {
-                if theta[a].abs() <= deadband[a] || theta[a] * w[a] <= 0.0 {
+                let (theta, w) = (self.theta[a], self.w[a]);
+                if theta.abs() <= self.deadband[a] || theta * w <= 0.0 {
                     continue;
                 }
-                let size = mean[a] * (1.0 + self.rate_spread * symmetric(rng));
-                let change = -theta[a].signum() * size - w[a];
+                let size = self.mean[a] * (1.0 + self.rate_spread * symmetric(&mut self.rng));
+                let change = -theta.signum() * size - w;
                 for b in 0..3 {
                     let share: f64 = if a == b {
                         1.0
                     } else {
-                        let normal: f64 = StandardNormal.sample(&mut *rng);
+                        let normal: f64 = StandardNormal.sample(&mut self.rng);
                         self.coupling * normal
                     };
                     next[b] += share * change;
                 }
             }
-            theta += (w + next) * (0.5 * cycle_s);
-            w = next;
-            track.rate_rad_s.push(w);
+            self.theta += (self.w + next) * (0.5 * cycle_s);
+            self.w = next;
+            self.samples.push(next);
         }
-        track
+    }
+
+    fn rate_rad_s(&self, t_s: f64) -> Vector3<f64> {
+        let (before, after, share) = self.samples.around(t_s);
+        before.lerp(&after, share)
     }
 }
 
-/// Evenly spread over -1 to 1.
-fn symmetric<R: Rng + ?Sized>(rng: &mut R) -> f64 {
-    let u: f64 = StandardUniform.sample(rng);
-    2.0 * u - 1.0
+/// A controller's cycles in tracker axes, and the drift.
+#[derive(Clone, Debug)]
+pub(super) struct Cycling {
+    to_tracker: Rotation3<f64>,
+    drift_rad_s: Vector3<f64>,
+    track: Track,
 }
 
-/// Rate about the control axes at each cycle.
-#[derive(Debug)]
-struct Track {
-    start_s: f64,
-    cycle_s: f64,
-    rate_rad_s: Vec<Vector3<f64>>,
-}
-
-impl Track {
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "the quotient is clamped to the index range"
-    )]
+impl Turning for Cycling {
     fn rate_rad_s(&self, t_s: f64) -> Vector3<f64> {
-        let last = self.rate_rad_s.len() - 2;
-        let cycles = (t_s - self.start_s) / self.cycle_s;
-        let k = cycles.floor().clamp(0.0, last as f64) as usize;
-        self.rate_rad_s[k].lerp(&self.rate_rad_s[k + 1], cycles - k as f64)
+        self.drift_rad_s + self.to_tracker * self.track.rate_rad_s(t_s)
+    }
+
+    fn step_s(&self) -> f64 {
+        STEP_S
+    }
+
+    fn next_break_s(&self, from_s: f64, backwards: bool) -> Option<f64> {
+        let (start_s, cycle_s) = (self.track.start_s, self.track.samples.step_s());
+        let near = ((from_s - start_s) / cycle_s).round();
+        let at = |cycles: f64| start_s + cycles * cycle_s;
+        let beside = [-1.0, 0.0, 1.0].map(|k| at(near + k));
+        if backwards {
+            beside.into_iter().rev().find(|&t| t < from_s)
+        } else {
+            beside.into_iter().find(|&t| t > from_s)
+        }
+    }
+
+    fn extend(&mut self, to_s: f64) {
+        self.track.extend(to_s);
+    }
+
+    fn forget(&mut self, before_s: f64) {
+        self.track.samples.forget(before_s);
     }
 }
 
@@ -199,6 +249,7 @@ mod tests {
     use focal_plane::{AttitudeSource, rotation_vector};
     use star_tracker::{Purpose, stream};
 
+    use super::super::integrate::whole;
     use super::*;
 
     fn cycle() -> PhasePlane {
@@ -220,10 +271,9 @@ mod tests {
     /// control axes are the tracker's turned by the cant.
     fn angles_deg(given: &PhasePlane, seed: u64) -> Vec<Vector3<f64>> {
         let span = [-5.0, 10_000.0];
-        let truth = given
-            .truth(span, &mut stream(seed, 0, Purpose::Motion))
-            .unwrap();
+        let turning = given.turning(span[0], &stream(seed, 0, Purpose::Motion));
         let start = given.start.attitude().unwrap();
+        let truth = whole(turning.unwrap(), start, span).unwrap();
         let cant = Rotation3::from_axis_angle(&Vector3::y_axis(), 15_f64.to_radians());
         let angle = |k: u32| {
             let q = truth.attitude(f64::from(k)).unwrap();
@@ -275,20 +325,18 @@ mod tests {
             coupling: 0.0,
             ..cycle()
         };
-        let track = given.track([0.0, 20_000.0], &mut stream(2, 0, Purpose::Motion));
+        let mut track = given.track(0.0, stream(2, 0, Purpose::Motion));
+        track.extend(20_000.0);
+        let rates: Vec<_> = track.samples.iter().collect();
         let mut sizes = Vec::new();
-        for pair in track.rate_rad_s.windows(2).filter(|p| p[0] == p[1]) {
+        for pair in rates.windows(2).filter(|p| p[0] == p[1]) {
             sizes.push(Angle::from_rad(pair[0].x.abs()).arcsec());
         }
         assert!(sizes.iter().all(|r| (7.5 - 1e-9..22.5 + 1e-9).contains(r)));
         let slow = sizes.iter().filter(|r| **r < 12.0).count();
         let fast = sizes.iter().filter(|r| **r > 18.0).count();
         assert!(slow > 0 && fast > 0, "both slow and fast tracks");
-        let reversals = track
-            .rate_rad_s
-            .windows(2)
-            .filter(|p| p[0].x * p[1].x < 0.0)
-            .count();
+        let reversals = rates.windows(2).filter(|p| p[0].x * p[1].x < 0.0).count();
         // 792 arcsec at 7.5 to 22.5 arcsec/s: 20 000 s hold between 189 and 568 crossings
         assert!((180..580).contains(&reversals), "{reversals}");
     }
@@ -311,7 +359,7 @@ mod tests {
             deadband_deg: [0.1, 0.0, 0.1],
             ..cycle()
         };
-        let got = given.truth([0.0, 1.0], &mut stream(1, 0, Purpose::Motion));
+        let got = given.turning(0.0, &stream(1, 0, Purpose::Motion));
         let name = "motion.deadband_deg";
         assert!(matches!(got, Err(ScenarioError::OutOfRange { name: n, .. }) if n == name));
     }

@@ -13,12 +13,15 @@
 //! Source: [A01] Eqs. 1 and 2 and the text around Eq. 3; Wertz, Spacecraft Attitude Determination and
 //! Control (1978), Section 16.2.
 
+use std::sync::Arc;
+
 use focal_plane::{Angle, AttitudeSeries, AttitudeSource, rotation_from_vector};
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 use serde::Deserialize;
 
-use super::integrate::integrate;
+use super::integrate::whole;
 use super::jitter::{Sinusoid, unit_axis};
+use super::turning::Turning;
 use super::{Pointing, STEP_S};
 use crate::ScenarioError;
 
@@ -71,10 +74,11 @@ impl Rotator {
         ScenarioError::check_finite("motion.nutation_phase_deg", self.nutation_phase_deg)?;
         let to_body = self.to_body()?;
         let rates = Rates::new(self.inertia_kg_m2, self.start_rate(), span_s);
-        // the tracker turns with the body; the rate in its axes is the body's, turned
-        let rate = |t: f64| to_body.inverse() * rates.at(t);
-        let start = self.start.attitude()?;
-        let plain = integrate(rate, start, span_s, STEP_S, &[])?;
+        let turning = Spinning {
+            to_tracker: to_body.inverse(),
+            rates: Arc::new(rates),
+        };
+        let plain = whole(turning, self.start.attitude()?, span_s)?;
         if self.sinusoid.is_empty() {
             return Ok(plain);
         }
@@ -131,6 +135,32 @@ impl Rotator {
         let (sin, cos) = Angle::from_deg(self.nutation_phase_deg).rad().sin_cos();
         Vector3::new(across * cos / ix, across * sin / iy, w3)
     }
+}
+
+/// The tracker turns with the body; the rate in its axes is the body's, turned.
+#[derive(Clone)]
+struct Spinning {
+    to_tracker: UnitQuaternion<f64>,
+    rates: Arc<Rates>,
+}
+
+impl Turning for Spinning {
+    fn rate_rad_s(&self, t_s: f64) -> Vector3<f64> {
+        self.to_tracker * self.rates.at(t_s)
+    }
+
+    fn step_s(&self) -> f64 {
+        STEP_S
+    }
+
+    fn next_break_s(&self, _from_s: f64, _backwards: bool) -> Option<f64> {
+        None
+    }
+
+    // the rates are there throughout
+    fn extend(&mut self, _to_s: f64) {}
+
+    fn forget(&mut self, _before_s: f64) {}
 }
 
 /// Body rate over time, at equal steps from t = 0 either way.

@@ -13,14 +13,16 @@
 //! Source: [M23] Section 4.2 and Fig. 9: orthogonal rate slews with inertial holds between them. The
 //! paper prints no shape; the quintic is an assumption.
 
-use focal_plane::{Angle, AttitudeSeries};
+use std::sync::Arc;
+
+use focal_plane::Angle;
 use nalgebra::Vector3;
-use rand_core::Rng;
+use rand_xoshiro::Xoshiro256PlusPlus;
 use serde::Deserialize;
 
 use super::hold::drift_rad_s;
-use super::integrate::integrate;
 use super::jitter::{Jitter, unit_axis};
+use super::turning::{Turning, neighbour};
 use super::{ClosedLoop, Pointing, STEP_S, Sinusoid};
 use crate::ScenarioError;
 
@@ -81,24 +83,40 @@ struct Turn {
     peak_rad_s: Vector3<f64>,
 }
 
+/// Slews, drift and jitter.
+#[derive(Clone, Debug)]
+pub(super) struct Slewing {
+    drift_rad_s: Vector3<f64>,
+    jitter: Jitter,
+    step_s: f64,
+    turns: Arc<[Turn]>,
+    breaks_s: Arc<[f64]>,
+}
+
 impl Slews {
-    pub(super) fn truth<R: Rng + ?Sized>(
+    pub(super) fn turning(
         &self,
-        span_s: [f64; 2],
-        rng: &mut R,
-    ) -> Result<AttitudeSeries, ScenarioError> {
-        let drift = drift_rad_s(self.drift_arcsec_s)?;
+        from_s: f64,
+        rng: &Xoshiro256PlusPlus,
+    ) -> Result<Slewing, ScenarioError> {
+        let drift_rad_s = drift_rad_s(self.drift_arcsec_s)?;
         let turns = self.turns()?;
         let (jitter, step_s) = Jitter::new(
             &self.sinusoid,
             self.closed_loop.as_ref(),
-            span_s,
+            from_s,
             STEP_S,
             rng,
         )?;
-        let rate = |t| drift + jitter.rate_rad_s(t) + slew_rate_rad_s(&turns, t);
-        let breaks: Vec<f64> = turns.iter().flat_map(Turn::breaks_s).collect();
-        integrate(rate, self.start.attitude()?, span_s, step_s, &breaks)
+        let mut breaks_s: Vec<f64> = turns.iter().flat_map(Turn::breaks_s).collect();
+        breaks_s.sort_by(f64::total_cmp);
+        Ok(Slewing {
+            drift_rad_s,
+            jitter,
+            step_s,
+            turns: turns.into(),
+            breaks_s: breaks_s.into(),
+        })
     }
 
     fn turns(&self) -> Result<Vec<Turn>, ScenarioError> {
@@ -112,6 +130,28 @@ impl Slews {
             }
         }
         Ok(turns)
+    }
+}
+
+impl Turning for Slewing {
+    fn rate_rad_s(&self, t_s: f64) -> Vector3<f64> {
+        self.drift_rad_s + self.jitter.rate_rad_s(t_s) + slew_rate_rad_s(&self.turns, t_s)
+    }
+
+    fn step_s(&self) -> f64 {
+        self.step_s
+    }
+
+    fn next_break_s(&self, from_s: f64, backwards: bool) -> Option<f64> {
+        neighbour(&self.breaks_s, from_s, backwards)
+    }
+
+    fn extend(&mut self, to_s: f64) {
+        self.jitter.extend(to_s);
+    }
+
+    fn forget(&mut self, before_s: f64) {
+        self.jitter.forget(before_s);
     }
 }
 
@@ -169,10 +209,16 @@ fn slew_rate_rad_s(turns: &[Turn], t_s: f64) -> Vector3<f64> {
 
 #[cfg(test)]
 mod tests {
-    use focal_plane::{AttitudeSource, rotation_from_vector, rotation_vector};
+    use focal_plane::{AttitudeSeries, AttitudeSource, rotation_from_vector, rotation_vector};
     use star_tracker::{Purpose, stream};
 
+    use super::super::integrate::whole;
     use super::*;
+
+    fn truth(sequence: &Slews, span_s: [f64; 2]) -> Result<AttitudeSeries, ScenarioError> {
+        let turning = sequence.turning(span_s[0], &stream(1, 0, Purpose::Motion))?;
+        whole(turning, sequence.start.attitude()?, span_s)
+    }
 
     fn slew(axis: [f64; 3], angle_deg: f64, duration_s: f64) -> Slew {
         Slew {
@@ -214,9 +260,7 @@ mod tests {
         ]);
         sequence.repeat = 2;
         let end_s = 4.0 + 2.0 * (20.0 + 31.0 + 40.03 + 21.0);
-        let truth = sequence
-            .truth([-1.0, end_s], &mut stream(1, 0, Purpose::Motion))
-            .unwrap();
+        let truth = truth(&sequence, [-1.0, end_s]).unwrap();
         let mut expected = sequence.start.attitude().unwrap();
         let mut t = 4.0;
         for _ in 0..2 {
@@ -241,9 +285,7 @@ mod tests {
             ramp_s: Some(2.0),
             ..slew([0.0, 1.0, 0.0], 3.0, 12.0)
         }]);
-        let truth = sequence
-            .truth([0.0, 20.0], &mut stream(1, 0, Purpose::Motion))
-            .unwrap();
+        let truth = truth(&sequence, [0.0, 20.0]).unwrap();
         for t in [6.1, 10.0, 13.9] {
             assert!((truth.rate_rad_s(t).unwrap().y - 0.3_f64.to_radians()).abs() < 1e-12);
         }
@@ -257,7 +299,7 @@ mod tests {
             ramp_s: Some(7.0),
             ..slew([1.0, 0.0, 0.0], 3.0, 12.0)
         }]);
-        let got = sequence.truth([0.0, 20.0], &mut stream(1, 0, Purpose::Motion));
+        let got = truth(&sequence, [0.0, 20.0]);
         assert!(matches!(
             got,
             Err(ScenarioError::OutOfRange {
