@@ -20,7 +20,7 @@ use super::dark::{self, Dark};
 use super::geometry::Geometry;
 use super::moment_level;
 use super::pixel_noise::{self, MIN_READ_VARIANCE};
-use super::sample::Sample;
+use super::sample::{Planes, Sample};
 use super::spline::Grid;
 use super::spot::{self, Normal};
 use super::window_fit::{self, Fitted, Known, PixelNoise, Pixels};
@@ -29,6 +29,10 @@ use super::{MAD_SCALE, robust_median};
 /// Rounds of everything: with half as many the table's centroids, moved by the very
 /// pixels that are sought, still show in the map at twice its error.
 const OUTER: usize = 12;
+/// Rounds before the map is learned. A star that moves along a line trades anything that does not change along
+/// that line between its spot and the map, and only the map's prior sends it back, slowly: what is the spot's
+/// must not get into the map in the first place.
+const UNMAPPED: usize = 2;
 /// Most rounds of spots and map at fixed positions, and the change of the map in
 /// its own sigmas that ends them.
 const INNER: usize = 60;
@@ -41,7 +45,7 @@ const FINAL_STEPS: usize = 16;
 /// Starting values in the scaled unit, each far on the side of knowing nothing:
 /// variance of backgrounds, and variance of the second differences of a spot.
 const BACKGROUND_VARIANCE: f64 = 1e4;
-const ROUGHNESS: f64 = 1e-6;
+const ROUGHNESS: f64 = 1e-2;
 /// A star's weight in the attitude over the median star's.
 const MAX_WEIGHT: f64 = 3.0;
 /// Fewest windows to learn a spot from.
@@ -136,9 +140,10 @@ pub(crate) fn learn(
     for outer in 0..OUTER {
         place(sample, taken, &mut state, &star_weight, length_px);
         weigh(sample, &windows, &mut state, learned.noise);
-        let sums = learned.learn_spots_and_dark(sample, &windows, &ordered, &state, mapped);
+        let mapping = mapped && outer >= UNMAPPED;
+        let sums = learned.learn_spots_and_dark(sample, &windows, &ordered, &state, mapping);
         if with_variance && outer == OUTER - 1 {
-            learned.dark_variance = learned.marginal_variance(&sums);
+            learned.dark_variance = learned.marginal_variance(sample, &sums);
         }
         let steps = if outer == 0 {
             FIRST_STEPS
@@ -263,6 +268,7 @@ impl Learned {
             .collect();
         let mut moment = vec![0.0; sample.centre.len()];
         let mut total = vec![0.0; sample.centre.len()];
+        let planes = Planes::new(&sample.group, &sample.centre);
         for _ in 0..INNER {
             moment.fill(0.0);
             total.fill(0.0);
@@ -275,7 +281,7 @@ impl Learned {
                 factor.solve(&mut spot.psi);
                 coupling.tell_pixels(&spot.psi, &mut moment, &mut total);
             }
-            if !mapped || self.dark.update(&moment, &total, &sample.group) < STANDS_STILL {
+            if !mapped || self.dark.update(&moment, &total, &planes) < STANDS_STILL {
                 break;
             }
         }
@@ -373,7 +379,7 @@ impl Learned {
     }
 
     /// Variance of the map, uncertainty of the spots included.
-    fn marginal_variance(&self, sums: &[(Normal, Coupling)]) -> Vec<f64> {
+    fn marginal_variance(&self, sample: &Sample, sums: &[(Normal, Coupling)]) -> Vec<f64> {
         let added: Vec<Vec<(usize, f64)>> = self
             .spots
             .par_iter()
@@ -383,7 +389,12 @@ impl Learned {
                     return Vec::new();
                 }
                 let precision = normal.penalised(&self.grid, spot.roughness);
-                dark::variance_from_spot(coupling, precision, &self.dark.variance)
+                dark::variance_from_spot(
+                    coupling,
+                    precision,
+                    &self.dark.variance,
+                    &sample.centre,
+                )
             })
             .collect();
         let mut variance = self.dark.variance.clone();
