@@ -1,18 +1,21 @@
 //! Which explanation of an image-level leftover the data supports.
 //!
 //! Centroids are formed anew as first moments, as first moments less what the
-//! effective spot says that they are off by, and as positions of that spot, each
+//! effective spot says that they are off by, as positions of that spot, and as
+//! positions of the round Gaussian nearest to it, each
 //! with and without a dark map; a function of pixel phase, the rival explanation,
 //! is tried on all of them. Out of fold, block by block:
 //!
 //! - the map is claimed if the best account with it beats the best without it:
 //!   anything else that the windows allow may stand in for it;
 //! - the spot is claimed if first moments corrected by it beat first moments as they
-//!   are, and as well as any function of pixel phase does. That a fitted spot has less
+//!   are, and as well as any function of pixel phase does; or if its positions beat both first moments
+//!   and those of the Gaussian, a function of pixel phase beside them or not. That a fitted spot has less
 //!   noise than a first moment is no effect.
 //!
 //! Once either is claimed centroids are formed anew, and then in the way that predicts
-//! best: a fitted spot also feels what is left of a warm pixel less.
+//! best: a fitted spot also feels what is left of a warm pixel less. What is constant for a star is then known as
+//! well as the map is; with a spot of its own, a star has no zero at all.
 //!
 //! Not physics: the comparison.
 
@@ -29,7 +32,7 @@ use crate::evidence::Evidence;
 use crate::figures;
 use crate::fit::OutOfFold;
 use crate::folds::Folds;
-use crate::images::{DARK_MAP, DARK_MAP_FILE, EFFECTIVE_PSF, Formed};
+use crate::images::{DARK_MAP, DARK_MAP_FILE, EFFECTIVE_PSF, Formed, Variants};
 use crate::search::{amplitudes, borrowed, fit};
 use crate::selection::{FAMILY_ALPHA, columns_of};
 use crate::star_data::StarData;
@@ -40,7 +43,13 @@ pub(crate) struct Side<'a> {
     pub(crate) moments: StarEvidence<'a>,
     pub(crate) unbiased: StarEvidence<'a>,
     pub(crate) fitted: StarEvidence<'a>,
+    pub(crate) gaussian: StarEvidence<'a>,
 }
+
+/// 1 sigma of where the zero of a star's own spot is, px.
+const OWN_ZERO_PX: f64 = 0.05;
+/// Nats that a claim has to bring at least: pixels that are hardly off zero are no map.
+const LEAST_GAIN: f64 = 6.0;
 
 /// What one step from a level to the next brought.
 #[derive(Clone, Debug)]
@@ -58,8 +67,48 @@ pub(crate) struct ImageLevel {
     pub(crate) rivals: Vec<Rival>,
     pub(crate) dark_map: Step,
     pub(crate) effective_psf: Step,
-    /// Positions of the spot predict better than moments.
-    pub(crate) fitted: bool,
+    /// How centroids are formed once there is a reason to.
+    way: Way,
+}
+
+/// How centroids are formed anew.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Way {
+    Moments,
+    Unbiased,
+    Fitted,
+    Gaussian,
+}
+
+impl ImageLevel {
+    /// The centroids that everything else is looked for in, and what is known of their zeros, px; `None`
+    /// for those of the table.
+    pub(crate) fn level<'a>(&self, formed: &'a Formed) -> Option<(&'a Variants, Vec<[f64; 2]>)> {
+        let (map, spot) = (self.dark_map.stands, self.effective_psf.stands);
+        if !map && !spot {
+            return None;
+        }
+        let side = if map {
+            &formed.with_map
+        } else {
+            &formed.without_map
+        };
+        let variants = match self.way {
+            Way::Moments => &side.moments,
+            Way::Unbiased => &side.unbiased,
+            Way::Fitted => &side.fitted,
+            Way::Gaussian => &side.gaussian,
+        };
+        let own = if spot { OWN_ZERO_PX } else { 0.0 };
+        let zero = |z: &[f64; 2]| z.map(|z| z.hypot(own));
+        Some((variants, side.zero_px.iter().map(zero).collect()))
+    }
+
+    /// Whether the noise of the centroids is no longer that of the declared ones.
+    pub(crate) fn new_noise(&self) -> bool {
+        matches!(self.way, Way::Fitted | Way::Gaussian)
+            && (self.dark_map.stands || self.effective_psf.stands)
+    }
 }
 
 /// A level out of fold, by itself and with the best function of pixel phase.
@@ -95,11 +144,13 @@ pub(crate) fn compare(
         tell("moments anew", &bare.moments)?,
         tell("moments anew - spot", &bare.unbiased)?,
         tell("effective_psf", &bare.fitted)?,
+        tell("gaussian spot", &bare.gaussian)?,
     ];
     let map = [
         tell("dark_map", &map.moments)?,
         tell("dark_map - spot", &map.unbiased)?,
         tell("dark_map + effective_psf", &map.fitted)?,
+        tell("dark_map + gaussian spot", &map.gaussian)?,
     ];
     // What only leads to a decision is not an account to be shown.
     rivals.retain(|r| !r.what.contains(" - spot"));
@@ -116,8 +167,8 @@ pub(crate) fn compare(
             .unwrap_or_else(|| measured.alone.clone())
     };
     let claim = step(
-        &best(&[&map[0], &map[2]]),
-        &best(&[&measured, &bare[0], &bare[2]]),
+        &best(&[&map[0], &map[2], &map[3]]),
+        &best(&[&measured, &bare[0], &bare[2], &bare[3]]),
         whole,
     );
     // Without a map, plain moments are those of the table or those formed anew.
@@ -131,11 +182,27 @@ pub(crate) fn compare(
     } else {
         (plain, &bare)
     };
-    let spot = step(&side[1].alone, &moments.alone, whole);
-    let spot_stands = spot.stands && side[1].best().total() >= moments.best().total();
-    let corrected = if spot_stands { &side[1] } else { moments };
-    let fitted = step(&side[2].alone, &corrected.alone, whole).stands;
-    let last = if fitted { &side[2] } else { corrected };
+    let corrected = step(&side[1].alone, &moments.alone, whole);
+    let corrects = corrected.stands && side[1].best().total() >= moments.best().total();
+    let sharper = step(&side[2].alone, &side[3].best().clone(), whole);
+    let beats = sharper.stands && step(&side[2].alone, moments.best(), whole).stands;
+    let spot_stands = corrects || beats;
+    let spot = if corrects { &corrected } else { &sharper };
+    // the way to form centroids once there is a reason to
+    let (way, last) = [
+        (Way::Moments, moments),
+        (Way::Unbiased, &side[1]),
+        (Way::Fitted, &side[2]),
+        (Way::Gaussian, &side[3]),
+    ]
+    .into_iter()
+    .filter(|(way, _)| match way {
+        Way::Moments | Way::Gaussian => !spot_stands,
+        Way::Unbiased => spot_stands,
+        Way::Fitted => true,
+    })
+    .max_by(|a, b| a.1.alone.total().total_cmp(&b.1.alone.total()))
+    .unwrap_or((Way::Moments, moments));
     let by_map = if spot_stands { &map[0] } else { last };
     let dark_map = Step {
         stands: claim.stands,
@@ -159,7 +226,7 @@ pub(crate) fn compare(
         rivals,
         dark_map,
         effective_psf,
-        fitted,
+        way,
     })
 }
 
@@ -253,7 +320,7 @@ fn step(with: &Score, without: &Score, whole: f64) -> Step {
         delta_loglik: total,
         p_value,
         explained: (sse(without) - sse(with)) / whole,
-        stands: total > 0.0 && p_value < FAMILY_ALPHA,
+        stands: total > LEAST_GAIN && p_value < FAMILY_ALPHA,
     }
 }
 

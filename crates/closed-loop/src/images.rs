@@ -19,6 +19,7 @@ use window_fit::Pixels;
 mod banded;
 mod coupling;
 mod dark;
+mod gaussian_spot;
 mod geometry;
 mod learn;
 mod map;
@@ -89,6 +90,11 @@ pub(crate) struct Centroids {
     pub(crate) unbiased: Variants,
     /// Positions fitted with the effective spot.
     pub(crate) fitted: Variants,
+    /// Positions fitted with the round Gaussian nearest to it.
+    pub(crate) gaussian: Variants,
+    /// 1 sigma of what is constant for each star, px: what the map takes off moments, and the zeros of
+    /// spots, that are set to them.
+    pub(crate) zero_px: Vec<[f64; 2]>,
     /// Rows that kept the centroid of the table, at most in any variant.
     pub(crate) fallback_rows: usize,
 }
@@ -142,8 +148,10 @@ pub(crate) fn form(data: &StarData, windows: &WindowTable, folds: &Folds) -> Opt
             .collect()
     };
     let (mut learned, bare) = rayon::join(|| learn(true), || learn(false));
-    let with_map = centroids(data, &sample, &learned);
-    let without_map = centroids(data, &sample, &bare);
+    let (with_map, without_map) = rayon::join(
+        || centroids(data, &sample, &learned, &fold),
+        || centroids(data, &sample, &bare, &fold),
+    );
     let all = learned.pop()?;
     let width = |s: &learn::Spot| {
         if s.psi.is_empty() {
@@ -160,38 +168,138 @@ pub(crate) fn form(data: &StarData, windows: &WindowTable, folds: &Folds) -> Opt
     })
 }
 
-/// Centroids of every star row from each of `learned`; rows whose window does not
-/// give all of them keep the centroid of the table.
-fn centroids(data: &StarData, sample: &Sample, learned: &[Learned]) -> Centroids {
-    let table = [data.frames.x_px.clone(), data.frames.y_px.clone()];
+/// Centroids of every star row from each of `learned`, the last of which has seen all frames, the others
+/// those outside their `fold`; rows whose window does not give all of them keep the centroid of the table.
+fn centroids(data: &StarData, sample: &Sample, learned: &[Learned], fold: &[usize]) -> Centroids {
+    let made: Vec<([[Vec<f64>; 2]; 4], usize)> = learned
+        .par_iter()
+        .enumerate()
+        .map(|(k, one)| one_variant(data, sample, one, |frame| fold[frame] != k))
+        .collect();
     let mut out = Centroids::default();
-    for one in learned {
-        let mut pixels = Pixels::default();
-        let mut variant = [table.clone(), table.clone(), table.clone()];
-        let mut fallback = data.t_s.len() - sample.windows();
-        for w in 0..sample.windows() {
-            let formed = one.fitted(sample, w, &mut pixels).and_then(|f| {
-                let m = one.moment(sample, w, &pixels)?;
-                let b = one.moment_bias(sample, w, f, &pixels)?;
-                Some([m, [m[0] - b[0], m[1] - b[1]], f])
-            });
-            let Some(formed) = formed else {
-                fallback += 1;
-                continue;
-            };
-            for (variant, at) in variant.iter_mut().zip(formed) {
-                for axis in 0..2 {
-                    variant[axis][sample.row[w]] = at[axis];
-                }
-            }
-        }
-        let [moments, unbiased, fitted] = variant;
+    for ([moments, unbiased, fitted, gaussian], fallback) in made {
         out.moments.push(moments);
         out.unbiased.push(unbiased);
         out.fitted.push(fitted);
+        out.gaussian.push(gaussian);
         out.fallback_rows = out.fallback_rows.max(fallback);
     }
+    out.zero_px = zeros(data, &[&out.moments, &out.fitted]);
     out
+}
+
+/// Moments, moments less their bias, fits and Gaussian fits of every star row by `one`, that was learned from
+/// the frames `taken`; and how many rows are those of the table.
+///
+/// A spot has no zero of its own: positions found with it are set such that they are, in the mean over a
+/// star, where its first moments are.
+fn one_variant(
+    data: &StarData,
+    sample: &Sample,
+    one: &Learned,
+    taken: impl Fn(usize) -> bool,
+) -> ([[Vec<f64>; 2]; 4], usize) {
+    let table = [data.frames.x_px.clone(), data.frames.y_px.clone()];
+    let mut variants = [(); 4].map(|()| table.clone());
+    let mut fallback = data.t_s.len() - sample.windows();
+    let mut pixels = Pixels::default();
+    let mut formed = Vec::with_capacity(sample.windows());
+    let mut off = vec![[const { Vec::new() }; 6]; sample.stars];
+    for frame in 0..fold_frames(sample) {
+        for w in sample.windows_of(frame) {
+            let found = one.fitted(sample, w, &mut pixels).and_then(|f| {
+                let m = one.moment(sample, w, &pixels)?;
+                let b = one.moment_bias(sample, w, f, &pixels)?;
+                let g = one.by_gaussian(sample, w, &mut pixels)?;
+                Some([m, [m[0] - b[0], m[1] - b[1]], f, g])
+            });
+            if let Some([m, others @ ..]) = found.filter(|_| taken(frame)) {
+                let star = &mut off[sample.star[w]];
+                for (k, at) in others.iter().enumerate() {
+                    for axis in 0..2 {
+                        star[2 * k + axis].push(m[axis] - at[axis]);
+                    }
+                }
+            }
+            formed.push(found);
+        }
+    }
+    let zero: Vec<[f64; 6]> = off
+        .into_iter()
+        .map(|star| star.map(|list| clipped_mean(&list)))
+        .collect();
+    for (w, found) in formed.into_iter().enumerate() {
+        let Some(found) = found else {
+            fallback += 1;
+            continue;
+        };
+        for (k, (variant, at)) in variants.iter_mut().zip(found).enumerate() {
+            for axis in 0..2 {
+                let zero = k
+                    .checked_sub(1)
+                    .map_or(0.0, |k| zero[sample.star[w]][2 * k + axis]);
+                variant[axis][sample.row[w]] = at[axis] + zero;
+            }
+        }
+    }
+    (variants, fallback)
+}
+
+fn fold_frames(sample: &Sample) -> usize {
+    sample.first_window.len() - 1
+}
+
+/// Mean of what lies within five robust sigmas of the median.
+fn clipped_mean(values: &[f64]) -> f64 {
+    let middle = robust_median(values.to_vec()).unwrap_or(0.0);
+    let off = values.iter().map(|v| (v - middle).abs()).collect();
+    let reach = 5.0 * MAD_SCALE * robust_median(off).unwrap_or(0.0);
+    let near = values.iter().filter(|v| (*v - middle).abs() <= reach);
+    let (sum, count) = near.fold((0.0, 0.0), |(s, n), v| (s + v, n + 1.0));
+    if count > 0.0 { sum / count } else { middle }
+}
+
+/// 1 sigma of each star's mean position, px, from its scatter between what was learned outside each fold
+/// (delete-one jackknife), the largest over `kinds`; with few folds each star's own is drawn half way to the
+/// mean over all.
+///
+/// Source: Efron & Stein 1981, Annals of Statistics 9, 586 (jackknife).
+fn zeros(data: &StarData, kinds: &[&Variants]) -> Vec<[f64; 2]> {
+    let stars = data.stars.len();
+    let mut largest = vec![[0.0_f64; 2]; stars];
+    for variants in kinds {
+        // the last has seen all frames
+        let folds = variants.len().saturating_sub(1);
+        if folds < 2 {
+            continue;
+        }
+        let n = folds as f64;
+        let mut variance = vec![[0.0; 2]; stars];
+        for axis in 0..2 {
+            let mut means = vec![vec![0.0; stars]; folds];
+            let mut rows = vec![0.0_f64; stars];
+            for (row, &star) in data.star.iter().enumerate() {
+                rows[star] += 1.0;
+                for (mean, variant) in means.iter_mut().zip(variants.iter()) {
+                    // from the table's: positions on a wide detector lose digits
+                    mean[star] += variant[axis][row] - variants[folds][axis][row];
+                }
+            }
+            for star in 0..stars {
+                let at = |k: usize| means[k][star] / rows[star].max(1.0);
+                let middle = (0..folds).map(at).sum::<f64>() / n;
+                let square: f64 = (0..folds).map(|k| (at(k) - middle).powi(2)).sum();
+                variance[star][axis] = (n - 1.0) / n * square;
+            }
+        }
+        let pooled = variance.as_flattened().iter().sum::<f64>() / (2.0 * stars as f64);
+        for (sigma, own) in largest.iter_mut().zip(&variance) {
+            for axis in 0..2 {
+                sigma[axis] = sigma[axis].max((0.5 * (own[axis] + pooled)).sqrt());
+            }
+        }
+    }
+    largest
 }
 
 /// The windows of the star rows, frame by frame; a row without one has no entry.

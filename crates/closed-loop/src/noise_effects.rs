@@ -95,6 +95,15 @@ impl NoiseEffects {
         Ok(())
     }
 
+    /// Leaves out what was said of the noise's growth with magnitude: of centroids formed in another way
+    /// than the declared ones it is another one.
+    pub(crate) fn without_magnitude(mut self) -> Self {
+        self.effects.retain(|e| e.id != MAGNITUDE);
+        self.entries.retain(|e| e.id != MAGNITUDE);
+        self.considered.retain(|c| c.id != MAGNITUDE);
+        self
+    }
+
     /// Puts what is known of the effects that were not claimed into the list.
     pub(crate) fn tell(&self, considered: &mut [ConsideredEffect]) {
         for known in &self.considered {

@@ -4,6 +4,7 @@
 //! misalignment   dx = J(P) theta                    three angles, prior: declared bias, or free
 //! distortion     dx = sum_jk a_jk (x^j y^k - m_jk)  (j,k) != (0,0), m_jk the mean over the field,
 //!                                                   the same for y; prior N(0, s^2) each
+//! zeros          dx = e, dy = n                     two numbers a star, of centroids formed anew
 //! directions     dx = f/Z-projection of q (e a + n b)   two angles a star, prior: a pixel
 //! ```
 //!
@@ -42,8 +43,13 @@ pub(crate) struct StarNuisance {
     /// attitudes some patterns of directions are rotations but for their second
     /// order; without a bound they run away by tens of pixels on noise alone.
     direction_sigma: f64,
+    /// 1 sigma of what is constant for each star, arcsec; empty for the centroids of the table.
+    zeros: Vec<[f64; 2]>,
     moments: Vec<f64>,
 }
+
+/// 1 sigma of a zero that is as good as known, arcsec.
+const LEAST_ZERO: f64 = 1e-4;
 
 impl StarNuisance {
     /// What `model` declares unknown for `data`.
@@ -67,8 +73,20 @@ impl StarNuisance {
                 0
             },
             direction_sigma: data.camera.arcsec_per_px()[0],
+            zeros: Vec::new(),
             moments,
         }
+    }
+
+    /// The same where what is constant for each star is known to these 1 sigma alone, px; where directions
+    /// are unknown they hold it already.
+    pub(crate) fn with_zeros(mut self, data: &StarData, sigma_px: &[[f64; 2]]) -> Self {
+        if self.directions == 0 {
+            let scale = data.camera.arcsec_per_px();
+            let arcsec = |s: &[f64; 2]| [0, 1].map(|a| (s[a] * scale[a]).max(LEAST_ZERO));
+            self.zeros = sigma_px.iter().map(arcsec).collect();
+        }
+        self
     }
 
     /// Prior precision of each column's amplitude, 1/arcsec^2.
@@ -85,15 +103,16 @@ impl StarNuisance {
         }
         let direction = 1.0 / (self.direction_sigma * self.direction_sigma);
         precision.extend(std::iter::repeat_n(direction, 2 * self.directions));
+        precision.extend(self.zeros.as_flattened().iter().map(|s| 1.0 / (s * s)));
         precision
     }
 
-    /// Columns of the misalignment, polynomials of an axis, columns of the directions.
+    /// Columns of the misalignment, polynomials of an axis, columns of the directions or zeros.
     pub(crate) fn parts(&self) -> (usize, usize, usize) {
         (
             3 * usize::from(self.misalignment.is_some()),
             self.distortion.map_or(0, |_| self.moments.len() - 1),
-            2 * self.directions,
+            2 * self.directions + 2 * self.zeros.len(),
         )
     }
 
@@ -135,6 +154,12 @@ impl StarNuisance {
                         // derivative of (X/Z, Y/Z)
                         out.own[0][(i, column)] = (d.x - v.x / v.z * d.z) / v.z;
                         out.own[1][(i, column)] = (d.y - v.y / v.z * d.z) / v.z;
+                    }
+                }
+                // never beside directions
+                if !self.zeros.is_empty() {
+                    for axis in 0..2 {
+                        out.own[axis][(i, misalignment + 2 * data.star[row] + axis)] = 1.0;
                     }
                 }
             }

@@ -100,18 +100,23 @@ pub(crate) fn run(
         }
         None => None,
     };
-    let anew = |variants: &[[Vec<f64>; 2]]| {
+    let anew = |variants: &[[Vec<f64>; 2]], zero_px: &[[f64; 2]]| {
         let residuals = variants
             .iter()
             .map(|c| data.residual_arcsec(Points { x: &c[0], y: &c[1] }))
             .collect();
-        evidence(&data, situation, residuals, motion)
+        let evidence = evidence(&data, situation, residuals, motion);
+        StarEvidence {
+            nuisance: evidence.nuisance.with_zeros(&data, zero_px),
+            ..evidence
+        }
     };
     let sides = formed.as_ref().map(|f| {
         [&f.without_map, &f.with_map].map(|c| Side {
-            moments: anew(&c.moments),
-            unbiased: anew(&c.unbiased),
-            fitted: anew(&c.fitted),
+            moments: anew(&c.moments, &c.zero_px),
+            unbiased: anew(&c.unbiased, &c.zero_px),
+            fitted: anew(&c.fitted, &c.zero_px),
+            gaussian: anew(&c.gaussian, &c.zero_px),
         })
     });
 
@@ -137,18 +142,10 @@ pub(crate) fn run(
         }
         None => None,
     };
-    let level = match (&sides, &image) {
-        (Some([bare, map]), Some(image)) => {
-            let side = if image.dark_map.stands { map } else { bare };
-            match (image.dark_map.stands, image.effective_psf.stands) {
-                (false, false) => &measured,
-                _ if image.fitted => &side.fitted,
-                (_, true) => &side.unbiased,
-                (_, false) => &side.moments,
-            }
-        }
-        _ => &measured,
-    };
+    let own = image.as_ref().zip(formed.as_ref());
+    let own = own.and_then(|(image, formed)| image.level(formed));
+    let own = own.map(|(variants, zero_px)| anew(variants, &zero_px));
+    let level = own.as_ref().unwrap_or(&measured);
     let candidates = || {
         let mut list = catalogue_candidates(&scene);
         // With raw windows a warm pixel is the dark map's business.
@@ -432,6 +429,9 @@ fn finish(f: &Finish<'_>) -> Result<Closed, CloseError> {
         },
     );
     let mut noise = noise?;
+    if f.image.is_some_and(|(level, _)| level.new_noise()) {
+        noise = noise.without_magnitude();
+    }
     effects.extend(noise.effects.iter().cloned());
     entries.extend(noise.entries.iter().cloned());
     model.effects.extend(entries);

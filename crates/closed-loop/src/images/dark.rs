@@ -195,7 +195,8 @@ fn plane_basis(pixels: &[usize], centre: &[[f64; 2]]) -> Vec<[f64; 3]> {
         .iter()
         .map(|&p| [1.0, centre[p][0], centre[p][1]])
         .collect();
-    let dot = |basis: &[[f64; 3]], a: usize, b: usize| basis.iter().map(|f| f[a] * f[b]).sum::<f64>();
+    let dot =
+        |basis: &[[f64; 3]], a: usize, b: usize| basis.iter().map(|f| f[a] * f[b]).sum::<f64>();
     for a in 0..3 {
         let before = dot(&basis, a, a);
         // twice: positions far from zero lose digits the first time
@@ -208,7 +209,11 @@ fn plane_basis(pixels: &[usize], centre: &[[f64; 2]]) -> Vec<[f64; 3]> {
             }
         }
         let left = dot(&basis, a, a);
-        let unit = if left > 1e-12 * before { 1.0 / left.sqrt() } else { 0.0 };
+        let unit = if left > 1e-12 * before {
+            1.0 / left.sqrt()
+        } else {
+            0.0
+        };
         for f in &mut basis {
             f[a] *= unit;
         }
@@ -286,10 +291,9 @@ mod tests {
             shared.pixel.iter().map(|&p| variance[p]),
         ));
         let own = &beside * known * &beside;
-        for (k, (p, added)) in
-            variance_from_spot(&shared, precision, &variance, &sample.centre)
-                .into_iter()
-                .enumerate()
+        for (k, (p, added)) in variance_from_spot(&shared, precision, &variance, &sample.centre)
+            .into_iter()
+            .enumerate()
         {
             assert_eq!(p, shared.pixel[k]);
             let expected = contrast[(k, k)] - own[(k, k)];
@@ -322,7 +326,14 @@ mod tests {
         for _ in 0..200 {
             // pedestal and slope go into the spot, as in the alternation
             let mut moment = moment.clone();
-            planes.take_off(&mut moment, &dark.precision.iter().map(|h| h.max(1e-9)).collect::<Vec<_>>());
+            planes.take_off(
+                &mut moment,
+                &dark
+                    .precision
+                    .iter()
+                    .map(|h| h.max(1e-9))
+                    .collect::<Vec<_>>(),
+            );
             dark.update(&moment, &weight, &planes);
         }
         let mut quiet = 0.0;
@@ -348,6 +359,10 @@ mod tests {
         assert!(dark.value[2].abs() < 1e-15 && !dark.seen[2]);
         assert!((change - 2.0).abs() < 1e-12);
         // both are as likely quiet as warm: after one step they share the power of 1 + 1/4
-        assert!((dark.variance[2] - 1.25).abs() < 1e-12, "{}", dark.variance[2]);
+        assert!(
+            (dark.variance[2] - 1.25).abs() < 1e-12,
+            "{}",
+            dark.variance[2]
+        );
     }
 }

@@ -17,6 +17,7 @@ use rayon::prelude::*;
 use super::banded::Factor;
 use super::coupling::{self, Coupling};
 use super::dark::{self, Dark};
+use super::gaussian_spot;
 use super::geometry::Geometry;
 use super::moment_level;
 use super::pixel_noise::{self, MIN_READ_VARIANCE};
@@ -64,12 +65,16 @@ pub(crate) struct Spot {
     scale: f64,
     /// What is taken off every pixel for a first moment.
     level: f64,
+    /// Spline coefficients of the Gaussian nearest to it; empty where there is none.
+    gaussian: Vec<f64>,
 }
 
 /// What is learned from some frames.
 #[derive(Clone, Debug)]
 pub(crate) struct Learned {
     pub(crate) grid: Grid,
+    /// That of the Gaussians.
+    finer: Grid,
     pub(crate) spots: Vec<Spot>,
     pub(crate) dark: Dark,
     pub(crate) noise: PixelNoise,
@@ -124,6 +129,7 @@ pub(crate) fn learn(
     };
     let mut learned = Learned {
         grid,
+        finer: gaussian_spot::finer(&grid),
         spots: windows
             .iter()
             .map(|list| first_guess(sample, list, &mut state, &grid))
@@ -142,8 +148,11 @@ pub(crate) fn learn(
         weigh(sample, &windows, &mut state, learned.noise);
         let mapping = mapped && outer >= UNMAPPED;
         let sums = learned.learn_spots_and_dark(sample, &windows, &ordered, &state, mapping);
-        if with_variance && outer == OUTER - 1 {
-            learned.dark_variance = learned.marginal_variance(sample, &sums);
+        if outer == OUTER - 1 {
+            learned.learn_gaussians(&sums);
+            if with_variance {
+                learned.dark_variance = learned.marginal_variance(sample, &sums);
+            }
         }
         let steps = if outer == 0 {
             FIRST_STEPS
@@ -200,6 +209,7 @@ fn first_guess(sample: &Sample, list: &[usize], state: &mut State, grid: &Grid) 
         background_variance: BACKGROUND_VARIANCE,
         scale: 1.0,
         level: background,
+        gaussian: Vec::new(),
     }
 }
 
@@ -296,6 +306,20 @@ impl Learned {
         sums
     }
 
+    /// The Gaussian nearest to each spot.
+    fn learn_gaussians(&mut self, sums: &[(Normal, Coupling)]) {
+        let (grid, finer) = (self.grid, self.finer);
+        self.spots
+            .par_iter_mut()
+            .zip(sums)
+            .filter(|(spot, _)| !spot.psi.is_empty())
+            .for_each(|(spot, (normal, _))| {
+                spot.gaussian = gaussian_spot::nearest(&grid, normal, &spot.psi)
+                    .and_then(|shape| gaussian_spot::coefficients(&finer, shape))
+                    .unwrap_or_default();
+            });
+    }
+
     /// Fits every window; returns the stars' weights in the attitude.
     fn fit_windows(
         &mut self,
@@ -389,12 +413,7 @@ impl Learned {
                     return Vec::new();
                 }
                 let precision = normal.penalised(&self.grid, spot.roughness);
-                dark::variance_from_spot(
-                    coupling,
-                    precision,
-                    &self.dark.variance,
-                    &sample.centre,
-                )
+                dark::variance_from_spot(coupling, precision, &self.dark.variance, &sample.centre)
             })
             .collect();
         let mut variance = self.dark.variance.clone();
@@ -425,17 +444,44 @@ impl Learned {
         w: usize,
         pixels: &mut Pixels,
     ) -> Option<[f64; 2]> {
-        let star = sample.star[w];
-        if self.spots[star].psi.is_empty() {
+        let spot = &self.spots[sample.star[w]];
+        self.by(&self.grid, &spot.psi, sample, w, pixels)
+    }
+
+    /// The same by the Gaussian nearest to the spot.
+    pub(crate) fn by_gaussian(
+        &self,
+        sample: &Sample,
+        w: usize,
+        pixels: &mut Pixels,
+    ) -> Option<[f64; 2]> {
+        let spot = &self.spots[sample.star[w]];
+        self.by(&self.finer, &spot.gaussian, sample, w, pixels)
+    }
+
+    fn by(
+        &self,
+        grid: &Grid,
+        psi: &[f64],
+        sample: &Sample,
+        w: usize,
+        pixels: &mut Pixels,
+    ) -> Option<[f64; 2]> {
+        if psi.is_empty() {
             return None;
         }
+        let star = sample.star[w];
         let start = Fitted {
             at: sample.start[w],
             flux: sample.flux[w],
             background: self.spots[star].background,
             ..Fitted::default()
         };
-        let known = self.known(star, Some(&self.dark.variance));
+        let known = Known {
+            grid,
+            psi,
+            ..self.known(star, Some(&self.dark.variance))
+        };
         window_fit::fit(&known, sample, w, &start, FINAL_STEPS, pixels).map(|f| f.at)
     }
 

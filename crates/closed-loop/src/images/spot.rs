@@ -106,6 +106,20 @@ pub(crate) fn normal(
 }
 
 impl Normal {
+    /// `g^T A h`.
+    pub(crate) fn product(&self, g: &[f64], h: &[f64]) -> f64 {
+        let stride = self.band.width + 1;
+        let mut sum = 0.0;
+        for (row, entries) in self.band.entries.chunks_exact(stride).enumerate() {
+            let reach = stride.min(g.len() - row);
+            sum += entries[0] * g[row] * h[row];
+            for (offset, a) in entries[..reach].iter().enumerate().skip(1) {
+                sum += a * (g[row] * h[row + offset] + g[row + offset] * h[row]);
+            }
+        }
+        sum
+    }
+
     /// A + R/rho + ridge.
     pub(crate) fn penalised(&self, grid: &Grid, rho: f64) -> Banded {
         let mut band = self.band.clone();
