@@ -1,7 +1,7 @@
 //! What each detector pixel adds by itself.
 //!
 //! ```text
-//! D(p) = sum w (z - B - F psi) / (sum w + h_p) - plane,   v(p) = 1/(sum w + h_p)
+//! D(p) = sum w (z - B - F psi) / (sum w + h_p) - level,   v(p) = 1/(sum w + h_p)
 //! h_p = sum_k r_kp / tau_k^2,   r_kp ~ n_k tau_k^-1 exp(-(D^2 + v)/(2 tau_k^2)),   k: quiet or warm
 //! tau_k^2 = sum_p r_kp (D^2 + v) / sum_p r_kp,   n_k = mean of r_kp     over the pixels seen
 //! ```
@@ -11,21 +11,21 @@
 //! quiet ones to zero and leave the warm ones alone. Where all pixels are warm both
 //! are wide, and nothing is drawn anywhere.
 //!
-//! The plane, fitted with the weights h to a group of pixels that share stars, has no size of its own: a
-//! uniform level is a pedestal of the spots or a background as well, and a slope
-//! `g p = g (p - s) + g s` is a slope of the spot, and a background that follows the star. Left
-//! free they wander off, and every first moment that is freed from the map with them.
+//! The level, the mean with the weights h of a group of pixels that share stars, has no size of its own: a
+//! uniform level is a pedestal of the spots or a background as well, and left free it wanders off. A slope
+//! `g p = g (p - s) + g s` is nearly one: a slope of the spot, and a background that follows the star. What
+//! is known of pixels and of backgrounds decides on it.
 //! That no pixel is negative is for the finished map.
 //!
 //! v is the variance with the spots known. They are not: a pixel that a spot sweeps over shares its signal
 //! with the spot's shape, and the marginal variance is
 //!
 //! ```text
-//! var(D(p) - plane) = v(p) + sum_i u_ip^T M_i^-1 u_ip,   u_ip = v(p) c_ip - plane_p of v c_i
+//! var(D(p) - mean D) = v(p) + sum_i u_ip^T M_i^-1 u_ip,   u_ip = v(p) c_ip - mean_p v c_i
 //! M_i = Q_i - sum_p v(p) c_ip c_ip^T,       c_ip = sum over the windows of star i on p of  w F taps
 //! ```
 //!
-//! with `Q_i` the spot's own precision and planes over the pixels that star i covers. Units: those of the
+//! with `Q_i` the spot's own precision and means over the pixels that star i covers. Units: those of the
 //! scaled windows.
 //!
 //! Source: linear least squares with blocks eliminated (Schur complement); Dempster,
@@ -33,7 +33,7 @@
 
 use super::banded::Banded;
 use super::coupling::Coupling;
-use super::sample::Planes;
+use super::sample::take_off_level;
 
 /// A dark map under construction.
 #[derive(Clone, Debug)]
@@ -65,9 +65,9 @@ impl Dark {
         }
     }
 
-    /// The next map from `sum w (z - B - F psi)` and `sum w` of every pixel, in groups that `planes` knows;
+    /// The next map from `sum w (z - B - F psi)` and `sum w` of every pixel, of groups `group`;
     /// returns the largest change in units of sqrt(v).
-    pub(crate) fn update(&mut self, moment: &[f64], weight: &[f64], planes: &Planes) -> f64 {
+    pub(crate) fn update(&mut self, moment: &[f64], weight: &[f64], group: &[usize]) -> f64 {
         let mut next = vec![0.0; self.value.len()];
         for p in 0..next.len() {
             self.seen[p] = weight[p] > 0.0;
@@ -86,7 +86,7 @@ impl Dark {
                 false => 0.0,
             })
             .collect();
-        planes.take_off(&mut next, &sure);
+        take_off_level(&mut next, group, &sure);
         let mut change = 0.0_f64;
         for p in (0..next.len()).filter(|&p| self.seen[p]) {
             change = change.max((next[p] - self.value[p]).abs() / self.variance[p].sqrt());
@@ -139,13 +139,12 @@ impl Dark {
 }
 
 /// What the uncertainty of one star's spot adds to the variance of each pixel
-/// against the plane through those that the star covers. `precision` is Q of the spot,
-/// `variance` v and `centre` the place by pixel.
+/// against the mean of those that the star covers. `precision` is Q of the spot,
+/// `variance` v by pixel.
 pub(crate) fn variance_from_spot(
     coupling: &Coupling,
     mut precision: Banded,
     variance: &[f64],
-    centre: &[[f64; 2]],
 ) -> Vec<(usize, f64)> {
     let order = precision.order;
     let mut matrix = Banded::zeros(order, order - 1);
@@ -154,16 +153,13 @@ pub(crate) fn variance_from_spot(
             *matrix.at(row, offset) = *precision.at(row, offset);
         }
     }
-    let basis = plane_basis(&coupling.pixel, centre);
-    // v c along each of the basis
-    let mut planes = vec![[0.0; 3]; order];
+    let mut mean = vec![0.0; order];
+    let pixels = coupling.pixel.len();
     for (k, &p) in coupling.pixel.iter().enumerate() {
         let (index, value) = coupling.row(k);
         for (n, (&i, vi)) in index.iter().zip(value).enumerate() {
             let c = variance[p] * vi;
-            for (plane, b) in planes[i].iter_mut().zip(&basis[k]) {
-                *plane += b * c;
-            }
+            mean[i] += c / pixels as f64;
             for (&j, vj) in index[n..].iter().zip(&value[n..]) {
                 *matrix.at(i, j - i) -= c * vj;
             }
@@ -173,11 +169,11 @@ pub(crate) fn variance_from_spot(
         return Vec::new();
     };
     let mut u = vec![0.0; order];
-    (0..coupling.pixel.len())
+    (0..pixels)
         .map(|k| {
             let p = coupling.pixel[k];
-            for (u, plane) in u.iter_mut().zip(&planes) {
-                *u = -plane.iter().zip(&basis[k]).map(|(a, b)| a * b).sum::<f64>();
+            for (u, m) in u.iter_mut().zip(&mean) {
+                *u = -m;
             }
             let (index, value) = coupling.row(k);
             for (&j, v) in index.iter().zip(value) {
@@ -186,39 +182,6 @@ pub(crate) fn variance_from_spot(
             (p, factor.quadratic(&mut u))
         })
         .collect()
-}
-
-/// Orthonormal functions that span the planes over some pixels, `[function]` by pixel; those that the pixels
-/// do not tell from the others are zero.
-fn plane_basis(pixels: &[usize], centre: &[[f64; 2]]) -> Vec<[f64; 3]> {
-    let mut basis: Vec<[f64; 3]> = pixels
-        .iter()
-        .map(|&p| [1.0, centre[p][0], centre[p][1]])
-        .collect();
-    let dot =
-        |basis: &[[f64; 3]], a: usize, b: usize| basis.iter().map(|f| f[a] * f[b]).sum::<f64>();
-    for a in 0..3 {
-        let before = dot(&basis, a, a);
-        // twice: positions far from zero lose digits the first time
-        for _ in 0..2 {
-            for b in 0..a {
-                let share = dot(&basis, a, b);
-                for f in &mut basis {
-                    f[a] -= share * f[b];
-                }
-            }
-        }
-        let left = dot(&basis, a, a);
-        let unit = if left > 1e-12 * before {
-            1.0 / left.sqrt()
-        } else {
-            0.0
-        };
-        for f in &mut basis {
-            f[a] *= unit;
-        }
-    }
-    basis
 }
 
 #[cfg(test)]
@@ -278,27 +241,20 @@ mod tests {
         let covariance = covariance
             .view((order, order), (pixels, pixels))
             .into_owned();
-        // what is left of each pixel beside the plane through all, by the normal equations
-        let planes = DMatrix::from_fn(pixels, 3, |k, j| {
-            let [x, y] = sample.centre[shared.pixel[k]];
-            [1.0, x, y][j]
-        });
-        let inverse = (planes.transpose() * &planes).try_inverse().unwrap();
-        let beside = DMatrix::identity(pixels, pixels) - &planes * inverse * planes.transpose();
-        let contrast = &beside * covariance * &beside;
-        let known = DMatrix::from_diagonal(&nalgebra::DVector::from_iterator(
-            pixels,
-            shared.pixel.iter().map(|&p| variance[p]),
-        ));
-        let own = &beside * known * &beside;
-        for (k, (p, added)) in variance_from_spot(&shared, precision, &variance, &sample.centre)
+        let all = pixels as f64;
+        for (k, (p, added)) in variance_from_spot(&shared, precision, &variance)
             .into_iter()
             .enumerate()
         {
             assert_eq!(p, shared.pixel[k]);
-            let expected = contrast[(k, k)] - own[(k, k)];
+            let contrast = covariance[(k, k)] - 2.0 * covariance.column(k).sum() / all
+                + covariance.sum() / (all * all);
+            // v of a pixel against the mean of the others, which the module leaves out
+            let own = variance[p] * (1.0 - 2.0 / all)
+                + shared.pixel.iter().map(|&q| variance[q]).sum::<f64>() / (all * all);
+            let expected = contrast - own;
             assert!(
-                (added - expected).abs() < 1e-6 * contrast[(k, k)],
+                (added - expected).abs() < 1e-6 * contrast,
                 "{added} {expected}"
             );
         }
@@ -306,38 +262,23 @@ mod tests {
 
     /// Of 400 pixels 20 are warm by 30 and all are known to 1: the noise of the quiet ones is drawn to
     /// zero (to less than half; it would be 1), the warm ones keep their size to their own noise and a
-    /// shrinkage of 1/30^2; and a slope of what is given goes.
+    /// shrinkage of 1/30^2; and a level goes.
     #[test]
     fn quiet_pixels_are_drawn_to_zero_and_warm_ones_are_not() {
-        let mut rng = star_tracker::stream(3, 0, star_tracker::Purpose::Noise);
-        let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
-        let side = 20;
-        let centre: Vec<[f64; 2]> = (0..side * side)
-            .map(|p| [(p % side) as f64, (p / side) as f64])
-            .collect();
-        let planes = Planes::new(&vec![0; centre.len()], &centre);
+        let mut rng = star_tracker::stream(3, 0, star_tracker::Purpose::TemporalNoise);
         let truth = |p: usize| if p % 20 == 7 { 30.0 } else { 0.0 };
-        let noise: Vec<f64> = centre.iter().map(|_| normal()).collect();
-        let weight = vec![1.0; centre.len()];
-        let moment: Vec<f64> = (0..centre.len())
-            .map(|p| truth(p) + noise[p] + 5.0 + 0.7 * centre[p][0] - 0.4 * centre[p][1])
-            .collect();
-        let mut dark = Dark::none(centre.len());
+        let noise: Vec<f64> = (0..400).map(|_| StandardNormal.sample(&mut rng)).collect();
+        let (weight, group) = (vec![1.0; 400], vec![0; 400]);
+        let mut dark = Dark::none(400);
         for _ in 0..200 {
-            // pedestal and slope go into the spot, as in the alternation
-            let mut moment = moment.clone();
-            planes.take_off(
-                &mut moment,
-                &dark
-                    .precision
-                    .iter()
-                    .map(|h| h.max(1e-9))
-                    .collect::<Vec<_>>(),
-            );
-            dark.update(&moment, &weight, &planes);
+            // a pedestal goes into the spot, as in the alternation
+            let mut moment: Vec<f64> = (0..400).map(|p| truth(p) + noise[p] + 5.0).collect();
+            let sure: Vec<f64> = dark.precision.iter().map(|h| h.max(1e-9)).collect();
+            take_off_level(&mut moment, &group, &sure);
+            dark.update(&moment, &weight, &group);
         }
         let mut quiet = 0.0;
-        for p in 0..centre.len() {
+        for p in 0..400 {
             if truth(p) > 0.0 {
                 let off = dark.value[p] - truth(p);
                 assert!((off - noise[p]).abs() < 0.5, "{off} {}", noise[p]);
@@ -353,16 +294,13 @@ mod tests {
     #[test]
     fn unseen_pixels_get_the_level_and_the_spread() {
         let mut dark = Dark::none(3);
-        let planes = Planes::new(&[0, 0, 0], &[[5.0, 5.0]; 3]);
-        let change = dark.update(&[12.0, 4.0, 0.0], &[4.0, 4.0, 0.0], &planes);
+        let change = dark.update(&[12.0, 4.0, 0.0], &[4.0, 4.0, 0.0], &[0, 0, 0]);
         assert!((dark.value[0] - 1.0).abs() < 1e-12 && (dark.value[1] + 1.0).abs() < 1e-12);
         assert!(dark.value[2].abs() < 1e-15 && !dark.seen[2]);
         assert!((change - 2.0).abs() < 1e-12);
-        // both are as likely quiet as warm: after one step they share the power of 1 + 1/4
-        assert!(
-            (dark.variance[2] - 1.25).abs() < 1e-12,
-            "{}",
-            dark.variance[2]
-        );
+        // all power 1 + 1/4 and quiet ones a tenth of it to begin with: 1/(1 + sqrt(10) exp(-4.5)) are warm, and
+        // no kind is ever rarer than one pixel
+        let warm = 1.0 / (1.0 + 10_f64.sqrt() * (-4.5_f64).exp());
+        assert!((dark.variance[2] - 1.25 * (warm + 1.0 / 3.0)).abs() < 1e-12);
     }
 }

@@ -21,7 +21,7 @@ use super::gaussian_spot;
 use super::geometry::Geometry;
 use super::moment_level;
 use super::pixel_noise::{self, MIN_READ_VARIANCE};
-use super::sample::{Planes, Sample};
+use super::sample::Sample;
 use super::spline::Grid;
 use super::spot::{self, Normal};
 use super::window_fit::{self, Fitted, Known, PixelNoise, Pixels};
@@ -30,10 +30,6 @@ use super::{MAD_SCALE, robust_median};
 /// Rounds of everything: with half as many the table's centroids, moved by the very
 /// pixels that are sought, still show in the map at twice its error.
 const OUTER: usize = 12;
-/// Rounds before the map is learned. A star that moves along a line trades anything that does not change along
-/// that line between its spot and the map, and only the map's prior sends it back, slowly: what is the spot's
-/// must not get into the map in the first place.
-const UNMAPPED: usize = 2;
 /// Most rounds of spots and map at fixed positions, and the change of the map in
 /// its own sigmas that ends them.
 const INNER: usize = 60;
@@ -43,10 +39,13 @@ const STANDS_STILL: f64 = 0.01;
 const FIRST_STEPS: usize = 4;
 const LEARNING_STEPS: usize = 2;
 const FINAL_STEPS: usize = 16;
-/// Starting values in the scaled unit, each far on the side of knowing nothing:
-/// variance of backgrounds, and variance of the second differences of a spot.
+/// Starting values in the scaled unit: variance of backgrounds, far on the side of knowing nothing, and variance
+/// of the second differences of a spot, that of a sharp one. A star that moves along a line trades anything
+/// that does not change along that line between its spot and the map, and only the map's prior sends it back,
+/// slowly: a spot that is too smooth at first leaves what it lacks in the map. One that follows everything takes
+/// from a map of many warm pixels.
 const BACKGROUND_VARIANCE: f64 = 1e4;
-const ROUGHNESS: f64 = 1e-2;
+const ROUGHNESS: f64 = 1e-5;
 /// A star's weight in the attitude over the median star's.
 const MAX_WEIGHT: f64 = 3.0;
 /// Fewest windows to learn a spot from.
@@ -146,12 +145,11 @@ pub(crate) fn learn(
     for outer in 0..OUTER {
         place(sample, taken, &mut state, &star_weight, length_px);
         weigh(sample, &windows, &mut state, learned.noise);
-        let mapping = mapped && outer >= UNMAPPED;
-        let sums = learned.learn_spots_and_dark(sample, &windows, &ordered, &state, mapping);
+        let sums = learned.learn_spots_and_dark(sample, &windows, &ordered, &state, mapped);
         if outer == OUTER - 1 {
             learned.learn_gaussians(&sums);
             if with_variance {
-                learned.dark_variance = learned.marginal_variance(sample, &sums);
+                learned.dark_variance = learned.marginal_variance(&sums);
             }
         }
         let steps = if outer == 0 {
@@ -278,7 +276,6 @@ impl Learned {
             .collect();
         let mut moment = vec![0.0; sample.centre.len()];
         let mut total = vec![0.0; sample.centre.len()];
-        let planes = Planes::new(&sample.group, &sample.centre);
         for _ in 0..INNER {
             moment.fill(0.0);
             total.fill(0.0);
@@ -291,7 +288,7 @@ impl Learned {
                 factor.solve(&mut spot.psi);
                 coupling.tell_pixels(&spot.psi, &mut moment, &mut total);
             }
-            if !mapped || self.dark.update(&moment, &total, &planes) < STANDS_STILL {
+            if !mapped || self.dark.update(&moment, &total, &sample.group) < STANDS_STILL {
                 break;
             }
         }
@@ -403,7 +400,7 @@ impl Learned {
     }
 
     /// Variance of the map, uncertainty of the spots included.
-    fn marginal_variance(&self, sample: &Sample, sums: &[(Normal, Coupling)]) -> Vec<f64> {
+    fn marginal_variance(&self, sums: &[(Normal, Coupling)]) -> Vec<f64> {
         let added: Vec<Vec<(usize, f64)>> = self
             .spots
             .par_iter()
@@ -413,7 +410,7 @@ impl Learned {
                     return Vec::new();
                 }
                 let precision = normal.penalised(&self.grid, spot.roughness);
-                dark::variance_from_spot(coupling, precision, &self.dark.variance, &sample.centre)
+                dark::variance_from_spot(coupling, precision, &self.dark.variance)
             })
             .collect();
         let mut variance = self.dark.variance.clone();

@@ -14,8 +14,6 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::{Matrix3, Vector3};
-
 use super::robust_median;
 
 /// Median flux of a window after scaling.
@@ -325,58 +323,17 @@ pub(crate) fn mean(values: Vec<f64>) -> Option<f64> {
     (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
 }
 
-/// Planes through the values of groups of pixels.
-#[derive(Clone, Debug)]
-pub(crate) struct Planes {
-    group: Vec<usize>,
-    /// Place of each pixel from the middle of its group, px.
-    place: Vec<[f64; 2]>,
-    groups: usize,
-}
-
-impl Planes {
-    pub(crate) fn new(group: &[usize], centre: &[[f64; 2]]) -> Self {
-        let groups = group.iter().max().map_or(0, |g| g + 1);
-        let mut middle = vec![[0.0; 3]; groups];
-        for (&g, c) in group.iter().zip(centre) {
-            let m = &mut middle[g];
-            *m = [m[0] + c[0], m[1] + c[1], m[2] + 1.0];
-        }
-        let place = group
-            .iter()
-            .zip(centre)
-            .map(|(&g, c)| [0, 1].map(|a| c[a] - middle[g][a] / middle[g][2]))
-            .collect();
-        Self {
-            group: group.to_vec(),
-            place,
-            groups,
-        }
+/// Takes the weighted mean of its group off every value.
+pub(crate) fn take_off_level(values: &mut [f64], group: &[usize], weights: &[f64]) {
+    let groups = group.iter().max().map_or(0, |g| g + 1);
+    let mut sums = vec![[0.0; 2]; groups];
+    for ((v, w), &g) in values.iter().zip(weights).zip(group) {
+        sums[g] = [sums[g][0] + w * v, sums[g][1] + w];
     }
-
-    /// Takes the plane that fits best with these weights off the values of each group; where pixels in a
-    /// row cannot tell a slope, the level alone.
-    pub(crate) fn take_off(&self, values: &mut [f64], weights: &[f64]) {
-        let mut sums = vec![(Matrix3::<f64>::zeros(), Vector3::<f64>::zeros()); self.groups];
-        let row = |p: usize| Vector3::new(1.0, self.place[p][0], self.place[p][1]);
-        for p in 0..values.len() {
-            let (normal, moment) = &mut sums[self.group[p]];
-            *normal += weights[p] * row(p) * row(p).transpose();
-            *moment += weights[p] * values[p] * row(p);
-        }
-        let planes: Vec<Vector3<f64>> = sums
-            .into_iter()
-            .map(|(mut normal, moment)| {
-                let ridge = 1e-9 * normal[(0, 0)].max(f64::MIN_POSITIVE);
-                normal[(1, 1)] += ridge;
-                normal[(2, 2)] += ridge;
-                normal
-                    .cholesky()
-                    .map_or(Vector3::zeros(), |factor| factor.solve(&moment))
-            })
-            .collect();
-        for (p, value) in values.iter_mut().enumerate() {
-            *value -= planes[self.group[p]].dot(&row(p));
+    for (v, &g) in values.iter_mut().zip(group) {
+        let [sum, weight] = sums[g];
+        if weight > 0.0 {
+            *v -= sum / weight;
         }
     }
 }

@@ -379,14 +379,15 @@ fn little_or_foreign_data_is_no_failure() {
                 .iter()
                 .all(|p| p.dn.is_finite() && p.sigma_dn > 0.0)
         );
-        // a spot that never moves over its pixels cannot be told from them
+        // a spot that never moves over its pixels cannot be told from them, but for what the others say of
+        // how warm pixels are
         let error = formed
             .map
             .pixels
             .iter()
             .map(|p| p.sigma_dn)
             .fold(0.0, f64::max);
-        assert!(error > 1.0, "{error}");
+        assert!(error > 0.2, "{error}");
     }
     let few = Scenario {
         frames: 12,
