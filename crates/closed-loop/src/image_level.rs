@@ -7,7 +7,8 @@
 //! is tried on all of them. Out of fold, block by block:
 //!
 //! - the map is claimed if the best account with it beats the best without it:
-//!   anything else that the windows allow may stand in for it;
+//!   anything else that the windows allow may stand in for it; or if it frees first moments of more than the spot
+//!   and pixel phase do, and no account is the worse for it;
 //! - the spot is claimed if first moments corrected by it beat first moments as they
 //!   are, and as well as any function of pixel phase does; or if its positions beat both first moments
 //!   and those of the Gaussian, a function of pixel phase beside them or not. That a fitted spot has less
@@ -166,11 +167,23 @@ pub(crate) fn compare(
             .max_by(better)
             .unwrap_or_else(|| measured.alone.clone())
     };
-    let claim = step(
-        &best(&[&map[0], &map[2], &map[3]]),
-        &best(&[&measured, &bare[0], &bare[2], &bare[3]]),
+    let (with, without) = (
+        best(&[&map[0], &map[2], &map[3]]),
+        best(&[&measured, &bare[0], &bare[2], &bare[3]]),
+    );
+    let predicts = step(&with, &without, whole);
+    // What the tracker sent are moments: pixels at the rim move them that no fitted spot feels.
+    let frees = step(
+        map[0].best(),
+        &best(&[&measured, &bare[0], &bare[1]]),
         whole,
     );
+    let harmless = with.total() > without.total() - LEAST_GAIN;
+    let claim = if !predicts.stands && frees.stands && harmless {
+        frees
+    } else {
+        predicts
+    };
     // Without a map, plain moments are those of the table or those formed anew.
     let plain = if bare[0].alone.total() > measured.alone.total() {
         &bare[0]
