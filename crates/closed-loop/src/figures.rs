@@ -217,26 +217,34 @@ fn consider(found: &Found, id: &str, excess: f64) -> ConsideredEffect {
     entry
 }
 
-/// What the leftover follows, among the empirical terms that were judged beside
-/// the chosen effects. `left` is the share of the before variance that is left.
-pub(crate) fn unattributed(found: &Found, left: f64) -> Unattributed {
-    let chosen = &found.selection.chosen;
-    let set = columns_of(&found.fitted.groups, chosen);
-    let base = found
-        .fitted
-        .fits
-        .out_of_fold(&set)
-        .map_or(0.0, |o| o.total_sse());
+/// What the leftover follows, among the empirical terms beside the chosen effects, each by
+/// the most certain of its `leading` parts. `left` is the share of the before variance
+/// that is left.
+pub(crate) fn unattributed(found: &Found, leading: &[usize], left: f64) -> Unattributed {
+    let fits = &found.fitted.fits;
+    let set = columns_of(&found.fitted.groups, &found.selection.chosen);
+    let base = fits.out_of_fold(&set).map_or(0.0, |o| o.total_sse());
+    let judge = |part: &[usize], parts: usize| -> Option<(f64, f64)> {
+        let mut with = set.clone();
+        with.extend(part);
+        let which: Vec<usize> = (set.len()..with.len()).collect();
+        let sse = fits.out_of_fold(&with)?.total_sse();
+        let p = fits.estimate(&with)?.p_value(&which);
+        let tried = parts * found.candidates.len();
+        let share = if base > 0.0 { 1.0 - sse / base } else { 0.0 };
+        Some(((p * tried as f64).min(1.0), share))
+    };
     let mut depends_on: Vec<Dependence> = (0..found.candidates.len())
         .filter(|&g| found.candidates[g].id() == EMPIRICAL && found.selection.judged[g].observable)
         .filter_map(|g| {
-            let mut with = set.clone();
-            with.extend(&found.fitted.groups[g].columns);
-            let sse = found.fitted.fits.out_of_fold(&with)?.total_sse();
+            let parts = found.parts(g, leading);
+            let count = parts.len();
+            let judged = parts.into_iter().filter_map(|part| judge(part, count));
+            let (p_value, variance_explained) = judged.min_by(|a, b| a.0.total_cmp(&b.0))?;
             Some(Dependence {
                 variable: found.candidates[g].selectors().get("variable")?.clone(),
-                variance_explained: if base > 0.0 { 1.0 - sse / base } else { 0.0 },
-                p_value: found.selection.judged[g].p_value,
+                variance_explained,
+                p_value,
             })
         })
         .collect();

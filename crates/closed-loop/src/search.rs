@@ -27,6 +27,8 @@ const CREDIBLE: f64 = 20.0;
 /// Values of a non-linear parameter tried at once, and how often the scan shrinks.
 const SCAN: usize = 9;
 const SCAN_ROUNDS: usize = 3;
+/// Columns of the longest term whose columns have an order.
+const MOST_ORDERED: usize = 12;
 /// Rounds of selection and polish; the choice settles in two or three.
 const ROUNDS: usize = 4;
 
@@ -165,6 +167,26 @@ impl Found {
             only.candidates.push(self.candidates[g].as_ref());
         }
         only
+    }
+}
+
+/// Leading columns by which a term of one variable is judged, beside all of them: a
+/// straight line, before what bends.
+pub(crate) const LEADING: [usize; 2] = [2, 4];
+
+impl Found {
+    /// Leading parts of the columns of `term`, shortest first; all of them last. What has
+    /// no order (one shift a star) is one whole.
+    pub(crate) fn parts(&self, term: usize, leading: &[usize]) -> Vec<&[usize]> {
+        let columns = &self.fitted.groups[term].columns[..];
+        let whole = self.candidates[term].coefficients().len() == columns.len();
+        let ordered = whole && columns.len() <= MOST_ORDERED;
+        leading
+            .iter()
+            .filter(|&&n| ordered && n < columns.len())
+            .map(|&n| &columns[..n])
+            .chain(std::iter::once(columns))
+            .collect()
     }
 }
 

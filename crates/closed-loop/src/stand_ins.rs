@@ -17,7 +17,7 @@
 //! Source: Schwarz 1978 for the price of a parameter.
 
 use crate::empirical::EMPIRICAL;
-use crate::search::Found;
+use crate::search::{Found, LEADING};
 use crate::selection::{FAMILY_ALPHA, columns_of, price};
 
 /// Nats by which a term must be worth more.
@@ -27,13 +27,14 @@ const BY_FAR: f64 = 8.0;
 pub(crate) fn stand_ins(found: &Found) -> Vec<usize> {
     let (groups, fits) = (&found.fitted.groups, &found.fitted.fits);
     let chosen = &found.selection.chosen;
-    let loglik = |set: &[usize]| Some(fits.out_of_fold(&columns_of(groups, set))?.total_loglik());
+    let each = 0.5 * found.fitted.scalars.max(2.0).ln();
     let terms: Vec<usize> = (0..groups.len())
         .filter(|&g| found.candidates[g].id() == EMPIRICAL && !groups[g].columns.is_empty())
         .collect();
-    let Some(all) = loglik(chosen) else {
+    let Some(all) = fits.out_of_fold(&columns_of(groups, chosen)) else {
         return Vec::new();
     };
+    let all = all.total_loglik();
     let mut most = (BY_FAR, Vec::new());
     for set in sets(found) {
         let rest: Vec<usize> = chosen
@@ -46,21 +47,23 @@ pub(crate) fn stand_ins(found: &Found) -> Vec<usize> {
             .map(|&g| price(&groups[g], found.fitted.scalars))
             .sum();
         for &term in &terms {
-            let mut with = rest.clone();
-            with.push(term);
-            let Some(instead) = loglik(&with) else {
-                continue;
-            };
-            let more = instead - price(&groups[term], found.fitted.scalars) - (all - paid);
-            let columns = columns_of(groups, &with);
-            let own = columns.len() - groups[term].columns.len();
-            let certain = || {
-                let which: Vec<usize> = (own..columns.len()).collect();
-                fits.estimate(&columns)
-                    .is_some_and(|e| e.p_value(&which) * (terms.len() as f64) < FAMILY_ALPHA)
-            };
-            if more > most.0 && certain() {
-                most = (more, set.clone());
+            for part in found.parts(term, &LEADING) {
+                let mut with = columns_of(groups, &rest);
+                let own = with.len();
+                with.extend(part);
+                let Some(instead) = fits.out_of_fold(&with) else {
+                    continue;
+                };
+                let more = instead.total_loglik() - each * part.len() as f64 - (all - paid);
+                let certain = || {
+                    let which: Vec<usize> = (own..with.len()).collect();
+                    let tried = (terms.len() * (LEADING.len() + 1)) as f64;
+                    fits.estimate(&with)
+                        .is_some_and(|e| e.p_value(&which) * tried < FAMILY_ALPHA)
+                };
+                if more > most.0 && certain() {
+                    most = (more, set.clone());
+                }
             }
         }
     }

@@ -34,7 +34,7 @@ use crate::motion::{self, Around};
 use crate::noise_effects;
 use crate::nuisance::StarNuisance;
 use crate::reference_wander::{self, REFERENCE_ERROR};
-use crate::search::{Found, amplitudes, fit};
+use crate::search::{Found, LEADING, amplitudes, fit};
 use crate::selection::columns_of;
 use crate::situation::Situation;
 use crate::star_data::{Inputs, Star, StarData, median_step};
@@ -383,7 +383,7 @@ fn finish(f: &Finish<'_>) -> Result<Closed, CloseError> {
     }
     let surroundings = f.situation.surroundings();
     // what is left is judged before a term without a cause is added
-    let mut unattributed = figures::unattributed(f.found, last / whole);
+    let mut unattributed = figures::unattributed(f.found, &LEADING, last / whole);
     let questions = f.situation.questions;
     let mut added = chosen.clone();
     if questions.empirical
