@@ -16,6 +16,9 @@
 //!
 //! Source: the partitioned normal equations of bundle adjustment (Brown 1958).
 
+#[cfg(test)]
+mod tests;
+
 use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
