@@ -6,3 +6,4 @@ mod kit;
 mod noise;
 mod nulls;
 mod power;
+mod unknown;
