@@ -83,12 +83,12 @@ fn data(single: bool) -> StarData {
         frames.begin(t);
         let stars = if k % 7 == 3 { 4 } else { 5 };
         for s in 0..stars {
-            let angle = 1.3 * s as f64;
+            let angle = 1.3 * f64::from(s);
             frames.push(
-                i32::try_from(s).unwrap(),
-                i64::try_from(s).unwrap() + 10,
-                (90.0 + 70.0 * s as f64) * angle.cos() + 0.8 * t,
-                (90.0 + 70.0 * s as f64) * angle.sin() - 1.1 * t,
+                s,
+                i64::from(s) + 10,
+                (90.0 + 70.0 * f64::from(s)) * angle.cos() + 0.8 * t,
+                (90.0 + 70.0 * f64::from(s)) * angle.sin() - 1.1 * t,
             );
         }
     }

@@ -5,8 +5,11 @@ use telemetry::report::{Report, Verdict};
 
 use crate::kit::{Case, Path, closed};
 
+/// Magnitude and colour of a star to the variable that it is moved by.
+type Of = fn(&[f64; 2]) -> f64;
+
 /// Moves every star along x by `size_px` times its `of` (magnitude, colour), -1 to 1.
-fn shifted(bundle: &mut Bundle, size_px: f64, of: fn(&[f64; 2]) -> f64) {
+fn shifted(bundle: &mut Bundle, size_px: f64, of: Of) {
     let catalog = bundle.catalog.as_ref().expect("a catalogue").clone();
     let value = |id: i64| {
         let at = catalog.index_of(id).expect("a known star");
@@ -25,7 +28,7 @@ fn shifted(bundle: &mut Bundle, size_px: f64, of: fn(&[f64; 2]) -> f64) {
     }
 }
 
-fn closes(seed: u64, size_px: f64, of: fn(&[f64; 2]) -> f64) -> Report {
+fn closes(seed: u64, size_px: f64, of: Of) -> Report {
     let case = Case {
         duration_s: 900.0,
         ..Case::new(Path::Slews, 300 + seed)
@@ -40,7 +43,7 @@ fn closes(seed: u64, size_px: f64, of: fn(&[f64; 2]) -> f64) -> Report {
 /// misplaced in the catalogue.
 #[test]
 fn a_slope_is_not_a_pile_of_stars() {
-    let variables: [(&str, fn(&[f64; 2]) -> f64); 2] = [("mag", |v| v[0]), ("colour", |v| v[1])];
+    let variables: [(&str, Of); 2] = [("mag", |v| v[0]), ("colour", |v| v[1])];
     for (seed, (name, of)) in variables.into_iter().enumerate() {
         let report = closes(seed as u64, 0.057, of);
         let ids: Vec<&str> = report.effects.iter().map(|e| e.id.as_str()).collect();
