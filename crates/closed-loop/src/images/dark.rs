@@ -100,6 +100,15 @@ impl Dark {
         change
     }
 
+    /// How much of a pixel's value is the data's, 0 to 1; the rest draws it to zero.
+    pub(crate) fn share_of_data(&self, p: usize) -> f64 {
+        if self.seen[p] {
+            1.0 - self.precision[p] * self.variance[p]
+        } else {
+            0.0
+        }
+    }
+
     /// One step for the kinds of pixels and what is known of each; returns the variance of a pixel of which
     /// nothing is.
     fn learn_kinds(&mut self, value: &[f64]) -> f64 {

@@ -48,6 +48,9 @@ const BACKGROUND_VARIANCE: f64 = 1e4;
 const ROUGHNESS: f64 = 1e-5;
 /// A star's weight in the attitude over the median star's.
 const MAX_WEIGHT: f64 = 3.0;
+/// What is known of any pixel beforehand over what the data say of it with the spots known: an error of 100
+/// times the noise says that nothing is known, and the equations stay definite.
+const LEAST_KNOWN: f64 = 1e-4;
 /// Fewest windows to learn a spot from.
 const MIN_WINDOWS: usize = 10;
 /// Residuals that the noise is judged by.
@@ -149,7 +152,7 @@ pub(crate) fn learn(
         if outer == OUTER - 1 {
             learned.learn_gaussians(&sums);
             if with_variance {
-                learned.dark_variance = learned.marginal_variance(&sums);
+                learned.dark_variance = learned.free_variance(sample, &sums);
             }
         }
         let steps = if outer == 0 {
@@ -399,8 +402,29 @@ impl Learned {
         }
     }
 
-    /// Variance of the map, uncertainty of the spots included.
-    fn marginal_variance(&self, sums: &[(Normal, Coupling)]) -> Vec<f64> {
+    /// Variance of the map if nothing is known of pixels beforehand, uncertainty of the spots included: what
+    /// quiet pixels are drawn to is no measurement, and the data cannot say how far a pixel is off that a
+    /// spot never leaves.
+    fn free_variance(&self, sample: &Sample, sums: &[(Normal, Coupling)]) -> Vec<f64> {
+        let mut weight = vec![0.0; sample.centre.len()];
+        for (spot, (_, coupling)) in self.spots.iter().zip(sums) {
+            if spot.psi.is_empty() {
+                continue;
+            }
+            for (&p, w) in coupling.pixel.iter().zip(&coupling.weight) {
+                weight[p] += w;
+            }
+        }
+        let mut variance: Vec<f64> = weight
+            .iter()
+            .map(|w| {
+                if *w > 0.0 {
+                    1.0 / (w * (1.0 + LEAST_KNOWN))
+                } else {
+                    0.0
+                }
+            })
+            .collect();
         let added: Vec<Vec<(usize, f64)>> = self
             .spots
             .par_iter()
@@ -410,10 +434,9 @@ impl Learned {
                     return Vec::new();
                 }
                 let precision = normal.penalised(&self.grid, spot.roughness);
-                dark::variance_from_spot(coupling, precision, &self.dark.variance)
+                dark::variance_from_spot(coupling, precision, &variance)
             })
             .collect();
-        let mut variance = self.dark.variance.clone();
         for (pixel, extra) in added.iter().flatten() {
             variance[*pixel] += extra;
         }

@@ -1,7 +1,7 @@
 //! The dark map as it is handed out, with an honest error for every pixel.
 //!
 //! ```text
-//! m_p  = marginal variance of D_p with the spots unknown
+//! m_p  = marginal variance of D_p with the spots unknown and nothing known of pixels beforehand
 //! J_p  = (n-1)/n sum_k (D_p^k - mean_k D_p^k)^2        D^k learned without fold k, k = 1..n
 //! k2   = max(1, median_p(J_p/m_p) / median(chi^2_{n-1}/(n-1)))
 //! sigma_p^2 = max(m_p, ((n-1) J_p + (n-1) k2 m_p) / (2 (n-1)))
@@ -10,7 +10,8 @@
 //! m knows what one star's spot and its pixels share, but neither warm pixels that
 //! switch nor spots that change in time; the jackknife over stretches of time sees
 //! both, with n - 1 degrees of freedom a pixel. k2 is what they say of all pixels
-//! together, and each pixel's own jackknife is drawn half way to it. All maps are
+//! together, of those that are measured: pixels drawn to zero scatter less than their
+//! errors. Each pixel's own jackknife is drawn half way to it. All maps are
 //! taken against their mean over a group of pixels: a level has no meaning of its
 //! own. The finished map counts from the lowest pixels of each group; nothing is
 //! below zero.
@@ -27,9 +28,15 @@ pub(crate) fn of(sample: &Sample, folds: &[Learned], all: &Learned) -> DarkMap {
     let scatter = jackknife(sample, folds);
     let freedom = folds.len() as f64 - 1.0;
     let marginal = &all.dark_variance;
-    let ratios: Vec<f64> = (0..scatter.len())
-        .filter_map(|p| Some(scatter[p]? / marginal[p]))
+    let ratio = |p: usize| Some(scatter[p]? / marginal[p]);
+    let own: Vec<f64> = (0..scatter.len())
+        .filter(|&p| all.dark.share_of_data(p) > 0.5)
+        .filter_map(ratio)
         .collect();
+    let ratios = match own.len() {
+        0..ENOUGH => (0..scatter.len()).filter_map(ratio).collect(),
+        _ => own,
+    };
     // Wilson & Hilferty 1931
     let median = (1.0 - 2.0 / (9.0 * freedom)).powi(3);
     let excess = robust_median(ratios).map_or(1.0, |r| (r / median).max(1.0));
@@ -52,6 +59,8 @@ pub(crate) fn of(sample: &Sample, folds: &[Learned], all: &Learned) -> DarkMap {
     DarkMap { pixels }
 }
 
+/// Fewest pixels that a median is taken over: it is good to 20 % then.
+const ENOUGH: usize = 20;
 /// Share of the pixels that may lie below the level that counts as dark.
 const LOWEST: f64 = 0.05;
 
