@@ -503,7 +503,7 @@ fn climb(
 ) -> (f64, [f64; 2]) {
     let mut halved = 0;
     for _ in 0..4 * halvings {
-        let centre = best.1;
+        let (start, centre) = best;
         for (dx, dy) in [(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)] {
             let k = [centre[0] + dx * step[0], centre[1] + dy * step[1]];
             let at = power(k);
@@ -511,7 +511,7 @@ fn climb(
                 best = (at, k);
             }
         }
-        if best.1 == centre {
+        if best.0 <= start {
             step = step.map(|s| 0.5 * s);
             halved += 1;
         }
