@@ -55,9 +55,11 @@ impl Field {
             }
         };
         let mut found: Vec<(f32, [f64; 2])> = Vec::new();
+        let zeros = || vec![Complex::new(0.0_f32, 0.0); cells[0] * cells[1]];
+        let mut space = [zeros(), zeros()];
         for &sx in shifts(0) {
             for &sy in shifts(1) {
-                found.extend(self.transform(cells, [sx, sy], variance, own));
+                found.extend(self.transform(cells, [sx, sy], variance, own, &mut space));
             }
         }
         found.sort_by(|a, b| b.0.total_cmp(&a.0));
@@ -88,6 +90,7 @@ impl Field {
         shift: [f64; 2],
         variance: [f64; 2],
         own: &Own,
+        [grid, columns]: &mut [Vec<Complex<f32>>; 2],
     ) -> Vec<(f32, [f64; 2])> {
         let [nx, ny] = cells;
         let mut planner = FftPlanner::<f32>::new();
@@ -117,7 +120,7 @@ impl Field {
             let twist = twists[axis][j % n];
             (j % n, if turned { -twist } else { twist })
         };
-        let mut grid = vec![Complex::new(0.0_f32, 0.0); nx * ny];
+        grid.fill(Complex::new(0.0, 0.0));
         for row in 0..self.rows() {
             let (i, ti) = cell(0, self.x_px[row]);
             let (j, tj) = cell(1, self.y_px[row]);
@@ -128,7 +131,6 @@ impl Field {
             || vec![Complex::default(); plans[0].get_inplace_scratch_len()],
             |scratch, line| plans[0].process_with_scratch(line, scratch),
         );
-        let mut columns = vec![Complex::new(0.0_f32, 0.0); nx * ny];
         columns
             .par_chunks_mut(ny * STRIP)
             .enumerate()
