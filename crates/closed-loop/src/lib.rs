@@ -34,6 +34,7 @@ mod manoeuvre;
 mod motion;
 mod noise_effects;
 mod nuisance;
+mod pattern;
 mod reference_wander;
 mod search;
 mod selection;

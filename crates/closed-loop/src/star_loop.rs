@@ -33,6 +33,7 @@ use crate::manoeuvre::stars::Sky;
 use crate::motion::{self, Around};
 use crate::noise_effects;
 use crate::nuisance::StarNuisance;
+use crate::pattern;
 use crate::reference_wander::{self, REFERENCE_ERROR};
 use crate::search::{Found, LEADING, amplitudes, fit};
 use crate::selection::columns_of;
@@ -420,12 +421,16 @@ fn finish(f: &Finish<'_>) -> Result<Closed, CloseError> {
         effects.push(effect);
         entries.push(entry);
     }
-    let (noise, leftover) = rayon::join(
+    let (noise, (leftover, pattern)) = rayon::join(
         || noise_effects::claim(f.situation, f.level, f.found, f.folds, &plain.axes),
         || {
             let inside = noise_effects::in_sample(f.level, f.found);
             let residual = inside.as_deref().unwrap_or(&plain.axes);
-            leftover::describe(&leftover::star_tracks(f.data, residual))
+            let order = f.situation.model.noise.distortion_order;
+            rayon::join(
+                || leftover::describe(&leftover::star_tracks(f.data, residual)),
+                || pattern::search(f.data, residual, f.folds, order),
+            )
         },
     );
     let mut noise = noise?;
@@ -437,6 +442,9 @@ fn finish(f: &Finish<'_>) -> Result<Closed, CloseError> {
     model.effects.extend(entries);
 
     leftover.tell(&mut unattributed);
+    if let Some(pattern) = pattern {
+        pattern.tell(&mut unattributed, last / whole);
+    }
     let excess = excess(f, last);
     let mut considered = figures::considered(f.found, excess);
     considered.retain(|c| !effects.iter().any(|e| e.id == c.id));

@@ -5,5 +5,6 @@ mod invariances;
 mod kit;
 mod noise;
 mod nulls;
+mod patterns;
 mod power;
 mod unknown;

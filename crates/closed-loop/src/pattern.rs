@@ -1,0 +1,568 @@
+//! A periodic pattern on the detector, which no effect of the catalogue has.
+//!
+//! What is left of both axes is searched for one wave vector k (cycles/px),
+//!
+//! ```text
+//! r_a(x, y) = c_a cos 2 pi (kx x + ky y) + s_a sin 2 pi (kx x + ky y)      a = x, y
+//! ```
+//!
+//! by a Fourier transform of the residuals on half pixels (x residual real, y residual
+//! imaginary, so that |X|^2 + |Y|^2 = (|F(k)|^2 + |F(-k)|^2) / 2), on a grid twice finer
+//! than 1/extent. The strongest peaks are held against the exact sums at the modelled
+//! positions, and the best is refined there. The half pixels cost a part 1 - sinc^2(kx/2)
+//! sinc^2(ky/2) of the power in the first step alone.
+//!
+//! Every residual is less the mean of its star, so that only what changes along a star's
+//! path counts: a constant of each star is the distortion's and the catalogue's. Whole
+//! cycles per pixel along one axis are pixel phase and are taken out before; waves of the
+//! distortion's length are not looked for. The four scores u (cos and sin, both axes) have
+//!
+//! ```text
+//! T^2 = u' V^-1 u,    V = sum over clusters u_c u_c',    P = 8 (2 Lx Ly) F(T^2 (G-4) / (4 (G-1)); 4, G-4)
+//! ```
+//!
+//! with 2 Lx Ly independent wave vectors in the half plane within one cycle per pixel, 8
+//! for the top between them, and G clusters: frames in one covariance, cells of star and
+//! block of time in another. A third P is that of the power over the mean power around k,
+//! once the wave is taken out. The largest of the three counts.
+//!
+//! Source: Scargle 1982 (periodogram); Hotelling 1931; Liang and Zeger 1986 (clusters).
+
+use std::f64::consts::{PI, TAU};
+use std::ops::Range;
+
+use nalgebra::{Cholesky, DMatrix, DVector, Matrix2, Matrix4, Vector2, Vector4};
+use rayon::prelude::*;
+use statrs::distribution::{ContinuousCDF, FisherSnedecor};
+use telemetry::report::{Dependence, Unattributed};
+
+use crate::folds::Folds;
+use crate::frame_rotation::{rotation_of, rotation_row};
+use crate::selection::FAMILY_ALPHA;
+use crate::star_data::StarData;
+
+#[cfg(test)]
+mod tests;
+mod transform;
+
+/// Peaks of the transform that are refined.
+const REFINED: usize = 6;
+/// Chances of a top for each independent wave vector.
+const CHANCES: f64 = 8.0;
+/// Waves fewer than this times the distortion's order across the detector are its own.
+const ORDERS: f64 = 2.0;
+/// The order where none is declared.
+const USUAL_ORDER: u32 = 7;
+/// Cycles over the extent within which a wave is one of pixel phase.
+const PHASE_GUARD: f64 = 3.0;
+/// Harmonics of pixel phase taken out.
+const HARMONICS: usize = 2;
+/// Share of a wave's power that must change along the stars' paths.
+const LEAST_MOTION: f64 = 0.1;
+/// Fewest clusters of a covariance.
+const LEAST_CLUSTERS: usize = 40;
+/// Wave vectors that the mean power around the peak is of.
+const AROUND: usize = 64;
+/// From this many stars a frame on, what a rotation of the frame does is left out.
+const STARS_TO_TURN: usize = 5;
+/// Least extent, px: less holds no waves to speak of.
+const LEAST_EXTENT_PX: f64 = 16.0;
+
+/// Residuals on the detector, the rows of each star together.
+#[derive(Clone, Debug, Default)]
+struct Field {
+    x_px: Vec<f64>,
+    y_px: Vec<f64>,
+    /// Residual of each axis, arcsec, less the mean of its star.
+    residual: [Vec<f64>; 2],
+    frame: Vec<usize>,
+    /// Rows of each star.
+    stars: Vec<Range<usize>>,
+}
+
+/// What was found.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Pattern {
+    /// Cycles per pixel.
+    pub(crate) wave: [f64; 2],
+    pub(crate) p_value: f64,
+    /// Out-of-fold share of the residual's variance.
+    pub(crate) explained: f64,
+    /// Extent that the rows cover, px.
+    extent: [f64; 2],
+}
+
+impl Pattern {
+    /// The name of the variable that the residual follows.
+    pub(crate) fn variable(&self) -> &'static str {
+        let cycles = |axis: usize, k: f64| ((self.wave[axis].abs() - k) * self.extent[axis]).abs();
+        if cycles(0, 0.0) < 1.0 {
+            "y_px"
+        } else if cycles(1, 0.0) < 1.0 {
+            "x_px"
+        } else if cycles(0, 1.0) < 1.0 && cycles(1, 1.0) < 1.0 {
+            "pixel_phase_x*pixel_phase_y"
+        } else {
+            "x_px*y_px"
+        }
+    }
+
+    /// Writes it where it is reported: something is left then. `left` is the share of the
+    /// before variance that is left.
+    pub(crate) fn tell(&self, unattributed: &mut Unattributed, left: f64) {
+        let variable = self.variable();
+        let list = &mut unattributed.depends_on;
+        let better =
+            |d: &Dependence| d.variance_explained >= self.explained && d.p_value < FAMILY_ALPHA;
+        unattributed.present = true;
+        let share = unattributed.variance_fraction.unwrap_or(0.0);
+        unattributed.variance_fraction = Some(share.max(self.explained * left));
+        if list.iter().any(|d| d.variable == variable && better(d)) {
+            return;
+        }
+        list.retain(|d| d.variable != variable);
+        list.push(Dependence {
+            variable: variable.to_owned(),
+            variance_explained: self.explained,
+            p_value: self.p_value,
+        });
+        list.sort_by(|a, b| b.variance_explained.total_cmp(&a.variance_explained));
+    }
+}
+
+/// The pattern that `residual` (arcsec, per axis over all rows) follows, if one is beyond
+/// doubt. `order` is the declared distortion's.
+pub(crate) fn search(
+    data: &StarData,
+    residual: &[Vec<f64>],
+    folds: &Folds,
+    order: Option<u32>,
+) -> Option<Pattern> {
+    let [rx, ry] = residual else { return None };
+    let mut frame = vec![0; data.t_s.len()];
+    for k in 0..data.frames.frames() {
+        frame[data.frames.rows_of(k)].fill(k);
+    }
+    let counts = |r: usize| {
+        !data.outlier[r]
+            && [rx, ry, &data.modelled[0], &data.modelled[1]]
+                .iter()
+                .all(|v| v[r].is_finite())
+    };
+    let mut of_star: Vec<Vec<usize>> = vec![Vec::new(); data.stars.len()];
+    for row in (0..frame.len()).filter(|&r| counts(r)) {
+        of_star[data.star[row]].push(row);
+    }
+    let field = |residual: [&[f64]; 2]| {
+        Field::new(
+            [&data.modelled[0], &data.modelled[1]],
+            residual,
+            &frame,
+            &of_star,
+        )
+    };
+    let as_left = field([rx, ry]);
+    let turning = data.t_s.len() >= STARS_TO_TURN * data.frames.frames();
+    if !turning {
+        return as_left.clone().pattern(&as_left, folds, order);
+    }
+    let turned: Vec<[f64; 2]> = (0..data.frames.frames())
+        .into_par_iter()
+        .flat_map_iter(|k| {
+            let theta = rotation_of(data, k, residual).unwrap_or_default();
+            data.frames.rows_of(k).map(move |row| {
+                let a = rotation_row(data, row);
+                let by = a.map(|a| a[0] * theta[0] + a[1] * theta[1] + a[2] * theta[2]);
+                [rx[row] - by[0], ry[row] - by[1]]
+            })
+        })
+        .collect();
+    let axis = |a: usize| -> Vec<f64> { turned.iter().map(|r| r[a]).collect() };
+    field([&axis(0), &axis(1)]).pattern(&as_left, folds, order)
+}
+
+/// Sums of the columns cos and sin, less the mean of each star, with each other and with
+/// both axes.
+#[derive(Clone, Copy, Debug, Default)]
+struct Sums {
+    normal: Matrix2<f64>,
+    score: [Vector2<f64>; 2],
+}
+
+impl Sums {
+    fn add(mut self, other: &Self) -> Self {
+        self.normal += other.normal;
+        self.score[0] += other.score[0];
+        self.score[1] += other.score[1];
+        self
+    }
+
+    /// Amplitudes of cos and sin for each axis.
+    fn amplitudes(&self) -> Option<[Vector2<f64>; 2]> {
+        let inverse = self.normal.try_inverse()?;
+        Some(self.score.map(|s| inverse * s))
+    }
+
+    /// The squares that the wave takes away, in units of each axis' variance.
+    fn power(&self, variance: [f64; 2]) -> f64 {
+        self.amplitudes().map_or(0.0, |beta| {
+            (0..2)
+                .map(|a| beta[a].dot(&self.score[a]) / variance[a])
+                .sum()
+        })
+    }
+}
+
+impl Field {
+    fn new(
+        at: [&[f64]; 2],
+        residual: [&[f64]; 2],
+        frame: &[usize],
+        of_star: &[Vec<usize>],
+    ) -> Self {
+        let mut field = Self::default();
+        for rows in of_star.iter().filter(|rows| rows.len() > 1) {
+            let first = field.frame.len();
+            for axis in 0..2 {
+                let mean = rows.iter().map(|&r| residual[axis][r]).sum::<f64>() / rows.len() as f64;
+                field.residual[axis].extend(rows.iter().map(|&r| residual[axis][r] - mean));
+            }
+            field.x_px.extend(rows.iter().map(|&r| at[0][r]));
+            field.y_px.extend(rows.iter().map(|&r| at[1][r]));
+            field.frame.extend(rows.iter().map(|&r| frame[r]));
+            field.stars.push(first..field.frame.len());
+        }
+        field
+    }
+
+    fn rows(&self) -> usize {
+        self.frame.len()
+    }
+
+    fn extent(&self) -> [f64; 2] {
+        [&self.x_px, &self.y_px].map(|v| {
+            let low = v.iter().copied().fold(f64::INFINITY, f64::min);
+            v.iter().copied().fold(f64::NEG_INFINITY, f64::max) - low
+        })
+    }
+
+    fn variance(&self) -> [f64; 2] {
+        self.residual
+            .each_ref()
+            .map(|r| r.iter().map(|v| v * v).sum::<f64>() / r.len() as f64)
+    }
+
+    /// The whole search; amplitudes and the share they explain are those of `as_left`.
+    fn pattern(mut self, as_left: &Self, folds: &Folds, order: Option<u32>) -> Option<Pattern> {
+        let extent = self.extent();
+        if self.frame.is_empty() || extent.iter().any(|l| *l < LEAST_EXTENT_PX) {
+            return None;
+        }
+        self.take_out_pixel_phase()?;
+        let variance = self.variance();
+        if variance.iter().any(|v| v.is_nan() || *v <= 0.0) {
+            return None;
+        }
+        let own = Own {
+            extent,
+            cycles: ORDERS * f64::from(order.unwrap_or(USUAL_ORDER).max(3)),
+        };
+        let power = |k: [f64; 2]| {
+            let sums = self.sums(k);
+            let moves = sums.normal.trace() / self.rows() as f64;
+            if own.excludes(k) || moves < LEAST_MOTION {
+                0.0
+            } else {
+                sums.power(variance)
+            }
+        };
+        let mut peaks: Vec<(f64, [f64; 2])> = self
+            .peaks(variance, &own)
+            .into_iter()
+            .chain([[1.0, 1.0], [1.0, -1.0]])
+            .map(|k| (power(k), k))
+            .collect();
+        peaks.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let trials = (CHANCES * 2.0 * extent[0] * extent[1]).max(1.0);
+        // chi-square of so little falls short by far, refined or not
+        if 0.5 * peaks.first()?.0 < 0.5 * trials.ln() {
+            return None;
+        }
+        let step = extent.map(|l| 0.25 / l);
+        let best = peaks
+            .into_iter()
+            .take(REFINED)
+            .map(|peak| climb(&power, peak, step, 2))
+            .max_by(|a, b| a.0.total_cmp(&b.0))?;
+        let best = climb(&power, best, step.map(|s| 0.25 * s), 7);
+        let wave = best.1;
+        if own.excludes(wave) {
+            return None;
+        }
+        let chance = self.chance(wave, folds)?;
+        if chance * trials >= FAMILY_ALPHA {
+            return None;
+        }
+        let p_value = trials * chance.max(self.chance_around(wave, variance, extent)?);
+        let explained = as_left.share_out_of_fold(wave, folds)?;
+        (p_value < FAMILY_ALPHA && explained > 0.0).then_some(Pattern {
+            wave,
+            p_value,
+            explained,
+            extent,
+        })
+    }
+
+    /// Columns cos and sin of the rows of one star, less their means.
+    fn columns(&self, rows: &Range<usize>, k: [f64; 2], out: &mut Vec<[f64; 2]>) {
+        out.clear();
+        let (mut c, mut s) = (0.0, 0.0);
+        for row in rows.clone() {
+            let cycles = k[0] * self.x_px[row] + k[1] * self.y_px[row];
+            let (sin, cos) = (TAU * (cycles - cycles.floor())).sin_cos();
+            c += cos;
+            s += sin;
+            out.push([cos, sin]);
+        }
+        let n = rows.len() as f64;
+        for v in out {
+            *v = [v[0] - c / n, v[1] - s / n];
+        }
+    }
+
+    fn sums(&self, k: [f64; 2]) -> Sums {
+        let each: Vec<Sums> = self
+            .stars
+            .par_iter()
+            .map_init(Vec::new, |columns, rows| {
+                self.columns(rows, k, columns);
+                self.sums_of(rows.start, columns, |_| true)
+            })
+            .collect();
+        each.iter().fold(Sums::default(), Sums::add)
+    }
+
+    fn sums_of(&self, first: usize, columns: &[[f64; 2]], counts: impl Fn(usize) -> bool) -> Sums {
+        let (mut cc, mut cs, mut ss) = (0.0, 0.0, 0.0);
+        let mut score = [[0.0; 2]; 2];
+        for (j, &[c, s]) in columns.iter().enumerate() {
+            let row = first + j;
+            if counts(row) {
+                cc += c * c;
+                cs += c * s;
+                ss += s * s;
+                for (score, residual) in score.iter_mut().zip(&self.residual) {
+                    score[0] += c * residual[row];
+                    score[1] += s * residual[row];
+                }
+            }
+        }
+        Sums {
+            normal: Matrix2::new(cc, cs, cs, ss),
+            score: score.map(Vector2::from),
+        }
+    }
+
+    /// Whole cycles per pixel along one axis: pixel phase has terms of its own.
+    fn take_out_pixel_phase(&mut self) -> Option<()> {
+        const WAVES: usize = 2 * HARMONICS;
+        let waves: [[f64; 2]; WAVES] = std::array::from_fn(|h| {
+            let k = (h / 2 + 1) as f64;
+            if h % 2 == 0 { [k, 0.0] } else { [0.0, k] }
+        });
+        let design: Vec<[f64; 2 * WAVES]> = self
+            .stars
+            .par_iter()
+            .flat_map_iter(|rows| {
+                let mut out = vec![[0.0; 2 * WAVES]; rows.len()];
+                let mut columns = Vec::new();
+                for (h, k) in waves.iter().enumerate() {
+                    self.columns(rows, *k, &mut columns);
+                    for (row, c) in out.iter_mut().zip(&columns) {
+                        row[2 * h..2 * h + 2].copy_from_slice(c);
+                    }
+                }
+                out
+            })
+            .collect();
+        let mut normal = DMatrix::zeros(2 * WAVES, 2 * WAVES);
+        let mut score = DMatrix::zeros(2 * WAVES, 2);
+        for (row, a) in design.iter().enumerate() {
+            for i in 0..2 * WAVES {
+                for j in 0..=i {
+                    normal[(i, j)] += a[i] * a[j];
+                }
+                score[(i, 0)] += a[i] * self.residual[0][row];
+                score[(i, 1)] += a[i] * self.residual[1][row];
+            }
+        }
+        normal.fill_upper_triangle_with_lower_triangle();
+        // where stars stand still there is nothing to take out
+        let least = 1e-6 * design.len() as f64;
+        let beta = normal.svd(true, true).solve(&score, least).ok()?;
+        for (axis, residual) in self.residual.iter_mut().enumerate() {
+            let beta: DVector<f64> = beta.column(axis).into_owned();
+            for (r, a) in residual.iter_mut().zip(&design) {
+                *r -= a.iter().zip(beta.iter()).map(|(a, b)| a * b).sum::<f64>();
+            }
+        }
+        Some(())
+    }
+
+    /// The chance of the scores at `k` under both covariances, without a search.
+    fn chance(&self, k: [f64; 2], folds: &Folds) -> Option<f64> {
+        let mut frames: Vec<Vector4<f64>> = Vec::new();
+        let mut cells: Vec<Vector4<f64>> = Vec::new();
+        let block = block_of_frame(folds);
+        frames.resize(block.len(), Vector4::zeros());
+        let mut columns = Vec::new();
+        for rows in &self.stars {
+            self.columns(rows, k, &mut columns);
+            let mut last = usize::MAX;
+            for (j, &[c, s]) in columns.iter().enumerate() {
+                let row = rows.start + j;
+                let [x, y] = [self.residual[0][row], self.residual[1][row]];
+                let u = Vector4::new(c * x, s * x, c * y, s * y);
+                frames[self.frame[row]] += u;
+                if block[self.frame[row]] != last {
+                    last = block[self.frame[row]];
+                    cells.push(Vector4::zeros());
+                }
+                if let Some(cell) = cells.last_mut() {
+                    *cell += u;
+                }
+            }
+        }
+        frames.retain(|u| u.norm_squared() > 0.0);
+        Some(hotelling(&frames)?.max(hotelling(&cells)?))
+    }
+
+    /// The chance of the power at `k` where that around it is usual.
+    fn chance_around(&self, k: [f64; 2], variance: [f64; 2], extent: [f64; 2]) -> Option<f64> {
+        let sums = self.sums(k);
+        let beta = sums.amplitudes()?;
+        let mut left = self.clone();
+        let mut columns = Vec::new();
+        for rows in &self.stars {
+            self.columns(rows, k, &mut columns);
+            for (j, &[c, s]) in columns.iter().enumerate() {
+                for (residual, b) in left.residual.iter_mut().zip(&beta) {
+                    residual[rows.start + j] -= b[0] * c + b[1] * s;
+                }
+            }
+        }
+        // a sunflower of wave vectors 3 to 16 cycles over the extent away
+        let golden = PI * (3.0 - 5.0_f64.sqrt());
+        let around: f64 = (0..AROUND)
+            .map(|j| {
+                let r = 3.0 + 13.0 * ((j as f64 + 0.5) / AROUND as f64).sqrt();
+                let (s, c) = (golden * j as f64).sin_cos();
+                let near = [k[0] + r * c / extent[0], k[1] + r * s / extent[1]];
+                left.sums(near).power(variance)
+            })
+            .sum::<f64>()
+            / AROUND as f64;
+        let law = FisherSnedecor::new(4.0, 4.0 * AROUND as f64).ok()?;
+        Some(law.sf(sums.power(variance) / around))
+    }
+
+    /// Share of the variance that the wave explains in each fold with the amplitudes of the others.
+    fn share_out_of_fold(&self, k: [f64; 2], folds: &Folds) -> Option<f64> {
+        let fold = folds.fold_of_frame();
+        let mut each = vec![Sums::default(); folds.count];
+        let mut columns = Vec::new();
+        for rows in &self.stars {
+            self.columns(rows, k, &mut columns);
+            for (f, sums) in each.iter_mut().enumerate() {
+                let part = self.sums_of(rows.start, &columns, |row| fold[self.frame[row]] == f);
+                *sums = sums.add(&part);
+            }
+        }
+        let whole = each.iter().fold(Sums::default(), Sums::add);
+        let mut gain = 0.0;
+        for own in &each {
+            let others = Sums {
+                normal: whole.normal - own.normal,
+                score: [0, 1].map(|a| whole.score[a] - own.score[a]),
+            };
+            for (b, score) in others.amplitudes()?.iter().zip(&own.score) {
+                gain += 2.0 * b.dot(score) - (own.normal * b).dot(b);
+            }
+        }
+        let total: f64 = self.residual.iter().flatten().map(|r| r * r).sum();
+        Some(gain / total)
+    }
+}
+
+/// The top of `power` near a wave vector, by steps that are halved where none leads higher.
+fn climb(
+    power: &impl Fn([f64; 2]) -> f64,
+    mut best: (f64, [f64; 2]),
+    mut step: [f64; 2],
+    halvings: usize,
+) -> (f64, [f64; 2]) {
+    let mut halved = 0;
+    for _ in 0..4 * halvings {
+        let (start, centre) = best;
+        for (dx, dy) in [(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)] {
+            let k = [centre[0] + dx * step[0], centre[1] + dy * step[1]];
+            let at = power(k);
+            if at > best.0 {
+                best = (at, k);
+            }
+        }
+        if best.0 <= start {
+            step = step.map(|s| 0.5 * s);
+            halved += 1;
+        }
+        if halved == halvings {
+            break;
+        }
+    }
+    best
+}
+
+/// Wave vectors that others own.
+#[derive(Clone, Copy, Debug)]
+struct Own {
+    extent: [f64; 2],
+    /// Cycles over the extent that the distortion may have.
+    cycles: f64,
+}
+
+impl Own {
+    fn excludes(&self, k: [f64; 2]) -> bool {
+        let cycles = |x: f64, y: f64| {
+            ((k[0].abs() - x) * self.extent[0]).hypot((k[1].abs() - y) * self.extent[1])
+        };
+        cycles(0.0, 0.0) < self.cycles
+            || cycles(1.0, 0.0) < PHASE_GUARD
+            || cycles(0.0, 1.0) < PHASE_GUARD
+    }
+}
+
+fn block_of_frame(folds: &Folds) -> Vec<usize> {
+    let mut out = Vec::new();
+    for (b, block) in folds.blocks.iter().enumerate() {
+        out.extend(std::iter::repeat_n(b, block.len()));
+    }
+    out
+}
+
+/// The chance of the sum of independent vectors of mean zero.
+fn hotelling(clusters: &[Vector4<f64>]) -> Option<f64> {
+    if clusters.len() < LEAST_CLUSTERS {
+        return None;
+    }
+    let n = clusters.len() as f64;
+    let sum: Vector4<f64> = clusters.iter().sum();
+    let mean = sum / n;
+    let spread: Matrix4<f64> = clusters
+        .iter()
+        .map(|u| (u - mean) * (u - mean).transpose())
+        .sum();
+    let covariance = spread * (n / (n - 1.0));
+    let square = sum.dot(&Cholesky::new(covariance)?.solve(&sum));
+    let law = FisherSnedecor::new(4.0, n - 4.0).ok()?;
+    Some(law.sf(square * (n - 4.0) / (4.0 * (n - 1.0))))
+}

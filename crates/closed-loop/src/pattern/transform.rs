@@ -1,0 +1,174 @@
+//! The strongest wave vectors of a field, by a transform of its residuals on half pixels.
+//!
+//! ```text
+//! F(k) = sum over rows (x residual + i y residual) e^(-2 pi i k p)     |X|^2 + |Y|^2 = (|F(k)|^2 + |F(-k)|^2) / 2
+//! ```
+//!
+//! p: the cell of the row, in half pixels; k: cycles/px. Detectors that a transform of the
+//! largest size does not resolve twice are transformed at half steps of k too.
+//!
+//! Source: Cooley and Tukey 1965.
+
+use std::f64::consts::TAU;
+
+use rayon::prelude::*;
+use rustfft::FftPlanner;
+use rustfft::num_complex::Complex;
+
+use super::{Field, Own};
+
+/// Cells of the transform in a pixel: waves of up to one cycle per pixel.
+const CELLS: f64 = 2.0;
+/// Cells of the transform at most, an axis.
+const MOST_CELLS: usize = 2048;
+/// Peaks of the transform that the exact sums are formed of.
+const PEAKS: usize = 16;
+/// Columns of the transform turned over at a time.
+const STRIP: usize = 16;
+
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "single precision is plenty to rank peaks"
+)]
+fn narrow(v: f64) -> f32 {
+    v as f32
+}
+
+impl Field {
+    /// The strongest wave vectors of the transform.
+    pub(super) fn peaks(&self, variance: [f64; 2], own: &Own) -> Vec<[f64; 2]> {
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "an extent in half pixels, limited"
+        )]
+        let cells = own.extent.map(|l| {
+            let wanted = (2.0 * CELLS * l).min(MOST_CELLS as f64) as usize;
+            wanted.next_power_of_two().clamp(64, MOST_CELLS)
+        });
+        // half steps between the frequencies where the transform alone is too coarse
+        let shifts = |axis: usize| -> &[f64] {
+            if (cells[axis] as f64) < 2.0 * CELLS * own.extent[axis] {
+                &[0.0, 0.5]
+            } else {
+                &[0.0]
+            }
+        };
+        let mut found: Vec<(f32, [f64; 2])> = Vec::new();
+        let zeros = || vec![Complex::new(0.0_f32, 0.0); cells[0] * cells[1]];
+        let mut space = [zeros(), zeros()];
+        for &sx in shifts(0) {
+            for &sy in shifts(1) {
+                found.extend(self.transform(cells, [sx, sy], variance, own, &mut space));
+            }
+        }
+        found.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let mut waves: Vec<[f64; 2]> = Vec::new();
+        for (_, k) in found {
+            let near = |w: &[f64; 2]| (0..2).all(|a| (w[a] - k[a]).abs() * own.extent[a] < 0.75);
+            if !waves.iter().any(near) {
+                waves.push(k);
+            }
+            if waves.len() == PEAKS {
+                break;
+            }
+        }
+        // half pixels cannot tell one cycle per pixel from minus one
+        let mirrored: Vec<[f64; 2]> = waves
+            .iter()
+            .filter(|k| k[0].abs() > 0.99 || k[1].abs() > 0.99)
+            .map(|k| [-k[0], k[1]])
+            .collect();
+        waves.extend(mirrored);
+        waves
+    }
+
+    /// The strongest wave of every column of the transform, with its power.
+    fn transform(
+        &self,
+        cells: [usize; 2],
+        shift: [f64; 2],
+        variance: [f64; 2],
+        own: &Own,
+        [grid, columns]: &mut [Vec<Complex<f32>>; 2],
+    ) -> Vec<(f32, [f64; 2])> {
+        let [nx, ny] = cells;
+        let mut planner = FftPlanner::<f32>::new();
+        let plans = cells.map(|n| planner.plan_fft_forward(n));
+        let twist = |axis: usize| -> Vec<Complex<f32>> {
+            let n = cells[axis];
+            (0..n)
+                .map(|j| {
+                    let (s, c) = (-TAU * shift[axis] * j as f64 / n as f64).sin_cos();
+                    Complex::new(narrow(c), narrow(s))
+                })
+                .collect()
+        };
+        let twists = [twist(0), twist(1)];
+        let scale = variance.map(|v| 1.0 / v.sqrt());
+        let low = [&self.x_px, &self.y_px].map(|v| v.iter().copied().fold(f64::INFINITY, f64::min));
+        let cell = |axis: usize, at: f64| -> (usize, Complex<f32>) {
+            #[expect(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "half pixels from the lowest position"
+            )]
+            let j = (CELLS * (at - low[axis])) as usize;
+            let n = cells[axis];
+            // beyond the grid a half step has turned by pi a period
+            let turned = shift[axis] > 0.0 && (j / n) % 2 == 1;
+            let twist = twists[axis][j % n];
+            (j % n, if turned { -twist } else { twist })
+        };
+        grid.fill(Complex::new(0.0, 0.0));
+        for row in 0..self.rows() {
+            let (i, ti) = cell(0, self.x_px[row]);
+            let (j, tj) = cell(1, self.y_px[row]);
+            let r = [0, 1].map(|a| narrow(self.residual[a][row] * scale[a]));
+            grid[j * nx + i] += Complex::new(r[0], r[1]) * ti * tj;
+        }
+        grid.par_chunks_mut(nx).for_each_init(
+            || vec![Complex::default(); plans[0].get_inplace_scratch_len()],
+            |scratch, line| plans[0].process_with_scratch(line, scratch),
+        );
+        columns
+            .par_chunks_mut(ny * STRIP)
+            .enumerate()
+            .for_each_init(
+                || vec![Complex::default(); plans[1].get_inplace_scratch_len()],
+                |scratch, (strip, out)| {
+                    for j in 0..ny {
+                        for i in 0..STRIP {
+                            out[i * ny + j] = grid[j * nx + strip * STRIP + i];
+                        }
+                    }
+                    for line in out.chunks_mut(ny) {
+                        plans[1].process_with_scratch(line, scratch);
+                    }
+                },
+            );
+        let frequency = |axis: usize, i: usize| {
+            let n = cells[axis] as f64;
+            let i = i as f64;
+            (if i < 0.5 * n { i } else { i - n } + shift[axis]) * CELLS / n
+        };
+        let opposite = |axis: usize, i: usize| {
+            (2 * cells[axis] - i - usize::from(shift[axis] > 0.0)) % cells[axis]
+        };
+        (0..nx)
+            .into_par_iter()
+            .filter_map(|i| {
+                let kx = frequency(0, i);
+                let (line, other) = (i * ny, opposite(0, i) * ny);
+                (0..=ny / 2)
+                    .filter(|&j| !own.excludes([kx, frequency(1, j).abs()]))
+                    .map(|j| {
+                        let p = columns[line + j].norm_sqr()
+                            + columns[other + opposite(1, j)].norm_sqr();
+                        (p, [kx, frequency(1, j)])
+                    })
+                    .max_by(|a, b| a.0.total_cmp(&b.0))
+            })
+            .collect()
+    }
+}
