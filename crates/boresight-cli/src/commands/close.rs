@@ -72,6 +72,13 @@ pub(crate) fn interrupted() {
 
 /// Draws of each model behind its spectrum: enough for a mean and its 3 sigma.
 const DRAWS: u64 = 40;
+/// A long run has many periods in every band, and needs fewer draws of it.
+const FLOWN_FRAMES: u64 = 400_000;
+const FEWEST_DRAWS: u64 = 12;
+
+fn draws(frames: usize) -> u64 {
+    (FLOWN_FRAMES / frames.max(1) as u64).clamp(FEWEST_DRAWS, DRAWS)
+}
 
 /// Ensembles of the declared model and of the better one beside the measured attitude error, and
 /// their `log_psd_cost` in the report; or why they cannot be had.
@@ -82,7 +89,7 @@ fn flown(
     console: &Console,
 ) -> Result<Compared, String> {
     let settings = CompareSettings {
-        draws: DRAWS,
+        draws: draws(bundle.attitude.as_ref().map_or(0, |a| a.t_s.len())),
         ..CompareSettings::default()
     };
     let added = (!closed.report.effects.is_empty()).then(|| closed.model.clone());
@@ -118,4 +125,17 @@ fn write(closed: &Closed, text: &str, output: &Output) -> anyhow::Result<()> {
         map.write(output)?;
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_long_run_is_flown_less_often() {
+        assert_eq!(draws(0), DRAWS);
+        assert_eq!(draws(3600), DRAWS);
+        assert_eq!(draws(20_000), 20);
+        assert_eq!(draws(144_000), FEWEST_DRAWS);
+    }
 }
