@@ -177,20 +177,18 @@ fn declared_outliers(situation: &Situation<'_>) -> Result<Option<[f64; 2]>, Clos
     Ok(found)
 }
 
-/// Looks for effects on the noise in what `found` leaves at `level`.
+/// Looks for effects on the noise in the `residual` that the stars leave at `level`.
 pub(crate) fn claim(
     situation: &Situation<'_>,
     level: &StarEvidence<'_>,
-    found: &Found,
+    residual: &[Vec<f64>],
     folds: &Folds,
-    out_of_fold: &[Vec<f64>],
 ) -> Result<NoiseEffects, CloseError> {
     let data = level.data;
-    let inside = in_sample(level, found);
     let declared = declared_variance(situation, data)?;
     let source = Source {
         data,
-        residual: inside.as_deref().unwrap_or(out_of_fold),
+        residual,
         declared: &declared,
         folds,
     };

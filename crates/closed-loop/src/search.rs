@@ -329,6 +329,23 @@ pub(crate) fn amplitudes(
     columns: usize,
 ) -> Option<Amplitudes> {
     let set = columns_of(&found.groups, chosen);
+    amplitudes_as(found, folds, chosen, |beta| {
+        let mut all = DVector::zeros(columns);
+        for (&c, b) in set.iter().zip(beta.iter()) {
+            all[c] = *b;
+        }
+        all
+    })
+}
+
+/// As [`amplitudes`], `spread` over the columns that are to be evaluated.
+pub(crate) fn amplitudes_as(
+    found: &Fitted,
+    folds: &Folds,
+    chosen: &[usize],
+    spread: impl Fn(&DVector<f64>) -> DVector<f64>,
+) -> Option<Amplitudes> {
+    let set = columns_of(&found.groups, chosen);
     let mut out = Amplitudes {
         nuisance: Vec::new(),
         candidates: Vec::new(),
@@ -336,11 +353,7 @@ pub(crate) fn amplitudes(
     for f in 0..folds.count {
         let beta = found.fits.amplitudes_without(f, &set)?;
         out.nuisance.push(found.fits.nuisance(Some(f), &set, &beta));
-        let mut all = DVector::zeros(columns);
-        for (i, &c) in set.iter().enumerate() {
-            all[c] = beta[i];
-        }
-        out.candidates.push(all);
+        out.candidates.push(spread(&beta));
     }
     Some(out)
 }

@@ -6,6 +6,8 @@
 //!
 //! Source: [M23] Fig. 4 for what a residual is.
 
+use std::sync::Arc;
+
 use effects::Candidate;
 use focal_plane::AttitudeSource;
 use nalgebra::{DVector, Vector3};
@@ -31,7 +33,7 @@ pub(crate) struct StarEvidence<'a> {
     pub(crate) data: &'a StarData,
     pub(crate) nuisance: StarNuisance,
     /// Residual variants: one, or one a fold and a last one for all data.
-    pub(crate) residuals: Vec<[Vec<f64>; 2]>,
+    pub(crate) residuals: Arc<Vec<[Vec<f64>; 2]>>,
     pub(crate) motion: Option<&'a dyn AttitudeSource>,
     /// First guess of the noise of a centroid, per axis, arcsec.
     pub(crate) sigma_guess_arcsec: f64,

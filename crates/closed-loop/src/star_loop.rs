@@ -8,6 +8,7 @@
 //! Not physics: the order of the steps.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use effects::{Candidate, Scene, StarFacts, StarRows};
 use focal_plane::{AttitudeSource, Points, rotation_vector};
@@ -20,7 +21,7 @@ use crate::confusion;
 use crate::declared;
 use crate::empirical::{EMPIRICAL, Empirical, Variable};
 use crate::error::CloseError;
-use crate::evidence::{Amplitudes, Evidence, Residuals};
+use crate::evidence::{Evidence, Residuals};
 use crate::figures;
 use crate::folds::Folds;
 use crate::frame_rotation::rotation_of;
@@ -35,7 +36,7 @@ use crate::noise_effects;
 use crate::nuisance::StarNuisance;
 use crate::pattern;
 use crate::reference_wander::{self, REFERENCE_ERROR};
-use crate::search::{Found, LEADING, amplitudes, fit};
+use crate::search::{Found, LEADING, amplitudes, amplitudes_as, fit};
 use crate::selection::columns_of;
 use crate::situation::Situation;
 use crate::star_data::{Inputs, Star, StarData, median_step};
@@ -208,7 +209,7 @@ fn evidence<'a>(
     StarEvidence {
         data,
         nuisance: StarNuisance::declared(situation.model, data),
-        residuals,
+        residuals: Arc::new(residuals),
         motion,
         // circular to per axis
         sigma_guess_arcsec: temporal.map_or(1.0, |s| s / std::f64::consts::SQRT_2),
@@ -313,22 +314,11 @@ struct Finish<'a> {
 
 impl Finish<'_> {
     fn residuals(&self, chosen: &[usize]) -> Result<Residuals, CloseError> {
-        let fits = &self.found.fitted.fits;
-        let set = columns_of(&self.found.fitted.groups, chosen);
         let only = self.found.only(chosen);
-        let mut amplitudes = Amplitudes {
-            nuisance: Vec::new(),
-            candidates: Vec::new(),
-        };
-        for fold in 0..self.folds.count {
-            let beta = fits
-                .amplitudes_without(fold, &set)
-                .ok_or(CloseError::Singular)?;
-            amplitudes
-                .nuisance
-                .push(fits.nuisance(Some(fold), &set, &beta));
-            amplitudes.candidates.push(only.spread(&beta));
-        }
+        let amplitudes = amplitudes_as(&self.found.fitted, self.folds, chosen, |beta| {
+            only.spread(beta)
+        })
+        .ok_or(CloseError::Singular)?;
         Ok(self
             .level
             .residuals(self.folds, &only.candidates, &amplitudes))
@@ -377,8 +367,12 @@ fn finish(f: &Finish<'_>) -> Result<Closed, CloseError> {
     let whole = f.power(f.before);
     let mut explained = Vec::new();
     let mut last = f.power(&f.residuals(&[])?);
-    for k in 0..chosen.len() {
-        let now = f.power(&f.residuals(&chosen[..=k])?);
+    for k in 1..=chosen.len() {
+        let now = if k == chosen.len() {
+            f.power(&plain)
+        } else {
+            f.power(&f.residuals(&chosen[..k])?)
+        };
         explained.push((last - now) / whole);
         last = now;
     }
@@ -387,13 +381,15 @@ fn finish(f: &Finish<'_>) -> Result<Closed, CloseError> {
     let mut unattributed = figures::unattributed(f.found, &LEADING, last / whole);
     let questions = f.situation.questions;
     let mut added = chosen.clone();
+    let mut after = None;
     if questions.empirical
         && let Some(g) = figures::best_empirical(f.found, &unattributed, &surroundings)
     {
         added.push(g);
-        explained.push((last - f.power(&f.residuals(&added)?)) / whole);
+        let with_term = f.residuals(&added)?;
+        explained.push((last - f.power(&with_term)) / whole);
+        after = Some(with_term);
     }
-    let after = f.residuals(&added)?;
     let (mut effects, mut entries) =
         figures::effects_found(f.found, &added, &explained, &surroundings, questions)?;
     tell_apart(f, &mut effects);
@@ -421,11 +417,11 @@ fn finish(f: &Finish<'_>) -> Result<Closed, CloseError> {
         effects.push(effect);
         entries.push(entry);
     }
+    let inside = noise_effects::in_sample(f.level, f.found);
+    let residual = inside.as_deref().unwrap_or(&plain.axes);
     let (noise, (leftover, pattern)) = rayon::join(
-        || noise_effects::claim(f.situation, f.level, f.found, f.folds, &plain.axes),
+        || noise_effects::claim(f.situation, f.level, residual, f.folds),
         || {
-            let inside = noise_effects::in_sample(f.level, f.found);
-            let residual = inside.as_deref().unwrap_or(&plain.axes);
             let order = f.situation.model.noise.distortion_order;
             rayon::join(
                 || leftover::describe(&leftover::star_tracks(f.data, residual)),
@@ -487,6 +483,7 @@ fn finish(f: &Finish<'_>) -> Result<Closed, CloseError> {
         },
     );
 
+    let after = after.unwrap_or(plain);
     let attitude = attitude_residuals(f, &after);
     let attitude_rms = |series: &[Vec<f64>; 3], outlier: &[bool]| {
         std::array::from_fn(|a| figures::rms(&series[a], outlier).unwrap_or(f64::NAN))

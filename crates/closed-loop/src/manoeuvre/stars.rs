@@ -103,7 +103,7 @@ impl<'a> Sky<'a> {
         let evidence = StarEvidence {
             data: &data,
             nuisance: StarNuisance::declared(self.model, &data),
-            residuals: vec![[none(), none()]],
+            residuals: vec![[none(), none()]].into(),
             motion: Some(flown),
             sigma_guess_arcsec: 1.0,
             noise: None,
