@@ -41,6 +41,7 @@ impl Bins {
                 blocks: Vec::new(),
                 fold_of_block: folds.fold_of_block.clone(),
                 count: folds.count,
+                prior_blocks: folds.prior_blocks,
             },
         };
         for block in &folds.blocks {

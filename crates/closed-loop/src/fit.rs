@@ -25,7 +25,15 @@
 //! neither the standard error nor the p-value is let below that of white noise,
 //! v S^-1 and chi-squared.
 //!
-//! Source: Liang & Zeger 1986 (cluster-robust variance); Hotelling 1931.
+//! Frames that share nothing in time have independent noise but for what the data
+//! says otherwise: there v S^-1 enters V as a prior that counts for `d` blocks,
+//!
+//! ```text
+//! V' = (d v S^-1 + (B - 1) V) / (d + B - 1)      and B + d takes the place of B in F
+//! ```
+//!
+//! Source: Liang & Zeger 1986 (cluster-robust variance); Hotelling 1931; Smyth 2004
+//! (moderated variance).
 
 use std::ops::Range;
 
@@ -232,15 +240,15 @@ pub(crate) struct Estimate {
     pub(crate) covariance: DMatrix<f64>,
     /// Its covariance if the noise were white.
     pub(crate) white: DMatrix<f64>,
-    /// Blocks behind the covariance.
-    pub(crate) blocks: usize,
+    /// Blocks behind the covariance, those that its prior counts for included.
+    pub(crate) blocks: f64,
 }
 
 impl Estimate {
     /// Probability that amplitudes `which` (positions in the set) are all zero
     /// and yet as far from it as this.
     pub(crate) fn p_value(&self, which: &[usize]) -> f64 {
-        let (p, b) = (which.len() as f64, self.blocks as f64);
+        let (p, b) = (which.len() as f64, self.blocks);
         if which.is_empty() || b <= p {
             return 1.0;
         }
@@ -288,6 +296,8 @@ pub(crate) struct Fits {
     folds: Vec<Eliminated>,
     all: Eliminated,
     blocks: usize,
+    /// [`Folds::prior_blocks`].
+    prior: f64,
 }
 
 impl Fits {
@@ -319,6 +329,7 @@ impl Fits {
             folds: by_fold,
             all,
             blocks: of.len(),
+            prior: folds.prior_blocks,
         })
     }
 
@@ -349,6 +360,7 @@ impl Fits {
             folds: Vec::new(),
             all,
             blocks: grams.gram.len(),
+            prior: 0.0,
         })
     }
 
@@ -455,12 +467,19 @@ impl Fits {
             }
         }
         let inverse = factor.inverse();
-        let covariance = &inverse * spread * &inverse;
+        let robust = &inverse * spread * &inverse;
+        let white = inverse * variance;
+        let (d, freedom) = (self.prior, (b - 1.0).max(0.0));
+        let covariance = if d > 0.0 {
+            (&white * d + robust * freedom) / (d + freedom)
+        } else {
+            robust
+        };
         Some(Estimate {
             value,
             covariance,
-            white: inverse * variance,
-            blocks: self.blocks,
+            white,
+            blocks: b + d,
         })
     }
 

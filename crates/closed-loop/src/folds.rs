@@ -19,9 +19,14 @@ const LEAVE_ONE_OUT_BELOW: usize = 10;
 const BLOCKS: usize = 60;
 /// A block shorter than this says little about correlation in time.
 const MIN_BLOCK_FRAMES: usize = 8;
+/// How firmly the noise of unrelated frames is held to be independent, in blocks:
+/// their variances differ from that of independent noise by a third, not by factors,
+/// since `2 / 20` is the squared relative scatter of a variance with so many degrees
+/// of freedom. A handful of snapshots would otherwise never be sure of anything.
+const UNRELATED_PRIOR: f64 = 20.0;
 
 /// A partition of the frames `0..n` into folds of blocks, all contiguous.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Folds {
     /// Frames of each block, in time order.
     pub(crate) blocks: Vec<Range<usize>>,
@@ -29,23 +34,36 @@ pub(crate) struct Folds {
     pub(crate) fold_of_block: Vec<usize>,
     /// How many folds there are.
     pub(crate) count: usize,
+    /// Blocks that the prior of independent noise counts for ([`crate::fit`]).
+    pub(crate) prior_blocks: f64,
 }
 
 impl Folds {
     /// Cuts `frames` frames into folds of (nearly) equal numbers of frames.
     pub(crate) fn cut(frames: usize) -> Self {
+        Self::in_blocks(frames, MIN_BLOCK_FRAMES, 0.0)
+    }
+
+    /// The same for frames that share nothing with their neighbours in time: a frame
+    /// may be a block of its own.
+    pub(crate) fn unrelated(frames: usize) -> Self {
+        Self::in_blocks(frames, 1, UNRELATED_PRIOR)
+    }
+
+    fn in_blocks(frames: usize, least: usize, prior_blocks: f64) -> Self {
         let count = if frames < LEAVE_ONE_OUT_BELOW {
             frames.max(1)
         } else {
             FOLDS
         };
-        let per_fold = (frames / count / MIN_BLOCK_FRAMES).clamp(1, BLOCKS / FOLDS);
+        let per_fold = (frames / count / least).clamp(1, BLOCKS / FOLDS);
         let pieces = count * per_fold;
         let edge = |k: usize| k * frames / pieces;
         Self {
             blocks: (0..pieces).map(|k| edge(k)..edge(k + 1)).collect(),
             fold_of_block: (0..pieces).map(|k| k / per_fold).collect(),
             count,
+            prior_blocks,
         }
     }
 
@@ -70,6 +88,7 @@ impl Folds {
             blocks: std::iter::once(0..frames).collect(),
             fold_of_block: vec![0],
             count: 1,
+            prior_blocks: 0.0,
         }
     }
 
@@ -106,6 +125,18 @@ mod tests {
             assert_eq!(folds.count, if frames < 10 { frames } else { 5 });
             assert_eq!(*fold.last().unwrap() + 1, folds.count);
         }
+    }
+
+    #[test]
+    fn a_dozen_snapshots_are_a_block_each_or_two() {
+        let folds = Folds::unrelated(12);
+        assert_eq!((folds.count, folds.blocks.len()), (5, 10));
+        assert!(folds.blocks.iter().all(|b| (1..=2).contains(&b.len())));
+        assert_eq!(Folds::unrelated(7).blocks.len(), 7);
+        assert_eq!(
+            Folds::unrelated(9000).blocks.len(),
+            Folds::cut(9000).blocks.len()
+        );
     }
 
     #[test]

@@ -27,7 +27,18 @@ use focal_plane::{
 use nalgebra::{UnitQuaternion, Vector3};
 use star_tracker::{Disturbance, Pbm, Rows, Scratch};
 
+use spectra::robust;
+
 use crate::directions;
+
+/// A star with fewer rows has no scatter of its own: the median deviation of so many
+/// is uncertain by a quarter.
+const FEW_ROWS: usize = 10;
+/// A star that moves by less of the detector's width than this is where it was, to
+/// a declared distortion of the usual order.
+const NEAR_SHARE: f64 = 1.0 / 16.0;
+/// Frames with a smaller share of stars that stayed are unrelated.
+const SAME_SHARE: f64 = 0.1;
 
 /// What is known of one star.
 #[derive(Clone, Debug)]
@@ -120,6 +131,72 @@ impl StarData {
         data.modelled = data.projected.clone();
         data.update_phase(inputs.phase);
         data
+    }
+
+    /// Marks rows that stand out of `axes`, residuals of every row, and says how many.
+    ///
+    /// A row is held against the rows of its star, or of all stars that have too few for
+    /// a scatter of their own (snapshots of the sky hardly see a star twice). Where a
+    /// frame's attitude comes from its own stars, one that was mistaken for another pulls
+    /// all others off as well: of such a frame only the worst goes at a time.
+    pub(crate) fn mark_outliers(&mut self, axes: &[Vec<f64>]) -> usize {
+        let mut rows = vec![0_usize; self.stars.len()];
+        for &s in &self.star {
+            rows[s] += 1;
+        }
+        let few = self.stars.len();
+        let of = |&s: &usize| if rows[s] < FEW_ROWS { few } else { s };
+        let group: Vec<usize> = self.star.iter().map(of).collect();
+        let mut marked = self.outlier.clone();
+        for axis in axes {
+            robust::mark_outliers(axis, &group, few + 1, &mut marked);
+        }
+        let size = |r: usize| axes.iter().map(|a| a[r] * a[r]).sum::<f64>();
+        let mut added = 0;
+        for frame in 0..self.frames.frames() {
+            let rows = self.frames.rows_of(frame);
+            let mut new: Vec<usize> = rows.filter(|&r| marked[r] && !self.outlier[r]).collect();
+            if self.free_attitude {
+                let worst = new
+                    .iter()
+                    .copied()
+                    .max_by(|&a, &b| size(a).total_cmp(&size(b)));
+                new = worst.into_iter().collect();
+            }
+            added += new.len();
+            for r in new {
+                self.outlier[r] = true;
+            }
+        }
+        added
+    }
+
+    /// Whether each frame is a picture of its own: its attitude is free, and hardly a
+    /// star is where it was in the frame before. Then nothing that changes slowly over
+    /// the detector or with time makes the noise of neighbouring frames alike.
+    pub(crate) fn frames_are_unrelated(&self) -> bool {
+        let near = NEAR_SHARE * 2.0 * self.camera.half_size_px()[0];
+        let (mut same, mut all) = (0_usize, 0_usize);
+        let mut last = vec![[f64::INFINITY; 2]; self.stars.len()];
+        for frame in 0..self.frames.frames() {
+            let rows = self.frames.rows_of(frame);
+            if frame > 0 {
+                all += rows.len();
+                let here = |&r: &usize| [self.modelled[0][r], self.modelled[1][r]];
+                same += rows
+                    .clone()
+                    .filter(|r| {
+                        let ([x, y], [u, v]) = (here(r), last[self.star[*r]]);
+                        (x - u).hypot(y - v) < near
+                    })
+                    .count();
+            }
+            last.fill([f64::INFINITY; 2]);
+            for r in rows {
+                last[self.star[r]] = [self.modelled[0][r], self.modelled[1][r]];
+            }
+        }
+        self.free_attitude && (same as f64) < SAME_SHARE * all as f64
     }
 
     /// Attitude of each frame, and directions where they are unknown.
@@ -362,5 +439,5 @@ impl StarData {
 /// Median of the steps of a time grid, s.
 pub(crate) fn median_step(t_s: &[f64]) -> Option<f64> {
     let mut steps: Vec<f64> = t_s.windows(2).map(|w| w[1] - w[0]).collect();
-    spectra::robust::median(&mut steps)
+    robust::median(&mut steps)
 }

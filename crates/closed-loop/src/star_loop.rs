@@ -45,7 +45,9 @@ use crate::star_search::{self, Wander};
 use spectra::robust;
 
 /// Fewest frames: every fold needs data to be predicted from.
-const MIN_FRAMES: usize = 4;
+const MIN_FRAMES: usize = 2;
+/// How often rows that only the effects found make stand out are set aside.
+const OUTLIER_ROUNDS: usize = 2;
 /// Fits of the declared unknowns, each at better modelled positions.
 const SETTLING_ROUNDS: usize = 4;
 
@@ -80,9 +82,33 @@ pub(crate) fn run(
             why: "the others lie outside the reference, or have no two stars to solve an attitude from",
         });
     }
-    let folds = Folds::cut(data.frames.frames());
+    let unrelated = data.frames_are_unrelated();
+    let folds = if unrelated {
+        Folds::unrelated(data.frames.frames())
+    } else {
+        Folds::cut(data.frames.frames())
+    };
+    for _ in 0..OUTLIER_ROUNDS {
+        let closed = trace(&mut data, situation, &phase, &folds, progress)?;
+        // a star mistaken for another hides in the residual of a lens that nobody calibrated
+        let left = closed.stars.as_ref().filter(|_| unrelated);
+        if left.is_none_or(|s| data.mark_outliers(&s.after_arcsec) == 0) {
+            return Ok(closed);
+        }
+    }
+    trace(&mut data, situation, &phase, &folds, progress)
+}
+
+/// From the residual of the declared model to the report.
+fn trace(
+    data: &mut StarData,
+    situation: &Situation<'_>,
+    phase: &centroid::CentroidError,
+    folds: &Folds,
+    progress: &dyn Fn(&str),
+) -> Result<Closed, CloseError> {
     progress("residuals of the declared model");
-    let before = settle(&mut data, situation, &phase, &folds)?;
+    let before = settle(data, situation, phase, folds)?;
 
     let around: Option<Box<dyn AttitudeSource>> = match &situation.reference {
         Some(_) => resolved_motion(situation, &data.frames.t_s),
@@ -93,12 +119,13 @@ pub(crate) fn run(
     };
     let motion = around.as_deref();
     data.follow(motion);
-    let measured = evidence(&data, situation, vec![data.measured_residual()], motion);
+    let data = &*data;
+    let measured = evidence(data, situation, vec![data.measured_residual()], motion);
 
     let formed = match &situation.bundle.images {
         Some(windows) => {
             progress("dark map from the raw windows");
-            images::form(&data, windows, &folds)
+            images::form(data, windows, folds)
         }
         None => None,
     };
@@ -107,9 +134,9 @@ pub(crate) fn run(
             .iter()
             .map(|c| data.residual_arcsec(Points { x: &c[0], y: &c[1] }))
             .collect();
-        let evidence = evidence(&data, situation, residuals, motion);
+        let evidence = evidence(data, situation, residuals, motion);
         StarEvidence {
-            nuisance: evidence.nuisance.with_zeros(&data, zero_px),
+            nuisance: evidence.nuisance.with_zeros(data, zero_px),
             ..evidence
         }
     };
@@ -132,15 +159,13 @@ pub(crate) fn run(
             bv: s.bv,
         })
         .collect();
-    let rows = all_rows(&data, motion);
-    let scene = scene(situation, &data, &facts, &rows);
+    let rows = all_rows(data, motion);
+    let scene = scene(situation, data, &facts, &rows);
     let image = match &sides {
         Some(sides) => {
             let mut phase = catalogue_candidates(&scene);
             phase.retain(|c| c.id() == "pixel_phase_harmonics");
-            Some(image_level::compare(
-                &measured, sides, &phase, &folds, &data,
-            )?)
+            Some(image_level::compare(&measured, sides, &phase, folds, data)?)
         }
         None => None,
     };
@@ -152,15 +177,15 @@ pub(crate) fn run(
         let mut list = catalogue_candidates(&scene);
         // With raw windows a warm pixel is the dark map's business.
         list.retain(|c| c.acts_on_stars() && !(formed.is_some() && c.id() == "hot_pixel"));
-        list.extend(leftover_terms(situation, &data));
+        list.extend(leftover_terms(situation, data));
         list
     };
-    let searched = star_search::run(level, &folds, &candidates, &|c| c.id() != EMPIRICAL)?;
+    let searched = star_search::run(level, folds, &candidates, &|c| c.id() != EMPIRICAL)?;
     progress("figures");
     finish(&Finish {
         situation,
-        data: &data,
-        folds: &folds,
+        data,
+        folds,
         measured: &measured,
         level: searched.evidence.as_ref().unwrap_or(level),
         found: &searched.found,
@@ -186,11 +211,7 @@ fn settle(
             let amplitudes = amplitudes(&fitted, folds, &[], 0).ok_or(CloseError::Singular)?;
             evidence.residuals(folds, &[], &amplitudes)
         };
-        let stars = data.stars.len();
-        let mut added = 0;
-        for axis in &before.axes {
-            added += robust::mark_outliers(axis, &data.star, stars, &mut data.outlier);
-        }
+        let added = data.mark_outliers(&before.axes);
         round += 1;
         if round >= SETTLING_ROUNDS && (added == 0 || round > 3 * SETTLING_ROUNDS) {
             return Ok(before);

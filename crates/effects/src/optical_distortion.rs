@@ -1,15 +1,16 @@
-//! Optical distortion outside the declared prior: radial, decentring, off-centre.
+//! Optical distortion outside the declared prior: scale, radial, decentring, off-centre.
 //!
 //! ```text
 //! x, y    tangent-plane position minus the centre (cx_px, cy_px),   r^2 = x^2 + y^2
-//! dx = x (k1 r^2 + k2 r^4) + 2 p1 x y + p2 (r^2 + 2 x^2)
-//! dy = y (k1 r^2 + k2 r^4) + p1 (r^2 + 2 y^2) + 2 p2 x y            times f: px
+//! dx = x (k0 + k1 r^2 + k2 r^4) + 2 p1 x y + p2 (r^2 + 2 x^2)
+//! dy = y (k0 + k1 r^2 + k2 r^4) + p1 (r^2 + 2 y^2) + 2 p2 x y       times f: px
 //! ```
 //!
-//! The coefficients have no unit (focal length 1). As regressors, k1, k2, p1, p2 enter about the
-//! boresight; to first order a displaced centre of a radial term is itself a decentring one, so cx, cy
-//! are not fitted. Short star tracks do not tell r^2 from r^4: the candidates are nested sets of terms,
-//! and the data decides how many it supports.
+//! The coefficients have no unit (focal length 1). k0 is what the declared focal length is short by, as
+//! a share of itself: a lens whose focal length is a little off is never fitted well by k1 and k2. As
+//! regressors, all enter about the boresight; to first order a displaced centre of a radial term is
+//! itself a decentring one, so cx, cy are not fitted. Short star tracks do not tell r^2 from r^4: the
+//! candidates are nested sets of terms, and the data decides how many it supports.
 //!
 //! Source: Brown, "Decentering distortion of lenses", Photogrammetric Engineering 32 (1966) 444.
 
@@ -24,12 +25,24 @@ use crate::{
 };
 
 const ID: &str = "optical_distortion";
-const TERMS: [&str; 4] = ["k1", "k2", "p1", "p2"];
+const TERMS: [&str; 5] = ["k0", "k1", "k2", "p1", "p2"];
 
 /// Sets of terms that are tried, as indices into [`TERMS`].
-const SETS: [&[usize]; 5] = [&[0], &[2, 3], &[0, 2, 3], &[0, 1], &[0, 1, 2, 3]];
+const SETS: [&[usize]; 8] = [
+    &[0],
+    &[1],
+    &[0, 1],
+    &[3, 4],
+    &[1, 3, 4],
+    &[1, 2],
+    &[0, 1, 2],
+    &[0, 1, 2, 3, 4],
+];
 
-/// Shift at the edge of the field that would not surprise, arcsec.
+/// Shift at the edge of the field that would not surprise, as a share of the distance from the
+/// boresight: a tenth of what an uncalibrated photographic lens has.
+const PLAUSIBLE_SHARE: f64 = 2e-3;
+/// The same of a calibrated camera with a narrow field, arcsec.
 const PLAUSIBLE_ARCSEC: f64 = 10.0;
 
 /// The kind.
@@ -41,7 +54,7 @@ impl EffectKind for Kind {
         ID
     }
     fn summary(&self) -> &'static str {
-        "radial and decentring distortion outside the declared prior"
+        "scale, radial and decentring distortion outside the declared prior"
     }
     fn needs(&self) -> &'static str {
         "stars"
@@ -57,7 +70,7 @@ impl EffectKind for Kind {
         parameters: &Parameters,
         surroundings: &Surroundings<'_>,
     ) -> Result<Box<dyn Effect>, EffectError> {
-        let known = ["k1", "k2", "p1", "p2", "cx_px", "cy_px"];
+        let known = ["k0", "k1", "k2", "p1", "p2", "cx_px", "cy_px"];
         let reader = Reader::new(ID, parameters, &known)?;
         // Terms not given are not there, and are not reported as zeros.
         let terms: Vec<usize> = (0..TERMS.len()).filter(|&k| reader.has(TERMS[k])).collect();
@@ -106,8 +119,12 @@ impl Shift for Brown {
     }
     fn coefficients(&self) -> Vec<Coefficient> {
         let edge = self.camera.half_size_px()[0] / self.camera.focal_length_px()[0];
-        let size = PLAUSIBLE_ARCSEC / focal_plane::ARCSEC_PER_RAD;
+        let size = f64::max(
+            PLAUSIBLE_SHARE * edge,
+            PLAUSIBLE_ARCSEC / focal_plane::ARCSEC_PER_RAD,
+        );
         let plausible = [
+            size / edge,
             size / edge.powi(3),
             size / edge.powi(5),
             size / edge.powi(2),
@@ -128,6 +145,7 @@ impl Shift for Brown {
         let r2 = x * x + y * y;
         let [fx, fy] = self.camera.focal_length_px();
         let all = [
+            [fx * x, fy * y],
             [fx * x * r2, fy * y * r2],
             [fx * x * r2 * r2, fy * y * r2 * r2],
             [fx * 2.0 * x * y, fy * (r2 + 2.0 * y * y)],

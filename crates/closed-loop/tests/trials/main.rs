@@ -7,4 +7,5 @@ mod noise;
 mod nulls;
 mod patterns;
 mod power;
+mod snapshots;
 mod unknown;
