@@ -166,7 +166,7 @@ pub enum TelemetryError {
     },
     /// A Parquet file whose compression is not read.
     #[error(
-        "{file}, column {column}: expected snappy compression or none, found {found}; write the file anew with one of them"
+        "{file}, column {column}: expected snappy, zstd, gzip or LZ4 compression or none, found {found}; write the file anew with one of them"
     )]
     Compression {
         /// File.

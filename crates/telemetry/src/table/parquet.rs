@@ -58,7 +58,16 @@ fn read_chunks<C: ChunkReader + 'static>(
         .flat_map(RowGroupMetaData::columns)
     {
         let compression = column.compression();
-        if !matches!(compression, Compression::UNCOMPRESSED | Compression::SNAPPY) {
+        let read = match compression {
+            Compression::UNCOMPRESSED
+            | Compression::SNAPPY
+            | Compression::GZIP(_)
+            | Compression::ZSTD(_)
+            | Compression::LZ4
+            | Compression::LZ4_RAW => true,
+            Compression::BROTLI(_) | Compression::LZO => false,
+        };
+        if !read {
             return Err(TelemetryError::Compression {
                 file: file.into(),
                 column: column.column_path().string(),
