@@ -22,7 +22,8 @@ use std::sync::Arc;
 use centroid::CentroidError;
 use effects::Effect;
 use focal_plane::{
-    AttitudeSeries, AttitudeSource, Camera, Pixel, Points, PointsMut, StarFrames, Vectors,
+    ARCSEC_PER_RAD, AttitudeSeries, AttitudeSource, Camera, Pixel, Points, PointsMut, StarFrames,
+    Vectors,
 };
 use nalgebra::{UnitQuaternion, Vector3};
 use star_tracker::{Disturbance, Pbm, Rows, Scratch};
@@ -30,6 +31,7 @@ use star_tracker::{Disturbance, Pbm, Rows, Scratch};
 use spectra::robust;
 
 use crate::directions;
+use crate::frame_rotation::{rotation_of, rotation_row};
 
 /// A star with fewer rows has no scatter of its own: the median deviation of so many
 /// is uncertain by a quarter.
@@ -391,6 +393,35 @@ impl StarData {
         self.camera
             .project(&(q * u))
             .map_or([f64::NAN; 2], |p| [p.x, p.y])
+    }
+
+    /// Turns each frame's own attitude by what its stars still agree on, once `shift` (arcsec,
+    /// what the fitted unknowns move each row by) is out. The first attitudes know neither the
+    /// unknowns nor the declared effects: under a lens that bends by pixels they are off by
+    /// pixels, and with them every phase.
+    pub(crate) fn turn_frames(&mut self, shift: &[Vec<f64>]) {
+        let measured = self.measured_residual();
+        let left: Vec<Vec<f64>> = measured
+            .iter()
+            .zip(shift)
+            .map(|(m, s)| m.iter().zip(s).map(|(m, s)| m - s).collect())
+            .collect();
+        let scale = self.camera.arcsec_per_px();
+        for frame in 0..self.frames.frames() {
+            let Some(theta) = rotation_of(self, frame, &left) else {
+                continue;
+            };
+            let turn = UnitQuaternion::from_scaled_axis(theta / ARCSEC_PER_RAD);
+            self.attitude[frame] = turn * self.attitude[frame];
+            // pixels within the field: the square of the turn is nothing
+            for row in self.frames.rows_of(frame) {
+                let jacobian = rotation_row(self, row);
+                for axis in 0..2 {
+                    self.projected[axis][row] +=
+                        Vector3::from(jacobian[axis]).dot(&theta) / scale[axis];
+                }
+            }
+        }
     }
 
     /// Moves the modelled positions to projection + `shift` (arcsec, the fitted

@@ -216,6 +216,9 @@ fn settle(
         if round >= SETTLING_ROUNDS && (added == 0 || round > 3 * SETTLING_ROUNDS) {
             return Ok(before);
         }
+        if data.free_attitude {
+            data.turn_frames(&before.modelled);
+        }
         data.move_modelled(&before.modelled, phase);
     }
 }
