@@ -23,6 +23,7 @@ use crate::motion::{self, Around};
 use crate::search::{Found, amplitudes, borrowed, fit};
 use crate::selection::columns_of;
 use crate::situation::Situation;
+use crate::spatial_errors::SpatialErrors;
 use crate::star_data::median_step;
 use focal_plane::{AttitudeSource, Series};
 use nalgebra::{DVector, UnitQuaternion};
@@ -79,9 +80,10 @@ pub(crate) fn run(
     candidates.extend(leftover_terms(situation, &data));
     let with_noise = |noise: [Coloured; 3]| evidence(&data, situation, noise, motion);
     let start = fit_noise(&data, &before);
+    let changes = SpatialErrors::declared(situation, &data.t_s);
     let bins = &data.bins.folds;
     let (found, noise) =
-        attitude_search::search(&with_noise, &data, bins, &folds, candidates, start)?;
+        attitude_search::search(&with_noise, &data, bins, &folds, candidates, changes, start)?;
     let after = residuals(&with_noise(noise), &folds, &found, &found.selection.chosen)?;
     let mut rivals = Vec::new();
     for (set, gain) in attitude_search::rivals(&with_noise, &data, bins, &found, noise) {
@@ -271,6 +273,7 @@ pub(crate) fn channels_of_interest(
 fn slow_leftover(
     data: &AttitudeData,
     after: &Residuals,
+    declared: [f64; 3],
     unattributed: &mut Unattributed,
     left: f64,
 ) {
@@ -284,7 +287,10 @@ fn slow_leftover(
             ..noise
         };
         let loglik = |n: &Coloured| n.log_likelihood(&data.bins.t_s, &means, &data.count[axis]);
-        slow += noise.slow * noise.slow;
+        // what the declared model makes by itself is not left over
+        if noise.slow > declared[axis] {
+            slow += noise.slow * noise.slow;
+        }
         whole += figures::rms(&after.axes[axis], &data.outlier[axis]).map_or(0.0, |r| r * r);
         gain += (loglik(&noise) - loglik(&white)).max(0.0);
     }
@@ -430,14 +436,21 @@ fn finish(
     )?;
     let mut model = situation.model.clone();
     model.effects.extend(entries);
+    let changes = SpatialErrors::declared(situation, &data.t_s);
+    if let Some(changes) = changes {
+        let own: f64 = changes.slow_arcsec.iter().map(|s| s * s).sum();
+        unattributed.present &= unattributed.variance_fraction.unwrap_or(0.0) * whole > own;
+    }
     if situation.model.hem.is_none() {
-        slow_leftover(data, &plain, &mut unattributed, last / whole);
+        let declared = changes.map_or([0.0; 3], |c| c.slow_arcsec);
+        slow_leftover(data, &plain, declared, &mut unattributed, last / whole);
     }
     let inside = in_sample(&evidence, data.t_s.len(), found);
     let tracks = leftover::attitude_tracks(
         &data.t_s,
         &inside.as_ref().unwrap_or(&plain).axes,
         &data.outlier,
+        changes,
     );
     leftover::describe(&tracks).tell(&mut unattributed);
     let errors = |r: &Residuals| Errors {

@@ -32,6 +32,10 @@ use crate::figures;
 use crate::folds::Folds;
 use crate::search::{Fitted, Found, amplitudes, borrowed, fit, fit_design, polish};
 use crate::selection::{Judgement, Selection, columns_of, price};
+use crate::spatial_errors::SpatialErrors;
+
+/// The effect that a change of stars looks like.
+const STEP: &str = "step_misalignment";
 
 /// Rounds of generalised least squares and noise fit.
 const ALTERNATIONS: usize = 3;
@@ -52,6 +56,8 @@ struct Scored {
     out_of_fold: f64,
     /// Amplitudes and their robust standard errors are within credible bounds.
     credible: bool,
+    /// Amplitudes of all columns of the candidates, in order; zero where not observable.
+    amplitudes: Vec<f64>,
 }
 
 /// The search, and the noise it ends with; `rows` are the folds of the unbinned rows.
@@ -61,6 +67,7 @@ pub(crate) fn search<'d>(
     folds: &Folds,
     rows: &Folds,
     mut candidates: Vec<Box<dyn Candidate>>,
+    changes: Option<SpatialErrors>,
     start: [Coloured; 3],
 ) -> Result<(Found, [Coloured; 3]), CloseError> {
     let mut chosen: Vec<usize> = Vec::new();
@@ -81,6 +88,7 @@ pub(crate) fn search<'d>(
             fitted: &fitted,
             candidates: &candidates,
             binned,
+            changes,
             noise,
         };
         let base = trial.score(&chosen).ok_or(CloseError::Singular)?;
@@ -140,6 +148,7 @@ pub(crate) fn rivals(
         fitted: &found.fitted,
         candidates,
         binned,
+        changes: None,
         noise,
     };
     let mut sets: Vec<Vec<usize>> = vec![Vec::new()];
@@ -185,6 +194,8 @@ struct Trial<'a, 'd> {
     candidates: &'a [Box<dyn Candidate>],
     /// Columns of all candidates, averaged over the bins.
     binned: DMatrix<f64>,
+    /// Jumps that are no step.
+    changes: Option<SpatialErrors>,
     noise: [Coloured; 3],
 }
 
@@ -237,11 +248,12 @@ impl Trial<'_, '_> {
             return Judgement::UNSEEN;
         }
         let others: Vec<usize> = chosen.iter().copied().filter(|&c| c != g).collect();
-        let mut with = others.clone();
-        with.push(g);
+        let mut set = others.clone();
+        set.push(g);
         let scores = if others.len() == chosen.len() {
-            self.score(&with).map(|s| (s, base.clone()))
+            self.score(&set).map(|s| (s, base.clone()))
         } else {
+            set = chosen.to_vec();
             self.score(&others).map(|s| (base.clone(), s))
         };
         let Some((with, without)) = scores else {
@@ -255,12 +267,24 @@ impl Trial<'_, '_> {
         let ratio = 2.0 * (with.loglik - without.loglik) / WIDENING;
         let freedom = (group.columns.len() + group.choices) as f64;
         let p = ChiSquared::new(freedom).map_or(1.0, |law| law.sf(ratio.max(0.0)));
+        let p = (p * tried.max(1) as f64).min(1.0);
         Judgement {
             delta_loglik: with.out_of_fold - without.out_of_fold,
-            p_value: (p * tried.max(1) as f64).min(1.0),
+            p_value: p.max(self.a_change(&set, g, &with)),
             credible: with.credible,
             observable: true,
         }
+    }
+
+    /// Chance that step `g` of `set` is a change of stars.
+    fn a_change(&self, set: &[usize], g: usize, scored: &Scored) -> f64 {
+        let Some(changes) = self.changes.filter(|_| self.candidates[g].id() == STEP) else {
+            return 0.0;
+        };
+        let width = |c: &usize| self.candidates[*c].coefficients().len();
+        let first: usize = set.iter().take_while(|c| **c != g).map(width).sum();
+        let step = |axis: usize| scored.amplitudes.get(first + axis).copied().unwrap_or(0.0);
+        changes.chance([step(0), step(1), step(2)])
     }
 
     /// `chosen` at its own best noise.
@@ -295,9 +319,13 @@ impl Trial<'_, '_> {
                             .is_some_and(|i| (*low..=*high).contains(&estimate.value[i]))
                     })
             });
-            last = Some((self.loglik(&noise, &residual), credible));
+            let mut all = vec![0.0; columns];
+            for (value, &c) in estimate.value.iter().zip(&set) {
+                all[c] = *value;
+            }
+            last = Some((self.loglik(&noise, &residual), credible, all));
         }
-        let (loglik, credible) = last?;
+        let (loglik, credible, values) = last?;
         let evidence = (self.with_noise)(noise);
         let design = evidence.whitened(&binned);
         let fitted = fit_design(&evidence, design.as_ref(), self.folds, &candidates).ok()?;
@@ -308,6 +336,7 @@ impl Trial<'_, '_> {
             loglik,
             out_of_fold: self.loglik(&noise, &predicted),
             credible,
+            amplitudes: values,
         })
     }
 

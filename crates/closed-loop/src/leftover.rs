@@ -30,6 +30,7 @@ use crate::coloured::Coloured;
 use crate::folds::Folds;
 use crate::frame_rotation::{rotation_inverse, rotation_row};
 use crate::selection::FAMILY_ALPHA;
+use crate::spatial_errors::SpatialErrors;
 use crate::star_data::{StarData, median_step};
 use crate::star_search::WIDENING;
 use telemetry::report::Unattributed;
@@ -64,6 +65,8 @@ pub(crate) struct Track {
     pub(crate) value: Vec<f64>,
     /// Weight: the white variance is in inverse proportion; 0 does not count.
     pub(crate) weight: Vec<f64>,
+    /// Jumps that the declared model makes on this axis.
+    pub(crate) changes: Option<(SpatialErrors, usize)>,
 }
 
 /// Lines and jumps of one bundle.
@@ -125,6 +128,7 @@ pub(crate) fn star_tracks(data: &StarData, residual: &[Vec<f64>]) -> Vec<Track> 
         t_s: data.frames.t_s.clone(),
         value: vec![0.0; frames],
         weight: vec![0.0; frames],
+        changes: None,
     };
     let mut tracks = vec![empty(), empty(), empty(), empty()];
     let half = data.camera.half_size_px();
@@ -171,10 +175,13 @@ pub(crate) fn attitude_tracks(
     t_s: &[f64],
     axes: &[Vec<f64>],
     outlier: &[Vec<bool>; 3],
+    changes: Option<SpatialErrors>,
 ) -> Vec<Track> {
     axes.iter()
         .zip(outlier)
-        .map(|(value, outlier)| Track {
+        .enumerate()
+        .map(|(axis, (value, outlier))| Track {
+            changes: changes.map(|c| (c, axis)),
             t_s: t_s.to_vec(),
             value: value.clone(),
             weight: outlier.iter().map(|o| f64::from(u8::from(!o))).collect(),
@@ -206,6 +213,7 @@ impl Track {
             t_s: Vec::new(),
             value: Vec::new(),
             weight: Vec::new(),
+            changes: self.changes,
         };
         for rows in rows {
             let (mut t, mut v, mut w) = (0.0, 0.0, 0.0);
@@ -272,7 +280,7 @@ impl Track {
         Some((beta.iter().copied().collect(), left))
     }
 
-    /// Frequencies of lines; they are taken out of the series.
+    /// Frequencies of lines that the declared model does not make; all are taken out of the series.
     fn lines(&mut self, alpha: f64) -> Vec<f64> {
         let mut found: Vec<f64> = Vec::new();
         let whole = self.clone();
@@ -300,8 +308,15 @@ impl Track {
                 found[k] = left.top(&left.whitened(&noise, &left.value), found[k], step);
             }
         }
-        if let Some((_, left)) = whole.take_out(&self.noise(), &whole.sinusoids(&found)) {
+        if let Some((size, left)) = whole.take_out(&self.noise(), &whole.sinusoids(&found)) {
             *self = left;
+            let declared = self.changes.map_or(0.0, |(c, axis)| c.slow_arcsec[axis]);
+            let rms = |k: usize| size[1 + 2 * k].hypot(size[2 + 2 * k]) / std::f64::consts::SQRT_2;
+            let mut k = 0;
+            found.retain(|_| {
+                k += 1;
+                rms(k - 1) > declared
+            });
         }
         found
     }
@@ -415,19 +430,22 @@ impl Track {
                         .collect();
                     let columns = [vec![1.0; step.len()], step];
                     let mut its_noise = noise;
-                    let mut left = self.take_out(&white, &columns)?.1;
+                    let (mut size, mut left) = self.take_out(&white, &columns)?;
                     for _ in 0..2 {
                         its_noise = left.noise();
-                        left = self.take_out(&its_noise, &columns)?.1;
+                        (size, left) = self.take_out(&its_noise, &columns)?;
                     }
                     let after = left.loglik(&its_noise);
-                    Some((after, at, left))
+                    Some((after, at, size[1], left))
                 })
                 .max_by(|a, b| a.0.total_cmp(&b.0));
-            let Some((after, at, left)) = best else { break };
+            let Some((after, at, size, left)) = best else {
+                break;
+            };
             let ratio = 2.0 * (after - before) / WIDENING;
             let p = ChiSquared::new(1.0).map_or(1.0, |law| law.sf(ratio.max(0.0)));
-            if p * tried as f64 >= alpha {
+            let change = |(c, axis): (SpatialErrors, usize)| c.chance_on(axis, size);
+            if p * tried as f64 >= alpha || self.changes.map_or(0.0, change) >= alpha {
                 break;
             }
             found.push(0.5 * (self.t_s[at - 1] + self.t_s[at]));

@@ -39,6 +39,7 @@ mod reference_wander;
 mod search;
 mod selection;
 mod situation;
+mod spatial_errors;
 mod stand_ins;
 mod star_columns;
 mod star_data;

@@ -21,6 +21,7 @@ fn tracks(seed: u64, points: usize, slow: f64, signal: &dyn Fn(f64) -> f64) -> V
                 })
                 .collect();
             Track {
+                changes: None,
                 weight: vec![1.0; points],
                 t_s,
                 value,

@@ -9,6 +9,8 @@ use telemetry::{Bundle, Model};
 /// How the tracker moves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Path {
+    /// At rest.
+    Still,
     /// A slow drift, tens of pixels within the run.
     Drift,
     /// Slews to and fro about three axes, up to 5 px/s.
@@ -33,6 +35,7 @@ impl Path {
             )
         };
         match self {
+            Self::Still => format!("[motion]\nkind = \"hold\"\n{start}\n"),
             Self::Drift => {
                 format!("[motion]\nkind = \"hold\"\n{start}\ndrift_arcsec_s = [6.0, -9.0, 1.0]\n")
             }

@@ -1,0 +1,129 @@
+//! Slow errors of the attitude that the declared model makes by itself: stars cross the
+//! detector, and change.
+//!
+//! Each star brings the declared error of its own place along. While n stars drift over
+//! pixels, and when one of them is replaced, the attitude errs and jumps by
+//!
+//! ```text
+//!         error                  jump                     s^2 = sigma_LSF^2/2 + A^2/3
+//! x, y:   s / sqrt(n)            sqrt(2) s / n            one axis of one star
+//! z:      s / (sqrt(2 n/3) h)    sqrt(2) s / (n (2/3) h)  h: half the field; stars of rms distance
+//!                                                         sqrt(2/3) h, the one that changes at the edge
+//! N = n sum (d / (2 h) + a / 4)  changes while the boresight moves by d and rolls by a
+//! ```
+//!
+//! (A: peak of the declared triangle). The attitude alone does not tell such a jump from a
+//! shift of the bracket: a step counts as one only if none of N changes makes it. Lines and
+//! slow noise within the error are what was declared, once the stars cross pixels. All are
+//! taken twice as wide: bright stars stand in heaps, two may go at once, and a sum of a few
+//! places scatters.
+//!
+//! Source: [M23] Fig. 4 with equal weights; erratum E14 for attitudes of few stars.
+
+use focal_plane::AttitudeSource;
+use nalgebra::Vector3;
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+use telemetry::ModelKind;
+
+use crate::situation::Situation;
+
+/// Stars of a model that does not say how many.
+const USUAL_STARS: f64 = 10.0;
+/// See the header.
+const WIDER: f64 = 2.0;
+/// Stretches of the motion; a jitter faster than that changes no stars for long.
+const STRETCHES: usize = 24;
+
+/// What changes of stars do to an attitude.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct SpatialErrors {
+    /// 1 sigma of a jump per axis, arcsec.
+    pub(crate) sigma_arcsec: [f64; 3],
+    /// Largest rms of the error per axis, arcsec; zero where no star crosses a pixel.
+    pub(crate) slow_arcsec: [f64; 3],
+    /// How many there are.
+    pub(crate) expected: f64,
+}
+
+impl SpatialErrors {
+    /// Of the declared model along the reference at times `t_s`; `None` if it declares no
+    /// error that stays with a place.
+    pub(crate) fn declared(situation: &Situation<'_>, t_s: &[f64]) -> Option<Self> {
+        let model = situation.model;
+        let reference = situation.reference.as_ref()?;
+        if model.kind != ModelKind::Pbm || t_s.len() < 2 {
+            return None;
+        }
+        let noise = &model.noise;
+        let star = (noise.distortion_arcsec.unwrap_or(0.0).powi(2) / 2.0
+            + noise.centroid_arcsec.unwrap_or(0.0).powi(2) / 3.0)
+            .sqrt();
+        let n = model.tracker.max_stars.map_or(USUAL_STARS, f64::from);
+        let [x, y] = situation.camera.half_size_px();
+        let half = x.max(y) / situation.camera.focal_length_px()[0];
+        let jump = WIDER * std::f64::consts::SQRT_2 * star / n;
+        let error = WIDER * star / n.sqrt();
+        let mut moved = 0.0;
+        let mut last = None;
+        for k in 0..=STRETCHES {
+            let Some(q) = reference.attitude(t_s[k * (t_s.len() - 1) / STRETCHES]) else {
+                continue;
+            };
+            if let Some(last) = last {
+                let turn: Vector3<f64> = focal_plane::rotation_vector(&q, &last);
+                moved += turn.xy().norm() / (2.0 * half) + turn.z.abs() / 4.0;
+            }
+            last = Some(q);
+        }
+        let crossed = moved * 2.0 * x.max(y) > 1.0;
+        let slow_arcsec = [error, error, error / (half * (2.0_f64 / 3.0).sqrt())];
+        (star > 0.0).then_some(Self {
+            sigma_arcsec: [jump, jump, jump / (2.0 / 3.0 * half)],
+            slow_arcsec: if crossed { slow_arcsec } else { [0.0; 3] },
+            expected: n * moved,
+        })
+    }
+
+    /// Chance that one of the changes makes a jump as large as `step`, arcsec.
+    pub(crate) fn chance(&self, step: [f64; 3]) -> f64 {
+        let square: f64 = (0..3)
+            .map(|a| (step[a] / self.sigma_arcsec[a]).powi(2))
+            .sum();
+        self.paid(square, 3.0)
+    }
+
+    /// The same of axis `axis` alone.
+    pub(crate) fn chance_on(&self, axis: usize, step: f64) -> f64 {
+        self.paid((step / self.sigma_arcsec[axis]).powi(2), 1.0)
+    }
+
+    fn paid(&self, square: f64, freedom: f64) -> f64 {
+        let one = ChiSquared::new(freedom).map_or(1.0, |law| law.sf(square));
+        (one * self.expected).min(1.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Three sigma of the largest axis come by chance in 2 to 3 of 100 changes; where
+    /// nothing changes, no step is one of them.
+    #[test]
+    fn a_step_is_held_against_the_changes_that_there_are() {
+        let changes = SpatialErrors {
+            sigma_arcsec: [0.5, 0.5, 5.0],
+            slow_arcsec: [0.0; 3],
+            expected: 20.0,
+        };
+        assert!(changes.chance([1.5, 0.0, 0.0]) > 0.5);
+        // exp(-x/2) (1 + ...) at 36: 7.5e-8 times 20
+        assert!((changes.chance([0.0, 3.0, 0.0]) - 1.5e-6).abs() < 2e-7);
+        assert!((changes.chance_on(2, 15.0) - 20.0 * 0.0027).abs() < 1e-4);
+        let still = SpatialErrors {
+            expected: 0.0,
+            ..changes
+        };
+        assert!(still.chance([0.1, 0.0, 0.0]).abs() < f64::EPSILON);
+    }
+}
