@@ -3,8 +3,8 @@
 //! An effect that was found is right if its id is that of an effect that acts, or one that the truth takes
 //! for as right, and every selector of the truth (a channel, a star) is the same. Each effect that acts
 //! answers for one that was found; a second of its kind is extra, as is any other. Parameters are held
-//! against the truth by name: z is their error over the reported sigma, or over a quarter of the
-//! interval (95 %, 2 x 1.96 sigma) where that is reported instead.
+//! against the truth by name: z is their error over the reported sigma; where an interval of 95 % is
+//! reported instead, over what reaches from the value to the bound on the truth's side, 1.96 sigma.
 //!
 //! Not physics: counting.
 
@@ -122,7 +122,7 @@ pub fn score(report: &Report, truth: &Truth, floor: Option<Floor>) -> Score {
                         name: name.clone(),
                         unit: estimate.unit.clone(),
                         value: estimate.value,
-                        z: (estimate.value - value) / sigma(estimate),
+                        z: (estimate.value - value) / sigma(estimate, value),
                     });
                 }
             }
@@ -161,9 +161,10 @@ fn is(effect: &FoundEffect, acting: &Acting) -> bool {
         })
 }
 
-fn sigma(estimate: &Estimate) -> f64 {
+fn sigma(estimate: &Estimate, truth: f64) -> f64 {
     match (estimate.interval, estimate.sigma) {
-        (Some([low, high]), _) => (high - low) / (2.0 * 1.96),
+        (Some([_, high]), _) if truth > estimate.value => (high - estimate.value) / 1.96,
+        (Some([low, _]), _) => (estimate.value - low) / 1.96,
         (None, Some(sigma)) => sigma,
         (None, None) => f64::NAN,
     }
@@ -376,7 +377,7 @@ mod tests {
         let mut found = effect("step_misalignment", None, &[("at_s", 14.0, f64::NAN)]);
         for estimate in found.parameters.values_mut() {
             estimate.sigma = None;
-            estimate.interval = Some([10.0, 13.92]);
+            estimate.interval = Some([12.04, 20.0]);
         }
         let scored = score(&report(Verdict::Explained, vec![found], None), &truth, None);
         assert!((scored.drawn[0].z - 4.0).abs() < 1e-12);

@@ -16,14 +16,24 @@
 //!
 //! ```text
 //! V = S^-1 (sum_b s_b s_b^T + v (S - sum_b S_b)) S^-1,   s_b = the score of block b at beta
-//! F = (B - p) / (p (B - 1)) beta^T V^-1 beta ~ F(p, B - p)    (Hotelling)
 //! ```
+//!
+//! How much wider than under white noise, m = eigenvalues of V over v S^-1, is known far
+//! better on average over p parameters than for each alone: p (B - 1) squares tell it
+//! instead of B - p. So beta is measured by white noise, and that by the mean of m,
+//!
+//! ```text
+//! Q = beta^T S beta / v      Q / sum m ~ F(p e, p e (B - 1)),   e = (sum m)^2 / (p sum m^2)
+//! ```
+//!
+//! and, where the m are unequal, no tail is let below that of the widest alone. Hotelling's
+//! T^2, which asks for all of V, loses a tenth of six-parameter effects of six standard errors.
 //!
 //! `S - sum_b S_b` is what the prior of the nuisance adds: a drawn distortion is
 //! one draw for all blocks, and its share of the score shows in none of them.
 //! Few blocks, or a column that lives in few of them, make V too small by chance:
 //! neither the standard error nor the p-value is let below that of white noise,
-//! v S^-1 and chi-squared.
+//! v S^-1 and chi-squared of Q.
 //!
 //! Frames that share nothing in time have independent noise but for what the data
 //! says otherwise: there v S^-1 enters V as a prior that counts for `d` blocks,
@@ -32,12 +42,12 @@
 //! V' = (d v S^-1 + (B - 1) V) / (d + B - 1)      and B + d takes the place of B in F
 //! ```
 //!
-//! Source: Liang & Zeger 1986 (cluster-robust variance); Hotelling 1931; Smyth 2004
-//! (moderated variance).
+//! Source: Liang & Zeger 1986 (cluster-robust variance); Smyth 2004 (moderated variance);
+//! Box 1954 and Greenhouse & Geisser 1959 (F of unequal variances).
 
 use std::ops::Range;
 
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn, SymmetricEigen};
 use rayon::prelude::*;
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
 
@@ -252,24 +262,32 @@ impl Estimate {
         if which.is_empty() || b <= p {
             return 1.0;
         }
-        let (Some(robust), Some(white)) = (
-            self.distance(&self.covariance, which),
-            self.distance(&self.white, which),
-        ) else {
+        let (Some(square), Some(wider)) = (self.square(which), self.wider(which)) else {
             return 1.0;
         };
-        let f = (b - p) / (p * (b - 1.0)) * robust;
-        let hotelling = FisherSnedecor::new(p, b - p).map_or(1.0, |law| law.sf(f));
-        hotelling.max(ChiSquared::new(p).map_or(1.0, |law| law.sf(white)))
+        let mean = wider.sum() / p;
+        let likeness = wider.sum().powi(2) / (p * wider.norm_squared());
+        let alike = f_tail(square / (p * mean), p * likeness, b);
+        let worst = f_tail(square / wider.max(), 1.0, b);
+        let white = ChiSquared::new(p).map_or(1.0, |law| law.sf(square));
+        alike.max(worst).max(white)
     }
 
-    /// Squared distance of amplitudes `which` from zero in the metric of `covariance`.
-    fn distance(&self, covariance: &DMatrix<f64>, which: &[usize]) -> Option<f64> {
+    /// Squared distance of amplitudes `which` from zero if the noise were white.
+    pub(crate) fn square(&self, which: &[usize]) -> Option<f64> {
         let value = DVector::from_fn(which.len(), |i, _| self.value[which[i]]);
-        let part = DMatrix::from_fn(which.len(), which.len(), |i, j| {
-            covariance[(which[i], which[j])]
-        });
-        Some(value.dot(&Cholesky::new(part)?.solve(&value)))
+        let white = Cholesky::new(part(&self.white, which))?;
+        Some(value.dot(&white.solve(&value)))
+    }
+
+    /// How many times the variance of white noise the amplitudes `which` really have,
+    /// along the directions in which that is a number.
+    pub(crate) fn wider(&self, which: &[usize]) -> Option<DVector<f64>> {
+        let root = Cholesky::new(part(&self.white, which))?.l();
+        let half = root.solve_lower_triangular(&part(&self.covariance, which))?;
+        let whole = root.solve_lower_triangular(&half.transpose())?;
+        let values = SymmetricEigen::new(symmetric(whole)).eigenvalues;
+        (values.max() > 0.0).then_some(values)
     }
 
     /// The cluster-robust covariance with no variance below that of white noise.
@@ -288,6 +306,18 @@ impl Estimate {
             .max(0.0)
             .sqrt()
     }
+}
+
+/// Rows and columns `which`.
+fn part(matrix: &DMatrix<f64>, which: &[usize]) -> DMatrix<f64> {
+    DMatrix::from_fn(which.len(), which.len(), |i, j| {
+        matrix[(which[i], which[j])]
+    })
+}
+
+/// Chance of F beyond `f` with `p` parameters, each with a variance from `blocks` blocks.
+fn f_tail(f: f64, p: f64, blocks: f64) -> f64 {
+    FisherSnedecor::new(p, p * (blocks - 1.0)).map_or(1.0, |law| law.sf(f))
 }
 
 /// All fits that selection needs, on one set of Grams.

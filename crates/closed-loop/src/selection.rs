@@ -35,6 +35,8 @@ pub(crate) struct Group {
     /// Choices among discrete forms that the group stands for, each paid for like
     /// a parameter.
     pub(crate) choices: usize,
+    /// Parameters that the columns follow non-linearly, found by scanning.
+    pub(crate) shapes: usize,
     /// Groups of one family are forms of one cause: at most one is chosen.
     pub(crate) family: String,
 }
