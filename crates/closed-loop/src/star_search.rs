@@ -10,12 +10,23 @@
 //!
 //! Candidates are put forward twice, by what white evidence and by what the present
 //! noise makes of them; the few best of each are scored, and the best that stands
-//! is added. An effect beside which the reference needs no slow error competes with
-//! that error as a whole: it stands if white evidence says so and it is the likelier
-//! of the two. Where the rotations of the declared model's residual are white, the
-//! plain search is all there is.
+//! is added. What white evidence finds by itself competes with that as a whole, each
+//! with its own noise and all that its freedom costs,
 //!
-//! Source: Wilks 1938 (likelihood ratio).
+//! ```text
+//! worth = L - sum over effects ( ln tried + k/2 (1 + ln(q/k)) ) - 4 a slow axis
+//! ```
+//!
+//! k parameters (instant, frequency and lag too), q the square of the amplitudes over
+//! their errors: the evidence if effects are spread like what was found. Without a slow
+//! error the noise is white, so that what such an error would add is taken off. The
+//! likelier explanation is named; an effect that is worth less than a slow error in its
+//! place is not, even if that error would not be named either. The log-odds of a step of
+//! q = 40 in white noise are about 4 +- 2.5, of a wander's best step -2 +- 2 or less:
+//! neither is ever certain. Where the rotations of the declared model's residual are
+//! white, the plain search is all there is.
+//!
+//! Source: Wilks 1938 (likelihood ratio); George & Foster 2000 (empirical Bayes selection).
 
 use effects::Candidate;
 use rayon::prelude::*;
@@ -120,7 +131,7 @@ fn attempt<'a>(
     let instead = Instead::of(white, folds, &found, may, &wander.noise)?;
     // Less than that imitates no effect, and would only hide one.
     if wander.axes().contains(&true) {
-        let better = instead.is_some_and(|i| i.refused.is_empty() && !i.slow && i.worth > worth);
+        let better = instead.is_some_and(|i| i.refused.is_empty() && i.worth > worth);
         if !better {
             let searched = Searched {
                 wander: Some(wander),
@@ -155,9 +166,8 @@ impl Searched<'_> {
 
 /// What white evidence chose, as an explanation in place of a slow error.
 struct Instead {
+    /// Beside a reference that has white noise alone.
     worth: f64,
-    /// It leaves a slow error behind.
-    slow: bool,
     /// What a slow error is worth more than.
     refused: Vec<usize>,
 }
@@ -187,7 +197,7 @@ impl Instead {
         };
         let score = |set: &[usize]| trial.score(set, noise).ok_or(CloseError::Singular);
         let whole = score(chosen)?;
-        let worth = trial.worth(&whole);
+        let worth = trial.worth(&whole, f64::INFINITY);
         let mut sets: Vec<Vec<usize>> = chosen
             .iter()
             .copied()
@@ -205,17 +215,13 @@ impl Instead {
                 .filter(|g| !set.contains(g))
                 .collect();
             let rest = score(&rest)?;
-            if trial.worth(&rest) > worth {
+            if trial.worth(&rest, SLOW_PRICE) > worth {
                 refused.extend(set);
             }
         }
         refused.sort_unstable();
         refused.dedup();
-        Ok(Some(Self {
-            worth,
-            slow: whole.is_slow(),
-            refused,
-        }))
+        Ok(Some(Self { worth, refused }))
     }
 }
 
@@ -263,13 +269,6 @@ struct Part {
     shapes: usize,
     /// Its sizes are such as nature makes.
     credible: bool,
-}
-
-impl Scored {
-    /// Whether a slow error is there beyond doubt.
-    fn is_slow(&self) -> bool {
-        significant(&self.rotations.slow_ratio(&self.noise)).contains(&true)
-    }
 }
 
 /// What scores hypotheses: everything comes from one pass over the data.
@@ -381,10 +380,10 @@ impl Trial<'_> {
 
     /// Log-likelihood less what the freedom of a hypothesis buys where nothing acts:
     /// for amplitudes the evidence under the spread that suits them best, for a slow
-    /// error a price a parameter, or its absence where that costs less.
-    fn worth(&self, scored: &Scored) -> f64 {
+    /// error of an axis `slow_price`, or its absence where that costs less.
+    fn worth(&self, scored: &Scored, slow_price: f64) -> f64 {
         let slow = scored.rotations.slow_ratio(&scored.noise);
-        let without: f64 = slow.iter().map(|r| (0.5 * r).clamp(0.0, SLOW_PRICE)).sum();
+        let without: f64 = slow.iter().map(|r| (0.5 * r).clamp(0.0, slow_price)).sum();
         let effects: f64 = scored
             .parts
             .iter()
@@ -520,7 +519,7 @@ fn coloured<'a>(
                 judged[g] = judgement;
             }
             let ratio = base.rotations.slow_ratio(&noise);
-            let worth = trial.worth(&base);
+            let worth = trial.worth(&base, SLOW_PRICE);
             return Ok(Coloured {
                 searched: Searched {
                     found: Found {

@@ -11,6 +11,8 @@ use telemetry::{Bundle, Model};
 pub(crate) enum Path {
     /// A slow drift, tens of pixels within the run.
     Drift,
+    /// Hardly a pixel within the run.
+    Still,
     /// Slews to and fro about three axes, up to 5 px/s.
     Slews,
     /// To and fro every 8 s: the image reverses again and again.
@@ -35,6 +37,11 @@ impl Path {
         match self {
             Self::Drift => {
                 format!("[motion]\nkind = \"hold\"\n{start}\ndrift_arcsec_s = [6.0, -9.0, 1.0]\n")
+            }
+            Self::Still => {
+                format!(
+                    "[motion]\nkind = \"hold\"\n{start}\ndrift_arcsec_s = [0.06, -0.09, 0.01]\n"
+                )
             }
             Self::Slews => {
                 let mut text = format!(
