@@ -7,6 +7,8 @@
 //! column_p = sum_j c_j (column_j(p + h) - column_j(p - h)) / 2h
 //! ```
 //!
+//! and the errors of the amplitudes are those beside it.
+//!
 //! An instant has no slope and no Gaussian error. Away from the true instant the log-likelihood
 //! falls like a random walk with a drift of minus half its variance, whose top is exponential:
 //!
@@ -32,9 +34,10 @@ use telemetry::report::FoundEffect;
 
 use crate::error::CloseError;
 use crate::evidence::Evidence;
+use crate::fit::Estimate;
 use crate::folds::Folds;
 use crate::search::{Found, fit};
-use crate::selection::columns_of;
+use crate::selection::{Group, columns_of};
 
 /// Parameters that are instants.
 const INSTANT: &str = "at_s";
@@ -86,9 +89,10 @@ pub(crate) fn complete(
     list.extend(slopes.iter().map(|s| &s.2 as &dyn Candidate));
     let fitted = fit(evidence, folds, &list)?;
     let all: Vec<usize> = (0..list.len()).collect();
-    let Some(estimate) = fitted.fits.estimate(&columns_of(&fitted.groups, &all)) else {
+    let Some(joint) = fitted.fits.estimate(&columns_of(&fitted.groups, &all)) else {
         return Ok(());
     };
+    widen(found, &fitted.groups, &estimate, &joint, effects);
     let mut at: usize = fitted.groups[..chosen.len()]
         .iter()
         .map(|group| group.columns.len())
@@ -98,11 +102,45 @@ pub(crate) fn complete(
             continue;
         }
         if let Some(told) = effects[*k].parameters.get_mut(*name) {
-            told.sigma = Some(estimate.sigma(at));
+            told.sigma = Some(joint.sigma(at));
         }
         at += 1;
     }
     Ok(())
+}
+
+/// Amplitudes are known less well where a lag or a frequency that changes with them is not known either:
+/// from `alone` to `joint`, which has the slopes too.
+fn widen(
+    found: &Found,
+    groups: &[Group],
+    alone: &Estimate,
+    joint: &Estimate,
+    effects: &mut [FoundEffect],
+) {
+    let mut at = 0;
+    for (k, &g) in found.selection.chosen.iter().enumerate() {
+        let columns = &found.fitted.groups[g].columns;
+        if groups[k].columns.len() != columns.len() {
+            return;
+        }
+        let before: usize = found.candidates[..g]
+            .iter()
+            .map(|c| c.coefficients().len())
+            .sum();
+        for &column in columns {
+            let name = &found.candidates[g].coefficients()[column - before].name;
+            let wider = joint.sigma(at) / alone.sigma(at);
+            if let Some(sigma) = effects[k]
+                .parameters
+                .get_mut(name)
+                .and_then(|told| told.sigma.as_mut())
+            {
+                *sigma *= wider.max(1.0);
+            }
+            at += 1;
+        }
+    }
 }
 
 /// Bounds of the instant of candidate `g`, beside the others that were chosen.
