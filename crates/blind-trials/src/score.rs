@@ -3,8 +3,8 @@
 //! An effect that was found is right if its id is that of an effect that acts, or one that the truth takes
 //! for as right, and every selector of the truth (a channel, a star) is the same. Each effect that acts
 //! answers for one that was found; a second of its kind is extra, as is any other. Parameters are held
-//! against the truth by name: z is their error over the reported sigma, or over a quarter of the
-//! interval (95 %, 2 x 1.96 sigma) where that is reported instead.
+//! against the truth by name: z is their error over the reported sigma. Where an interval of 95 % is
+//! reported instead (an instant, whose errors are not Gaussian), it holds the truth or not.
 //!
 //! Not physics: counting.
 
@@ -40,6 +40,8 @@ pub struct Drawn {
     pub value: f64,
     /// Error over sigma; NaN where there is no sigma.
     pub z: f64,
+    /// Whether the truth lies within the bounds; `None` where there are none.
+    pub held: Option<bool>,
 }
 
 /// A report, scored.
@@ -123,6 +125,7 @@ pub fn score(report: &Report, truth: &Truth, floor: Option<Floor>) -> Score {
                         unit: estimate.unit.clone(),
                         value: estimate.value,
                         z: (estimate.value - value) / sigma(estimate),
+                        held: (estimate.interval).map(|[low, high]| low <= value && value <= high),
                     });
                 }
             }
@@ -163,9 +166,8 @@ fn is(effect: &FoundEffect, acting: &Acting) -> bool {
 
 fn sigma(estimate: &Estimate) -> f64 {
     match (estimate.interval, estimate.sigma) {
-        (Some([low, high]), _) => (high - low) / (2.0 * 1.96),
         (None, Some(sigma)) => sigma,
-        (None, None) => f64::NAN,
+        _ => f64::NAN,
     }
 }
 
@@ -371,14 +373,20 @@ mod tests {
     }
 
     #[test]
-    fn an_interval_stands_for_sigma() {
+    fn an_interval_holds_the_truth_or_not() {
         let truth = truth(vec![acts("step_misalignment", None, &[("at_s", 10.0)])]);
-        let mut found = effect("step_misalignment", None, &[("at_s", 14.0, f64::NAN)]);
-        for estimate in found.parameters.values_mut() {
-            estimate.sigma = None;
-            estimate.interval = Some([10.0, 13.92]);
-        }
-        let scored = score(&report(Verdict::Explained, vec![found], None), &truth, None);
-        assert!((scored.drawn[0].z - 4.0).abs() < 1e-12);
+        let held = |interval: [f64; 2]| {
+            let mut found = effect("step_misalignment", None, &[("at_s", 14.0, 1.0)]);
+            for estimate in found.parameters.values_mut() {
+                estimate.interval = Some(interval);
+            }
+            let scored = score(&report(Verdict::Explained, vec![found], None), &truth, None);
+            // an instant has no sigma, whatever stands beside its bounds
+            assert!(scored.drawn[0].z.is_nan() && scored.values_right());
+            scored.drawn[0].held
+        };
+        assert_eq!(held([9.0, 15.0]), Some(true));
+        assert_eq!(held([11.0, 15.0]), Some(false));
+        assert_eq!(held([9.0, 9.5]), Some(false));
     }
 }

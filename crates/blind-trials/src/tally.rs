@@ -39,6 +39,8 @@ pub struct Tally {
     pub parameters: Vec<ParameterRow>,
     /// Sum of z^2, and their number.
     pub z: (f64, usize),
+    /// Intervals that hold the truth, of how many.
+    pub held: [usize; 2],
 }
 
 /// A parameter over the seeds in which its effect was found.
@@ -90,6 +92,10 @@ impl Tally {
             if score.floor.is_finite() {
                 tally.within[0] += usize::from((score.after / score.floor - 1.0).abs() <= 0.02);
                 tally.within[1] += 1;
+            }
+            for held in score.drawn.iter().filter_map(|d| d.held) {
+                tally.held[0] += usize::from(held);
+                tally.held[1] += 1;
             }
             for z in score.drawn.iter().map(|d| d.z).filter(|z| z.is_finite()) {
                 tally.z.0 += z * z;
@@ -190,6 +196,7 @@ mod tests {
                 unit: "s".into(),
                 value,
                 z: (value - 5.0) / 0.5,
+                held: None,
             }],
             ..a_score()
         };

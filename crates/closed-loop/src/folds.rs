@@ -14,7 +14,7 @@ use std::ops::Range;
 pub(crate) const FOLDS: usize = 5;
 /// Below this number of frames one frame is left out at a time.
 const LEAVE_ONE_OUT_BELOW: usize = 10;
-/// Blocks wanted over the whole span. Hotelling's statistic on p parameters
+/// Blocks wanted over the whole span. A variance of p parameters
 /// needs clearly more blocks than p; longer blocks hold longer correlations.
 const BLOCKS: usize = 60;
 /// A block shorter than this says little about correlation in time.

@@ -47,6 +47,7 @@ mod star_evidence;
 mod star_loop;
 mod star_moments;
 mod star_search;
+mod star_weights;
 
 pub use close::{Closed, Rival, close, close_asking};
 pub use error::CloseError;

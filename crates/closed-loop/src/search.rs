@@ -107,6 +107,7 @@ pub(crate) fn fit_grams(
             columns,
             bounds,
             choices: candidate.choices(),
+            shapes: candidate.nonlinear().len(),
             family: family(*candidate),
         });
         column += p;

@@ -1,7 +1,7 @@
 //! Which effects the data supports: forward selection out of fold.
 //!
 //! Every candidate group is tried beside those already chosen. It is eligible
-//! if its out-of-fold log-likelihood gain is positive and its Hotelling p-value,
+//! if its out-of-fold log-likelihood gain is positive and its p-value,
 //! times the number of groups that were tried (Bonferroni: the whole search is
 //! paid for), is below [`FAMILY_ALPHA`]. Of the eligible ones the largest gain
 //! after a price per parameter wins, so that a flexible wrong effect does not
@@ -35,6 +35,8 @@ pub(crate) struct Group {
     /// Choices among discrete forms that the group stands for, each paid for like
     /// a parameter.
     pub(crate) choices: usize,
+    /// Parameters that the columns follow non-linearly, found by scanning.
+    pub(crate) shapes: usize,
     /// Groups of one family are forms of one cause: at most one is chosen.
     pub(crate) family: String,
 }

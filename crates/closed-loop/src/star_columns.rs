@@ -32,6 +32,8 @@ pub(crate) struct StarColumns<'a> {
     pub(crate) residuals: &'a [[Vec<f64>; 2]],
     /// The motion that candidates may evaluate.
     pub(crate) motion: Option<&'a dyn AttitudeSource>,
+    /// Weight of each row ([`crate::star_weights`]).
+    pub(crate) weight: &'a [f64],
 }
 
 /// The columns of some frames.
@@ -224,19 +226,32 @@ impl StarColumns<'_> {
         }
     }
 
-    /// Zeroes the rows of outliers; returns how many of `frames`' rows count.
-    pub(crate) fn mask(&self, frames: Range<usize>, out: &mut Filled) -> usize {
+    /// What a row counts for: nothing if it is an outlier.
+    pub(crate) fn weight_of(&self, row: usize) -> f64 {
+        if self.data.outlier[row] {
+            0.0
+        } else {
+            self.weight[row]
+        }
+    }
+
+    /// Weighs the rows; returns how many of `frames`' rows count.
+    pub(crate) fn weigh(&self, frames: Range<usize>, out: &mut Filled) -> usize {
         let data = self.data;
         let rows = data.frames.first_row[frames.start]..data.frames.first_row[frames.end];
-        let mut used = rows.len();
-        for i in (0..rows.len()).filter(|i| data.outlier[rows.start + i]) {
-            out.shared.row_mut(i).fill(0.0);
-            for own in &mut out.own {
-                own.row_mut(i).fill(0.0);
+        let scaled = |m: &mut DMatrix<f64>| {
+            if m.is_empty() {
+                return;
             }
-            used -= 1;
-        }
-        used
+            for column in m.as_mut_slice().chunks_exact_mut(rows.len()) {
+                for (v, row) in column.iter_mut().zip(rows.clone()) {
+                    *v *= self.weight_of(row);
+                }
+            }
+        };
+        scaled(&mut out.shared);
+        out.own.iter_mut().for_each(scaled);
+        rows.clone().filter(|&row| !data.outlier[row]).count()
     }
 
     /// What `amplitudes` (nuisance and candidates) shift the filled rows of `frames`

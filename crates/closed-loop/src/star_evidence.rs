@@ -39,6 +39,8 @@ pub(crate) struct StarEvidence<'a> {
     pub(crate) sigma_guess_arcsec: f64,
     /// Noise that the stars of a frame share; `None`: white.
     pub(crate) noise: Option<CommonNoise>,
+    /// Weight of each row.
+    pub(crate) weight: Arc<Vec<f64>>,
 }
 
 impl<'a> StarEvidence<'a> {
@@ -64,6 +66,7 @@ impl<'a> StarEvidence<'a> {
             candidates,
             residuals: &self.residuals,
             motion: self.motion,
+            weight: &self.weight,
         }
     }
 

@@ -42,6 +42,7 @@ use crate::situation::Situation;
 use crate::star_data::{Inputs, Star, StarData, median_step};
 use crate::star_evidence::StarEvidence;
 use crate::star_search::{self, Wander};
+use crate::star_weights;
 use spectra::robust;
 
 /// Fewest frames: every fold needs data to be predicted from.
@@ -238,6 +239,12 @@ fn evidence<'a>(
         // circular to per axis
         sigma_guess_arcsec: temporal.map_or(1.0, |s| s / std::f64::consts::SQRT_2),
         noise: None,
+        // where windows are sent, centroids are formed anew, with another noise
+        weight: Arc::new(if situation.bundle.images.is_some() {
+            vec![1.0; data.t_s.len()]
+        } else {
+            star_weights::of(data)
+        }),
     }
 }
 

@@ -30,7 +30,6 @@ use crate::folds::Folds;
 use crate::frame_rotation::rotation_row;
 use crate::gram::BlockGrams;
 use crate::star_columns::{Filled, Layout, StarColumns};
-use crate::star_data::StarData;
 
 /// Frames whose columns are filled at once: enough for the matrix product to
 /// dominate, few enough to stay in cache.
@@ -337,12 +336,12 @@ impl Sums {
             let chunk = at..(at + CHUNK_FRAMES).min(frames.end);
             at = chunk.end;
             columns.fill(chunk.clone(), &sums.layout, &mut scratch.filled);
-            sums.scalars += 2 * columns.mask(chunk.clone(), &mut scratch.filled);
+            sums.scalars += 2 * columns.weigh(chunk.clone(), &mut scratch.filled);
             sums.add_rows(&mut scratch);
             if bins.is_none() && turn == 0 {
                 continue;
             }
-            let moments = moments(columns.data, chunk.clone(), &sums.layout, &mut scratch);
+            let moments = moments(columns, chunk.clone(), &sums.layout, &mut scratch);
             if turn > 0 {
                 let turned = scratch.filled.turn.transpose();
                 sums.turn.gemm(1.0, &turned, &moments, 1.0);
@@ -353,7 +352,7 @@ impl Sums {
                     bin += 1;
                 }
                 if without[bin] {
-                    sums.lose(columns.data, frame, k, &scratch);
+                    sums.lose(columns, frame, k, &scratch);
                 } else if let Some((kept, normals)) = &mut sums.bins {
                     let mut kept = kept.fixed_rows_mut::<3>(3 * bin);
                     kept += moments.fixed_rows::<3>(3 * k);
@@ -402,7 +401,8 @@ impl Sums {
     }
 
     /// Puts the rows of frame `k` of the chunk among those of no rotation.
-    fn lose(&mut self, data: &StarData, frame: usize, k: usize, scratch: &Scratch) {
+    fn lose(&mut self, columns: &StarColumns<'_>, frame: usize, k: usize, scratch: &Scratch) {
+        let data = columns.data;
         let width = self.layout.width();
         let (lost, scalars) = self
             .lost
@@ -411,7 +411,7 @@ impl Sums {
         let filled = &scratch.filled;
         let first = data.frames.first_row[frame - k];
         for row in data.frames.rows_of(frame).filter(|&r| !data.outlier[r]) {
-            let jacobian = rotation_row(data, row);
+            let jacobian = weighed_rotation(columns, row);
             let i = row - first;
             for axis in 0..2 {
                 let mut line = DVector::zeros(width);
@@ -510,13 +510,24 @@ impl Block {
     }
 }
 
+/// Rotation columns of a row, times its weight.
+fn weighed_rotation(columns: &StarColumns<'_>, row: usize) -> [[f64; 3]; 2] {
+    let weight = columns.weight_of(row);
+    if weight > 0.0 {
+        rotation_row(columns.data, row).map(|axis| axis.map(|a| weight * a))
+    } else {
+        [[0.0; 3]; 2]
+    }
+}
+
 /// A^T c of every frame and column, three rows a frame, and N of every frame.
 fn moments(
-    data: &StarData,
+    columns: &StarColumns<'_>,
     frames: Range<usize>,
     layout: &Layout,
     scratch: &mut Scratch,
 ) -> DMatrix<f64> {
+    let data = columns.data;
     let first = data.frames.first_row[frames.start];
     let last = data.frames.first_row[frames.end];
     let Scratch {
@@ -526,13 +537,7 @@ fn moments(
         ..
     } = scratch;
     jacobian.clear();
-    jacobian.extend((first..last).map(|row| {
-        if data.outlier[row] {
-            [[0.0; 3]; 2]
-        } else {
-            rotation_row(data, row)
-        }
-    }));
+    jacobian.extend((first..last).map(|row| weighed_rotation(columns, row)));
     let of_frame: Vec<Range<usize>> = frames
         .map(|k| {
             let rows = data.frames.rows_of(k);

@@ -10,12 +10,23 @@
 //!
 //! Candidates are put forward twice, by what white evidence and by what the present
 //! noise makes of them; the few best of each are scored, and the best that stands
-//! is added. An effect beside which the reference needs no slow error competes with
-//! that error as a whole: it stands if white evidence says so and it is the likelier
-//! of the two. Where the rotations of the declared model's residual are white, the
-//! plain search is all there is.
+//! is added. What white evidence finds by itself competes with that as a whole, each
+//! with its own noise and all that its freedom costs,
 //!
-//! Source: Wilks 1938 (likelihood ratio).
+//! ```text
+//! worth = L - sum over effects ( ln tried + k/2 (1 + ln(q/k)) ) - 4 a slow axis
+//! ```
+//!
+//! k parameters (instant, frequency and lag too), q the square of the amplitudes over
+//! their errors: the evidence if effects are spread like what was found. Without a slow
+//! error the noise is white, so that what such an error would add is taken off. The
+//! likelier explanation is named; an effect that is worth less than a slow error in its
+//! place is not, even if that error would not be named either. The log-odds of a step of
+//! q = 40 in white noise are about 4 +- 2.5, of a wander's best step -2 +- 2 or less:
+//! neither is ever certain. Where the rotations of the declared model's residual are
+//! white, the plain search is all there is.
+//!
+//! Source: Wilks 1938 (likelihood ratio); George & Foster 2000 (empirical Bayes selection).
 
 use effects::Candidate;
 use rayon::prelude::*;
@@ -41,14 +52,9 @@ const ALTERNATIONS: usize = 2;
 /// The ratio of a noise model that is only nearly right runs this much wider than
 /// chi-squared (as at attitude level).
 pub(crate) const WIDENING: f64 = 1.3;
-/// An effect that leaves no slow error behind explains the residual in its place:
-/// it has to be this many times likelier (natural logarithm).
-const INSTEAD: f64 = 6.0;
-/// Chance under white noise below which a slow error is not even a suspicion.
-const SUSPICION: f64 = 0.3;
-/// What looks like a slow error of the reference has to be this far from chance
-/// where one is suspected.
-const SUSPECT_ALPHA: f64 = 1e-4;
+/// What a slow error of an axis pays for its size and correlation time, nats: a size is
+/// known to a fifth and a time to a factor of two, within the decades that they may have.
+const SLOW_PRICE: f64 = 4.0;
 /// Most effects that are added.
 const MOST: usize = 8;
 /// Searches whose outcome is refused before one is taken as it is.
@@ -87,15 +93,8 @@ pub(crate) fn run<'a>(
     };
     let mut may: Vec<bool> = candidates().iter().map(|c| eligible(c.as_ref())).collect();
     for _ in 0..MOST_REFUSALS {
-        let (searched, suspected) = attempt(white, folds, candidates(), &may, start)?;
-        let found = &searched.found;
-        let mut refused: Vec<usize> = found.selection.chosen.clone();
-        refused.retain(|&g| {
-            suspected
-                && found.candidates[g].acts_on_attitude()
-                && found.selection.judged[g].p_value > SUSPECT_ALPHA
-        });
-        refused.extend(stand_ins(found));
+        let (searched, mut refused) = attempt(white, folds, candidates, &may, start)?;
+        refused.extend(stand_ins(&searched.found));
         if refused.is_empty() {
             return Ok(searched);
         }
@@ -103,43 +102,132 @@ pub(crate) fn run<'a>(
             may[g] = false;
         }
     }
-    Ok(attempt(white, folds, candidates(), &may, start)?.0)
+    // no end: what a slow error or a term of one variable explains better is not named
+    for (may, candidate) in may.iter_mut().zip(candidates()) {
+        *may &= !candidate.acts_on_attitude();
+    }
+    Ok(attempt(white, folds, candidates, &may, start)?.0)
 }
 
-/// One search, and whether a slow error of the reference is suspected that is not
-/// part of what was found.
+/// One search, and what of its outcome a slow error of the reference explains better.
 fn attempt<'a>(
     white: &StarEvidence<'a>,
     folds: &Folds,
-    mut candidates: Vec<Box<dyn Candidate>>,
+    candidates: &dyn Fn() -> Vec<Box<dyn Candidate>>,
     may: &[bool],
     start: Option<CommonNoise>,
-) -> Result<(Searched<'a>, bool), CloseError> {
-    let (mut suspected, mut begun) = (false, None);
-    if let Some(start) = start {
-        let Coloured {
-            searched,
-            wander,
-            white: plain,
-        } = coloured(white, folds, candidates, may, start)?;
-        // Less than that imitates no effect, and would only hide one.
-        if wander.axes().contains(&true) {
+) -> Result<(Searched<'a>, Vec<usize>), CloseError> {
+    let Some(start) = start else {
+        let found = search(white, folds, candidates(), may, None)?;
+        return Ok((Searched::plain(found), Vec::new()));
+    };
+    let Coloured {
+        searched,
+        wander,
+        white: begun,
+        worth,
+    } = coloured(white, folds, candidates(), may, start)?;
+    let found = search(white, folds, candidates(), may, begun)?;
+    let instead = Instead::of(white, folds, &found, may, &wander.noise)?;
+    // Less than that imitates no effect, and would only hide one.
+    if wander.axes().contains(&true) {
+        let better = instead.is_some_and(|i| i.refused.is_empty() && i.worth > worth);
+        if !better {
             let searched = Searched {
                 wander: Some(wander),
                 ..searched
             };
-            return Ok((searched, false));
+            return Ok((searched, Vec::new()));
         }
-        suspected = chances(&wander.ratio).iter().any(|p| *p < SUSPICION);
-        candidates = searched.found.candidates;
-        begun = Some(plain);
+        return Ok((Searched::plain(found), Vec::new()));
     }
-    let searched = Searched {
-        found: search(white, folds, candidates, may, begun)?,
-        evidence: None,
-        wander: None,
-    };
-    Ok((searched, suspected))
+    // forms of one cause (steps at other instants) are no better
+    let family = |g: usize| found.fitted.groups[g].family.as_str();
+    let causes: Vec<&str> = instead
+        .iter()
+        .flat_map(|i| i.refused.iter().map(|&g| family(g)))
+        .collect();
+    let refused = (0..found.candidates.len())
+        .filter(|&g| causes.contains(&family(g)))
+        .collect();
+    Ok((Searched::plain(found), refused))
+}
+
+impl Searched<'_> {
+    /// Of white evidence alone.
+    fn plain(found: Found) -> Self {
+        Self {
+            found,
+            evidence: None,
+            wander: None,
+        }
+    }
+}
+
+/// What white evidence chose, as an explanation in place of a slow error.
+struct Instead {
+    /// Beside a reference that has white noise alone.
+    worth: f64,
+    /// What a slow error is worth more than.
+    refused: Vec<usize>,
+}
+
+impl Instead {
+    /// `None`: nothing that a slow error could imitate.
+    fn of(
+        white: &StarEvidence<'_>,
+        folds: &Folds,
+        found: &Found,
+        may: &[bool],
+        noise: &CommonNoise,
+    ) -> Result<Option<Self>, CloseError> {
+        let chosen = &found.selection.chosen;
+        let turns = |g: &usize| found.candidates[*g].acts_on_attitude();
+        if !chosen.iter().any(turns) {
+            return Ok(None);
+        }
+        let moments = white.moments(folds, &borrowed(&found.candidates));
+        let trial = Trial {
+            moments: &moments,
+            folds,
+            precision: white.precision(),
+            variance: found.fitted.fits.variance(&[]).unwrap_or(1.0),
+            groups: &found.fitted.groups,
+            tried: tried(may),
+        };
+        let score = |set: &[usize]| trial.score(set, noise).ok_or(CloseError::Singular);
+        let whole = score(chosen)?;
+        let worth = trial.worth(&whole, f64::INFINITY);
+        let mut sets: Vec<Vec<usize>> = chosen
+            .iter()
+            .copied()
+            .filter(turns)
+            .map(|g| vec![g])
+            .collect();
+        if sets.len() > 1 {
+            sets.push(sets.concat());
+        }
+        let mut refused = Vec::new();
+        for set in sets {
+            let rest: Vec<usize> = chosen
+                .iter()
+                .copied()
+                .filter(|g| !set.contains(g))
+                .collect();
+            let rest = score(&rest)?;
+            if trial.worth(&rest, SLOW_PRICE) > worth {
+                refused.extend(set);
+            }
+        }
+        refused.sort_unstable();
+        refused.dedup();
+        Ok(Some(Self { worth, refused }))
+    }
+}
+
+/// Groups that are paid for.
+fn tried(may: &[bool]) -> usize {
+    may.iter().filter(|m| **m).count().max(1)
 }
 
 /// Noise of the declared model's residual, where it may hold a slow error. How much
@@ -156,6 +244,7 @@ fn declared_noise(
         precision: white.precision(),
         variance: white.variance_guess(),
         groups: &[],
+        tried: 1,
     };
     let noise = trial.taken_out(&trial.columns(&[]));
     Ok(noise.filter(|n| n.reference.iter().any(|r| r.slow > 0.0)))
@@ -169,21 +258,17 @@ struct Scored {
     loglik: f64,
     out_of_fold: f64,
     estimate: Estimate,
-    /// Columns of each candidate within the estimate, and whether its sizes are credible.
-    parts: Vec<(std::ops::Range<usize>, bool)>,
+    parts: Vec<Part>,
 }
 
-impl Scored {
-    /// Whether this hypothesis does without the slow error that `other` needs;
-    /// `white` is what white evidence says of what it adds.
-    fn stands_instead(&self, other: &Self, white: &Judgement) -> bool {
-        let slow = |s: &Self| significant(&s.rotations.slow_ratio(&s.noise)).contains(&true);
-        white.stands()
-            && white.p_value < SUSPECT_ALPHA
-            && self.loglik > other.loglik + INSTEAD
-            && !slow(self)
-            && slow(other)
-    }
+/// A candidate within an estimate.
+#[derive(Clone, Debug)]
+struct Part {
+    columns: std::ops::Range<usize>,
+    /// Parameters that its columns follow non-linearly.
+    shapes: usize,
+    /// Its sizes are such as nature makes.
+    credible: bool,
 }
 
 /// What scores hypotheses: everything comes from one pass over the data.
@@ -195,6 +280,8 @@ struct Trial<'a> {
     /// Of a scalar of white evidence.
     variance: f64,
     groups: &'a [Group],
+    /// Groups that are paid for.
+    tried: usize,
 }
 
 impl Trial<'_> {
@@ -250,7 +337,11 @@ impl Trial<'_> {
                     .clone()
                     .zip(&group.bounds)
                     .all(|(i, [low, high])| (*low..=*high).contains(&estimate.value[i]));
-                (own, credible)
+                Part {
+                    columns: own,
+                    shapes: group.shapes,
+                    credible,
+                }
             })
             .collect();
         Some(Scored {
@@ -287,16 +378,32 @@ impl Trial<'_> {
         None
     }
 
+    /// Log-likelihood less what the freedom of a hypothesis buys where nothing acts:
+    /// for amplitudes the evidence under the spread that suits them best, for a slow
+    /// error of an axis `slow_price`, or its absence where that costs less.
+    fn worth(&self, scored: &Scored, slow_price: f64) -> f64 {
+        let slow = scored.rotations.slow_ratio(&scored.noise);
+        let without: f64 = slow.iter().map(|r| (0.5 * r).clamp(0.0, slow_price)).sum();
+        let effects: f64 = scored
+            .parts
+            .iter()
+            .map(|part| {
+                let which: Vec<usize> = part.columns.clone().collect();
+                let shapes = part.shapes;
+                let square = scored.estimate.square(&which).unwrap_or(0.0);
+                // what is scanned is fitted too
+                let k = (which.len() + shapes) as f64;
+                (self.tried as f64).ln() + 0.5 * k * (1.0 + (square / k.max(1.0)).max(1.0).ln())
+            })
+            .sum();
+        scored.loglik - without - effects
+    }
+
     /// What the last of the candidates of `with` adds to `without`.
-    fn judge(
-        &self,
-        with: &Scored,
-        at: usize,
-        without: &Scored,
-        choices: usize,
-        tried: usize,
-    ) -> Judgement {
-        let (columns, credible) = &with.parts[at];
+    fn judge(&self, with: &Scored, at: usize, without: &Scored, choices: usize) -> Judgement {
+        let Part {
+            columns, credible, ..
+        } = &with.parts[at];
         let freedom = columns.len() + choices;
         let ratio = 2.0 * (with.loglik - without.loglik) / WIDENING;
         let likely = ChiSquared::new(freedom as f64).map_or(1.0, |law| law.sf(ratio.max(0.0)));
@@ -304,7 +411,7 @@ impl Trial<'_> {
         let p = likely.max(with.estimate.p_value(&which));
         Judgement {
             delta_loglik: with.out_of_fold - without.out_of_fold,
-            p_value: (p * tried as f64).min(1.0),
+            p_value: (p * self.tried as f64).min(1.0),
             credible: *credible,
             observable: !columns.is_empty(),
         }
@@ -315,8 +422,9 @@ impl Trial<'_> {
 struct Coloured<'a> {
     searched: Searched<'a>,
     wander: Wander,
-    /// The same candidates under white noise.
-    white: Fitted,
+    /// The same candidates under white noise, where none was changed.
+    white: Option<Fitted>,
+    worth: f64,
 }
 
 fn coloured<'a>(
@@ -326,8 +434,9 @@ fn coloured<'a>(
     may: &[bool],
     start: CommonNoise,
 ) -> Result<Coloured<'a>, CloseError> {
-    let tried = may.iter().filter(|m| **m).count().max(1);
+    let tried = tried(may);
     let mut banned = vec![false; candidates.len()];
+    let mut polished = false;
     let mut chosen: Vec<usize> = Vec::new();
     let mut noise = start;
     let mut moments = white.moments(folds, &borrowed(&candidates));
@@ -350,19 +459,16 @@ fn coloured<'a>(
             precision: white.precision(),
             variance: plain.fits.variance(&[]).unwrap_or(1.0),
             groups: &plain.groups,
+            tried,
         };
         let base = trial.score(&chosen, &noise).ok_or(CloseError::Singular)?;
         noise = base.noise;
         let mut stands = Vec::new();
         let mut fallen = None;
-        let white_alone = judged(&plain.fits, &plain.groups, &chosen, tried);
         for (at, &g) in chosen.iter().enumerate() {
             let others: Vec<usize> = chosen.iter().copied().filter(|&c| c != g).collect();
             let without = trial.score(&others, &noise).ok_or(CloseError::Singular)?;
-            let mut judgement = trial.judge(&base, at, &without, plain.groups[g].choices, tried);
-            if base.stands_instead(&without, &white_alone[g]) {
-                judgement.p_value = white_alone[g].p_value;
-            }
+            let judgement = trial.judge(&base, at, &without, plain.groups[g].choices);
             if !judgement.stands() {
                 fallen = Some(g);
             }
@@ -399,10 +505,7 @@ fn coloured<'a>(
                 with.push(g);
                 let scored = trial.score(&with, &noise)?;
                 let group = &plain.groups[g];
-                let mut judgement = trial.judge(&scored, chosen.len(), &base, group.choices, tried);
-                if scored.stands_instead(&base, &white_alone[g]) {
-                    judgement.p_value = white_alone[g].p_value;
-                }
+                let judgement = trial.judge(&scored, chosen.len(), &base, group.choices);
                 let rank = judgement.delta_loglik - price(group, plain.scalars);
                 judgement.stands().then_some((g, rank, scored.noise))
             })
@@ -416,6 +519,7 @@ fn coloured<'a>(
                 judged[g] = judgement;
             }
             let ratio = base.rotations.slow_ratio(&noise);
+            let worth = trial.worth(&base, SLOW_PRICE);
             return Ok(Coloured {
                 searched: Searched {
                     found: Found {
@@ -431,10 +535,12 @@ fn coloured<'a>(
                     rotations: base.rotations,
                     ratio,
                 },
-                white: plain,
+                white: (!polished).then_some(plain),
+                worth,
             });
         };
         chosen.push(added);
+        polished = true;
         noise = its_noise;
         let fitted = under(&noise)?;
         let evidence = white.with_noise(&noise);
@@ -450,6 +556,7 @@ impl Wander {
     }
 }
 
+/// Axes whose ratio is beyond doubt.
 fn significant(ratio: &[f64; 3]) -> [bool; 3] {
     chances(ratio).map(|p| p < FAMILY_ALPHA)
 }

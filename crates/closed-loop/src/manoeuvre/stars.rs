@@ -107,6 +107,7 @@ impl<'a> Sky<'a> {
             motion: Some(flown),
             sigma_guess_arcsec: 1.0,
             noise: None,
+            weight: vec![1.0; data.t_s.len()].into(),
         };
         let folds = Folds::cut(data.frames.frames());
         match &self.noise {

@@ -9,7 +9,7 @@ use super::*;
 use crate::coloured::Coloured;
 use crate::empirical::{Empirical, Variable};
 use crate::nuisance::StarNuisance;
-use crate::star_data::Inputs;
+use crate::star_data::{Inputs, StarData};
 
 /// The camera turns about an axis by a function of time.
 #[derive(Debug)]
@@ -113,8 +113,15 @@ fn data(single: bool) -> StarData {
     data
 }
 
+/// Weights that differ from row to row.
+fn weights(data: &StarData) -> Vec<f64> {
+    (0..data.t_s.len())
+        .map(|r| 0.7 + 0.15 * (r % 5) as f64)
+        .collect()
+}
+
 /// Every column of every row that counts, x and y of a row together, and the rotation
-/// columns of each.
+/// columns of each, weighed.
 fn dense(columns: &StarColumns<'_>) -> (DMatrix<f64>, Vec<(usize, Vector3<f64>)>) {
     let data = columns.data;
     let layout = columns.layout();
@@ -132,8 +139,10 @@ fn dense(columns: &StarColumns<'_>) -> (DMatrix<f64>, Vec<(usize, Vector3<f64>)>
                 for (k, &place) in layout.own.iter().enumerate() {
                     line[place] = filled.own[axis][(row, k)];
                 }
+                let weight = columns.weight[row];
+                line.iter_mut().for_each(|v| *v *= weight);
                 lines.push(line);
-                turns.push((frame, Vector3::from(rotation_row(data, row)[axis])));
+                turns.push((frame, weight * Vector3::from(rotation_row(data, row)[axis])));
             }
         }
     }
@@ -172,12 +181,14 @@ fn with_both(
     let residuals = [residual];
     let (one, two): ([&dyn Candidate; 2], [&dyn Candidate; 2]) =
         ([&whole, &sparse], [&rowwise, &sparse]);
+    let weight = weights(&data);
     let columns = |candidates| StarColumns {
         data: &data,
         nuisance: &nuisance,
         candidates,
         residuals: &residuals,
         motion: None,
+        weight: &weight,
     };
     let folds = Folds::cut(data.frames.frames());
     let bins = Bins::cut(&data.frames.t_s, &folds, MOST_BINS);
@@ -261,6 +272,7 @@ fn a_free_attitude_leaves_what_no_rotation_explains() {
             candidates: &[],
             residuals: &[residual],
             motion: None,
+            weight: &weights(&data),
         };
         let folds = Folds::cut(data.frames.frames());
         let (sum, scalars) = StarMoments::accumulate(&columns, &folds, Keep::Free)

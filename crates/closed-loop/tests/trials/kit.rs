@@ -13,6 +13,8 @@ pub(crate) enum Path {
     Still,
     /// A slow drift, tens of pixels within the run.
     Drift,
+    /// Hardly a pixel within the run.
+    Still,
     /// Slews to and fro about three axes, up to 5 px/s.
     Slews,
     /// To and fro every 8 s: the image reverses again and again.
@@ -38,6 +40,11 @@ impl Path {
             Self::Still => format!("[motion]\nkind = \"hold\"\n{start}\n"),
             Self::Drift => {
                 format!("[motion]\nkind = \"hold\"\n{start}\ndrift_arcsec_s = [6.0, -9.0, 1.0]\n")
+            }
+            Self::Still => {
+                format!(
+                    "[motion]\nkind = \"hold\"\n{start}\ndrift_arcsec_s = [0.06, -0.09, 0.01]\n"
+                )
             }
             Self::Slews => {
                 let mut text = format!(

@@ -124,3 +124,32 @@ fn step() {
     let lines = "at_s = 211.3\nx_arcsec = {}\ny_arcsec = 0.0\nz_arcsec = 0.0";
     finds(Path::Drift, "step_misalignment", lines, "x_arcsec", 1.2);
 }
+
+/// A step of six and a half standard errors (x 5.3, y 3.8) in white noise is a step, not a reference that
+/// wanders: expected of 95 in 100, fewer than 6 of 8 once in 200. Its instant lies within its bounds of
+/// 95 %: outside more than 3 of 8 times once in 6000.
+#[test]
+fn a_faint_step_is_a_step() {
+    let (mut steps, mut inside) = (0, 0);
+    for seed in 0..8 {
+        let mut case = Case::new(Path::Still, 40 + seed);
+        case.duration_s = 600.0;
+        let report = case
+            .with(
+                "step_misalignment",
+                "at_s = 250.3\nx_arcsec = 0.465\ny_arcsec = -0.335\nz_arcsec = 0.0",
+            )
+            .close()
+            .report;
+        let Some(first) = report.effects.first() else {
+            continue;
+        };
+        if first.id == "step_misalignment" {
+            steps += 1;
+            let [low, high] = first.parameters["at_s"].interval.unwrap();
+            inside += usize::from((low..=high).contains(&250.3));
+        }
+    }
+    assert!(steps >= 6, "{steps} of 8");
+    assert!(inside + 3 >= steps, "{inside} of {steps} within");
+}
