@@ -42,7 +42,7 @@ use rayon::prelude::*;
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
 
 use crate::folds::Folds;
-use crate::gram::BlockGrams;
+use crate::gram::{BlockGrams, FoldSums, Gram};
 
 /// The columns of a Gram matrix, in their order.
 #[derive(Clone, Debug, Default)]
@@ -84,62 +84,52 @@ struct Eliminated {
     nuisance: DMatrix<f64>,
     /// Training Gram of the candidates and the residual (last), nuisance removed.
     train: DMatrix<f64>,
+    /// What the prior adds to the diagonal of the nuisance's normal matrix.
+    prior: Vec<f64>,
     /// ln det of the nuisance's normal matrix.
     log_det: f64,
     /// Training scalars.
     scalars: f64,
     /// Training scalars less the nuisance freedom.
     freedom: f64,
-    /// Gram of what is judged in the transformed columns, and its scalars.
-    blocks: Vec<(DMatrix<f64>, f64)>,
 }
 
 impl Eliminated {
     fn new(
-        grams: &BlockGrams,
+        (gram, scalars): &(DMatrix<f64>, f64),
         layout: &Layout,
         variance: f64,
-        fold: Option<usize>,
-        train: impl Fn(usize) -> bool,
-        judged: impl Fn(usize) -> bool + Sync,
+        pick: &[usize],
     ) -> Option<Self> {
         let n = layout.nuisance_precision.len();
-        let (gram, scalars) = grams.sum(train);
-        let pick = layout.picked(fold);
         let mut normal = gram.view((0, 0), (n, n)).into_owned();
         // A column that nothing constrains (a gauge freedom, a star never seen in
         // training) gets a precision far below what one scalar of data brings.
         let floor = 1e-10 * normal.diagonal().max().max(f64::MIN_POSITIVE);
-        for (k, &precision) in layout.nuisance_precision.iter().enumerate() {
-            normal[(k, k)] += precision * variance + floor;
+        let priors = layout.nuisance_precision.iter();
+        let prior: Vec<f64> = priors.map(|p| p * variance + floor).collect();
+        for (k, prior) in prior.iter().enumerate() {
+            normal[(k, k)] += prior;
         }
-        let cross = picked(&gram, 0..n, &pick);
+        let cross = picked(gram, 0..n, pick);
         let (nuisance, log_det) = if n == 0 {
             (cross.clone(), 0.0)
         } else {
             let factor = Cholesky::new(normal)?;
             (factor.solve(&cross), factor.ln_determinant())
         };
-        let mut reduced = both(&gram, &pick);
+        let mut reduced = both(gram, pick);
         reduced.gemm(-1.0, &cross.transpose(), &nuisance, 1.0);
-        let blocks = (0..grams.gram.len())
-            .into_par_iter()
-            .filter(|&b| judged(b))
-            .map(|b| {
-                let gram = transformed(&grams.gram[b], n, &pick, &nuisance);
-                (gram, grams.scalars[b])
-            })
-            .collect();
         // Columns under a tight prior cost less than one degree of freedom each;
         // counting them whole is the cautious side.
         let freedom = (scalars - n as f64).max(1.0);
         Some(Self {
             nuisance,
             train: reduced,
+            prior,
             log_det,
-            scalars,
+            scalars: *scalars,
             freedom,
-            blocks,
         })
     }
 
@@ -162,6 +152,32 @@ impl Eliminated {
         let beta = factor.solve(&score);
         Some((beta, factor))
     }
+
+    /// Amplitudes of `set`, and the noise variance beside them.
+    fn trained(&self, set: &[usize]) -> Option<(DVector<f64>, f64)> {
+        let (beta, _) = self.amplitudes(set)?;
+        let last = self.train.ncols() - 1;
+        let explained: f64 = (0..set.len())
+            .map(|i| beta[i] * self.train[(set[i], last)])
+            .sum();
+        let freedom = (self.freedom - set.len() as f64).max(1.0);
+        let variance = (self.train[(last, last)] - explained) / freedom;
+        Some((beta, variance.max(f64::MIN_POSITIVE)))
+    }
+
+    /// Nuisance amplitudes of the residual less `beta` times `set`.
+    fn left(&self, set: &[usize], beta: &DVector<f64>) -> DVector<f64> {
+        less(&self.nuisance, set, beta)
+    }
+}
+
+/// The last column less `beta` times the columns `set`.
+fn less(columns: &DMatrix<f64>, set: &[usize], beta: &DVector<f64>) -> DVector<f64> {
+    let mut out = columns.column(columns.ncols() - 1).into_owned();
+    for (&c, b) in set.iter().zip(beta.iter()) {
+        out.axpy(-b, &columns.column(c), 1.0);
+    }
+    out
 }
 
 /// `T^T G T` for `T = [-W; I]` over the picked columns.
@@ -211,17 +227,25 @@ fn both(gram: &DMatrix<f64>, pick: &[usize]) -> DMatrix<f64> {
 }
 
 /// What a set of candidate columns does outside the folds it was fitted on.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct OutOfFold {
-    /// Squared error of each block, predicted from the other folds.
+    /// Squared error of each fold, or block, predicted from the other folds.
     pub(crate) sse: Vec<f64>,
-    /// Log-likelihood of each block, nats, noise variance from the other folds.
+    /// Log-likelihood of each, nats, noise variance from the other folds.
     pub(crate) loglik: Vec<f64>,
-    /// Scalars of each block.
+    /// Scalars of each.
     pub(crate) scalars: Vec<f64>,
 }
 
 impl OutOfFold {
+    fn add(&mut self, error: f64, scalars: f64, variance: f64) {
+        let constant = (std::f64::consts::TAU * variance).ln();
+        self.sse.push(error);
+        self.loglik
+            .push(-0.5 * (scalars * constant + error / variance));
+        self.scalars.push(scalars);
+    }
+
     pub(crate) fn total_loglik(&self) -> f64 {
         self.loglik.iter().sum()
     }
@@ -293,9 +317,15 @@ impl Estimate {
 /// All fits that selection needs, on one set of Grams.
 #[derive(Clone, Debug)]
 pub(crate) struct Fits {
+    layout: Layout,
     folds: Vec<Eliminated>,
+    /// Gram of each fold in the columns of its fit, and its scalars.
+    held: Vec<(DMatrix<f64>, f64)>,
     all: Eliminated,
-    blocks: usize,
+    grams: BlockGrams,
+    fold_of_block: Vec<usize>,
+    /// `G W - 2 G_nc` of each block with W of all data: what makes T^T G T of any few columns.
+    inner: Vec<DMatrix<f64>>,
     /// [`Folds::prior_blocks`].
     prior: f64,
 }
@@ -310,56 +340,77 @@ impl Fits {
         layout: &Layout,
         variance: f64,
     ) -> Option<Self> {
-        let of = &folds.fold_of_block;
+        Self::of(grams, &grams.by_fold(folds), folds, layout, variance)
+    }
+
+    /// As [`new`](Self::new) where the sums over the folds are there already.
+    pub(crate) fn of(
+        grams: &BlockGrams,
+        sums: &FoldSums,
+        folds: &Folds,
+        layout: &Layout,
+        variance: f64,
+    ) -> Option<Self> {
+        let n = layout.nuisance_precision.len();
         let by_fold = (0..folds.count)
             .into_par_iter()
             .map(|f| {
-                Eliminated::new(
-                    grams,
-                    layout,
-                    variance,
-                    Some(f),
-                    |b| of[b] != f,
-                    |b| of[b] == f,
-                )
+                let pick = layout.picked(Some(f));
+                let fold = Eliminated::new(&sums.without(f), layout, variance, &pick)?;
+                let (own, scalars) = &sums.fold[f];
+                let held = transformed(own, n, &pick, &fold.nuisance);
+                Some((fold, (held, *scalars)))
             })
             .collect::<Option<Vec<_>>>()?;
-        let all = Eliminated::new(grams, layout, variance, None, |_| true, |_| true)?;
+        let (by_fold, held) = by_fold.into_iter().unzip();
+        let pick = layout.picked(None);
+        let all = Eliminated::new(&sums.all, layout, variance, &pick)?;
+        let inner = grams
+            .gram
+            .par_iter()
+            .map(|g| g.inner(&all.nuisance, &pick))
+            .collect();
         Some(Self {
+            layout: layout.clone(),
             folds: by_fold,
+            held,
             all,
-            blocks: of.len(),
+            grams: grams.clone(),
+            fold_of_block: folds.fold_of_block.clone(),
+            inner,
             prior: folds.prior_blocks,
         })
     }
 
     /// Noise variance of a scalar where no candidate is in the model, from a first guess.
-    pub(crate) fn noise_alone(grams: &BlockGrams, layout: &Layout, guess: f64) -> Option<f64> {
+    pub(crate) fn noise_alone(sums: &FoldSums, layout: &Layout, guess: f64) -> Option<f64> {
+        let (gram, scalars) = &sums.all;
         let n = layout.nuisance_precision.len();
-        let (whole, scalars) = grams.sum(|_| true);
-        let alone = BlockGrams {
-            gram: vec![
-                whole
-                    .remove_columns(n, layout.candidates)
-                    .remove_rows(n, layout.candidates),
-            ],
-            scalars: vec![scalars],
-            log_scale: 0.0,
-        };
+        let kept: Vec<usize> = (0..n).chain(n + layout.candidates..gram.ncols()).collect();
+        let alone = gram.select_columns(&kept).select_rows(&kept);
         let layout = Layout {
             candidates: 0,
             ..layout.clone()
+        };
+        let alone = BlockGrams {
+            gram: vec![Gram::whole(alone)],
+            scalars: vec![*scalars],
+            log_scale: 0.0,
         };
         Self::whole(&alone, &layout, guess)?.variance(&[])
     }
 
     /// As [`new`](Self::new), on all data alone: for what asks nothing of the folds.
     pub(crate) fn whole(grams: &BlockGrams, layout: &Layout, variance: f64) -> Option<Self> {
-        let all = Eliminated::new(grams, layout, variance, None, |_| true, |_| false)?;
+        let all = Eliminated::new(&grams.total(), layout, variance, &layout.picked(None))?;
         Some(Self {
+            layout: layout.clone(),
             folds: Vec::new(),
+            held: Vec::new(),
             all,
-            blocks: grams.gram.len(),
+            grams: grams.clone(),
+            fold_of_block: Vec::new(),
+            inner: Vec::new(),
             prior: 0.0,
         })
     }
@@ -374,33 +425,41 @@ impl Fits {
         ))
     }
 
-    /// Out-of-fold error of the candidate columns `set`; `None` if they cannot
+    /// Out-of-fold error of the candidate columns `set`, fold by fold; `None` if they cannot
     /// be told apart in some fold.
     pub(crate) fn out_of_fold(&self, set: &[usize]) -> Option<OutOfFold> {
-        let (mut sse, mut loglik, mut count) = (Vec::new(), Vec::new(), Vec::new());
-        for fold in &self.folds {
-            let (beta, _) = fold.amplitudes(set)?;
-            let last = fold.train.ncols() - 1;
-            let train_sse = fold.train[(last, last)]
-                - (0..set.len())
-                    .map(|i| beta[i] * fold.train[(set[i], last)])
-                    .sum::<f64>();
-            let variance =
-                (train_sse / (fold.freedom - set.len() as f64).max(1.0)).max(f64::MIN_POSITIVE);
-            for (gram, scalars) in &fold.blocks {
-                let error = quadratic(gram, set, &beta);
-                sse.push(error);
-                count.push(*scalars);
-                loglik.push(
-                    -0.5 * (scalars * (std::f64::consts::TAU * variance).ln() + error / variance),
-                );
-            }
+        let mut out = OutOfFold::default();
+        for (fold, (gram, scalars)) in self.folds.iter().zip(&self.held) {
+            let (beta, variance) = fold.trained(set)?;
+            out.add(quadratic(gram, set, &beta), *scalars, variance);
         }
-        Some(OutOfFold {
-            sse,
-            loglik,
-            scalars: count,
-        })
+        Some(out)
+    }
+
+    /// As [`out_of_fold`](Self::out_of_fold), block by block.
+    pub(crate) fn out_of_fold_by_block(&self, set: &[usize]) -> Option<OutOfFold> {
+        let n = self.layout.nuisance_precision.len();
+        let trained: Vec<(DVector<f64>, f64)> = (0..self.folds.len())
+            .map(|f| {
+                let fold = &self.folds[f];
+                let (beta, variance) = fold.trained(set)?;
+                let residual = self.layout.residual(Some(f));
+                let mut z = DVector::zeros(n + self.layout.candidates + self.layout.residuals);
+                z[residual] = 1.0;
+                for (&c, b) in set.iter().zip(beta.iter()) {
+                    z[n + c] = -b;
+                }
+                z.rows_mut(0, n).axpy(-1.0, &fold.left(set, &beta), 1.0);
+                Some((z, variance))
+            })
+            .collect::<Option<_>>()?;
+        let mut out = OutOfFold::default();
+        for (b, &f) in self.fold_of_block.iter().enumerate() {
+            let (z, variance) = &trained[f];
+            let error = self.grams.gram[b].quadratic(z).max(0.0);
+            out.add(error, self.grams.scalars[b], *variance);
+        }
+        Some(out)
     }
 
     /// Log-likelihood of all data at the best amplitudes of `set`, the nuisance
@@ -426,44 +485,42 @@ impl Fits {
         beta: &DVector<f64>,
     ) -> DVector<f64> {
         let eliminated = fold.map_or(&self.all, |f| &self.folds[f]);
-        let mut nuisance = eliminated
-            .nuisance
-            .column(eliminated.nuisance.ncols() - 1)
-            .into_owned();
-        for (i, &c) in set.iter().enumerate() {
-            nuisance.axpy(-beta[i], &eliminated.nuisance.column(c), 1.0);
-        }
-        nuisance
+        eliminated.left(set, beta)
     }
 
     /// Joint estimate of `set` on all data.
     pub(crate) fn estimate(&self, set: &[usize]) -> Option<Estimate> {
         let (value, factor) = self.all.amplitudes(set)?;
-        let last = self.all.train.ncols() - 1;
+        let n = self.layout.nuisance_precision.len();
+        let residual = self.layout.residual(None);
         let p = set.len();
+        // M = T^T G T of a block: M_ij = G_ij + (W_i inner_j + inner_i W_j) / 2
+        let w = &self.all.nuisance;
+        let left = self.all.left(set, &value);
         let mut spread = DMatrix::zeros(p, p);
-        for (gram, _) in &self.all.blocks {
+        for (gram, inner) in self.grams.gram.iter().zip(&self.inner) {
+            let within = less(inner, set, &value);
             let score = DVector::from_fn(p, |i, _| {
-                gram[(set[i], last)]
-                    - (0..p)
-                        .map(|j| gram[(set[i], set[j])] * value[j])
-                        .sum::<f64>()
+                let row = n + set[i];
+                let own = (0..p)
+                    .map(|j| gram.at(row, n + set[j]) * value[j])
+                    .sum::<f64>();
+                let cross = w.column(set[i]).dot(&within) + inner.column(set[i]).dot(&left);
+                gram.at(row, residual) - own + 0.5 * cross
             });
             spread.ger(1.0, &score, &score, 1.0);
         }
-        let b = self.blocks as f64;
+        let b = self.grams.gram.len() as f64;
         // Small-sample factor of the cluster-robust variance.
         spread *= b / (b - 1.0).max(1.0);
         let variance = self.variance(set)?;
+        // S less the sum of M is what the prior adds
         for i in 0..p {
             for j in 0..p {
-                let own: f64 = self
-                    .all
-                    .blocks
-                    .iter()
-                    .map(|(gram, _)| gram[(set[i], set[j])])
+                let prior: f64 = (0..n)
+                    .map(|k| self.all.prior[k] * w[(k, set[i])] * w[(k, set[j])])
                     .sum();
-                spread[(i, j)] += variance * (self.all.train[(set[i], set[j])] - own);
+                spread[(i, j)] += variance * prior;
             }
         }
         let inverse = factor.inverse();

@@ -20,6 +20,7 @@
 mod tests;
 
 use std::ops::Range;
+use std::sync::{Arc, OnceLock};
 
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use rayon::prelude::*;
@@ -28,7 +29,7 @@ use crate::bins::Bins;
 use crate::common_noise::{CommonNoise, Filter, Rotations};
 use crate::folds::Folds;
 use crate::frame_rotation::rotation_row;
-use crate::gram::BlockGrams;
+use crate::gram::{BlockGrams, Gram};
 use crate::star_columns::{Filled, Layout, StarColumns};
 use crate::star_data::StarData;
 
@@ -58,7 +59,7 @@ pub(crate) enum Keep<'a> {
 #[derive(Clone, Debug)]
 struct Block {
     /// R; G where no rotation is kept apart.
-    rest: DMatrix<f64>,
+    rest: Arc<DMatrix<f64>>,
     /// Products of the rows of bins without an attitude; they are not in R.
     lost: Option<DMatrix<f64>>,
     /// Scalars of G and of R.
@@ -72,11 +73,16 @@ struct Block {
 
 impl Block {
     /// G of some columns.
-    fn gram(&self, columns: &[usize]) -> DMatrix<f64> {
-        let mut gram = pick(&self.rest, columns);
-        if let Some(lost) = &self.lost {
-            gram += pick(lost, columns);
-        }
+    fn gram(&self, columns: &[usize]) -> Gram {
+        let rest = match &self.lost {
+            Some(lost) => Arc::new(pick(&self.rest, columns) + pick(lost, columns)),
+            None => shared(&self.rest, columns),
+        };
+        Gram::new(1.0, rest, self.whitened(columns))
+    }
+
+    /// Rows whose products are what the rotations take out of G.
+    fn whitened(&self, columns: &[usize]) -> DMatrix<f64> {
         let mut whitened = self.theta.select_columns(columns);
         for (bin, inverse) in self.inverse.iter().enumerate() {
             let root = inverse.and_then(|v| v.cholesky()?.l().try_inverse());
@@ -85,8 +91,12 @@ impl Block {
                 .fixed_rows_mut::<3>(3 * bin)
                 .copy_from(&(root.unwrap_or_else(Matrix3::zeros) * part));
         }
-        gram.gemm(1.0, &whitened.transpose(), &whitened, 1.0);
-        gram
+        whitened
+    }
+
+    /// Scalars of R and of the bins' rotations.
+    fn solved_scalars(&self) -> f64 {
+        self.rest_scalars + 3.0 * self.inverse.iter().flatten().count() as f64
     }
 
     /// The block with every bin's rotation thrown away.
@@ -109,6 +119,9 @@ pub(crate) struct StarMoments {
     t_s: Vec<f64>,
     /// Frames of each bin.
     frames: Vec<usize>,
+    /// Sums over the blocks, once they are asked for: of R, and of the products under white noise.
+    rest: OnceLock<DMatrix<f64>>,
+    white: OnceLock<DMatrix<f64>>,
 }
 
 impl StarMoments {
@@ -142,6 +155,8 @@ impl StarMoments {
             blocks,
             t_s,
             frames,
+            rest: OnceLock::new(),
+            white: OnceLock::new(),
         }
     }
 
@@ -152,7 +167,7 @@ impl StarMoments {
             .into_iter()
             .map(|b| {
                 debug_assert!(b.inverse.is_empty(), "rotations are in no block");
-                (b.rest, b.scalars)
+                (Gram::whole(b.rest), b.scalars)
             })
             .unzip();
         BlockGrams {
@@ -160,6 +175,28 @@ impl StarMoments {
             scalars,
             log_scale: 0.0,
         }
+    }
+
+    /// The sum over the blocks of the products under white noise, of some of the columns.
+    pub(crate) fn white_in_all(&self, columns: &[usize]) -> BlockGrams {
+        let white = self.white.get_or_init(|| {
+            let all: Vec<usize> = (0..self.width()).collect();
+            self.white_of(&all).total().0
+        });
+        BlockGrams {
+            gram: vec![Gram::whole(pick(white, columns))],
+            scalars: vec![self.blocks.iter().map(|b| b.scalars).sum()],
+            log_scale: 0.0,
+        }
+    }
+
+    /// The sum over the blocks of R.
+    fn rest(&self) -> &DMatrix<f64> {
+        self.rest.get_or_init(|| {
+            let width = self.width();
+            let zeros = DMatrix::zeros(width, width);
+            self.blocks.iter().fold(zeros, |sum, b| sum + &*b.rest)
+        })
     }
 
     /// The products of some of the columns under white noise.
@@ -178,6 +215,39 @@ impl StarMoments {
 
     /// The products of `columns` under `noise`: of scalars of unit variance.
     pub(crate) fn under(&self, columns: &[usize], noise: &CommonNoise) -> BlockGrams {
+        let weight = noise.centroid.powi(-2);
+        let (log_scale, innovations) = self.innovations(columns, noise);
+        let gram = self
+            .blocks
+            .par_iter()
+            .zip(innovations)
+            .map(|(k, e)| Gram::new(weight, shared(&k.rest, columns), e))
+            .collect();
+        BlockGrams {
+            gram,
+            scalars: self.blocks.iter().map(Block::solved_scalars).collect(),
+            log_scale,
+        }
+    }
+
+    /// The sum over the blocks of [`under`](Self::under).
+    pub(crate) fn under_in_all(&self, columns: &[usize], noise: &CommonNoise) -> BlockGrams {
+        let weight = noise.centroid.powi(-2);
+        let (log_scale, innovations) = self.innovations(columns, noise);
+        let mut gram = pick(self.rest(), columns) * weight;
+        for e in innovations {
+            gram.gemm(1.0, &e.transpose(), &e, 1.0);
+        }
+        BlockGrams {
+            gram: vec![Gram::whole(gram)],
+            scalars: vec![self.blocks.iter().map(Block::solved_scalars).sum()],
+            log_scale,
+        }
+    }
+
+    /// Whitened innovations of the rotations, block by block, and what the log-likelihood of scalars
+    /// under `noise` lacks.
+    fn innovations(&self, columns: &[usize], noise: &CommonNoise) -> (f64, Vec<DMatrix<f64>>) {
         let inverse: Vec<Option<Matrix3<f64>>> = self
             .blocks
             .iter()
@@ -185,33 +255,16 @@ impl StarMoments {
             .collect();
         let filter = Filter::new(noise, &self.t_s, &self.frames, &inverse);
         let mut log_scale = filter.log_scale;
-        let weight = noise.centroid.powi(-2);
         let mut first = 0;
-        let mut jobs = Vec::with_capacity(self.blocks.len());
+        let mut out = Vec::with_capacity(self.blocks.len());
         let mut state = vec![Vector3::zeros(); columns.len()];
         for k in &self.blocks {
             let steps = first..first + k.inverse.len();
             first = steps.end;
             log_scale -= k.rest_scalars * noise.centroid.ln();
-            jobs.push((k, filter.innovations(steps, &k.theta, columns, &mut state)));
+            out.push(filter.innovations(steps, &k.theta, columns, &mut state));
         }
-        let gram = jobs
-            .into_par_iter()
-            .map(|(k, e)| {
-                let mut gram = pick(&k.rest, columns) * weight;
-                gram.gemm(1.0, &e.transpose(), &e, 1.0);
-                gram
-            })
-            .collect();
-        let scalars = self.blocks.iter().map(|k| {
-            let solved = k.inverse.iter().flatten().count();
-            k.rest_scalars + 3.0 * solved as f64
-        });
-        BlockGrams {
-            gram,
-            scalars: scalars.collect(),
-            log_scale,
-        }
+        (log_scale, out)
     }
 
     /// Rotations of the last of `columns` less `beta` times the others; `freedom` is
@@ -227,11 +280,11 @@ impl StarMoments {
             columns.len(),
             beta.iter().map(|b| -b).chain(std::iter::once(1.0)),
         );
-        let (mut sse, mut rest) = (0.0, 0.0);
+        let sse = left.dot(&(pick(self.rest(), columns) * &left));
+        let mut rest = 0.0;
         let mut mean: [Vec<f64>; 3] = std::array::from_fn(|_| Vec::with_capacity(self.t_s.len()));
         let mut count = mean.clone();
         for kept in &self.blocks {
-            sse += left.dot(&(pick(&kept.rest, columns) * &left));
             rest += kept.rest_scalars;
             let mut theta = kept.theta.column(residual).into_owned();
             for (&column, b) in fitted.iter().zip(beta.iter()) {
@@ -263,6 +316,16 @@ fn pick(matrix: &DMatrix<f64>, columns: &[usize]) -> DMatrix<f64> {
     DMatrix::from_fn(columns.len(), columns.len(), |i, j| {
         matrix[(columns[i], columns[j])]
     })
+}
+
+/// As [`pick`], without a copy where that is all.
+fn shared(matrix: &Arc<DMatrix<f64>>, columns: &[usize]) -> Arc<DMatrix<f64>> {
+    let all = columns.len() == matrix.ncols() && columns.iter().enumerate().all(|(i, &c)| i == c);
+    if all {
+        matrix.clone()
+    } else {
+        Arc::new(pick(matrix, columns))
+    }
 }
 
 /// Columns of a product that are formed at once: a product of columns with themselves
@@ -466,7 +529,7 @@ impl Sums {
         }
         let width = order.len();
         let mut block = Block {
-            rest: pick(&rest, &order),
+            rest: Arc::new(pick(&rest, &order)),
             lost: self.lost.map(|(lost, _)| pick(&lost, &order)),
             scalars: self.scalars as f64,
             rest_scalars: scalars as f64,
@@ -505,7 +568,8 @@ impl Block {
                 self.inverse.push(None);
             }
         }
-        self.rest.gemm(-1.0, &whitened.transpose(), &whitened, 1.0);
+        let rest = Arc::make_mut(&mut self.rest);
+        rest.gemm(-1.0, &whitened.transpose(), &whitened, 1.0);
         self.theta = moments;
     }
 }

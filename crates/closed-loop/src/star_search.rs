@@ -217,7 +217,7 @@ impl Trial<'_> {
 
     /// Noise of what is left once white evidence has fitted all of `columns`.
     fn taken_out(&self, columns: &[usize]) -> Option<CommonNoise> {
-        let grams = self.moments.white_of(columns);
+        let grams = self.moments.white_in_all(columns);
         let layout = self.layout(columns);
         let fits = Fits::whole(&grams, &layout, self.variance)?;
         let all: Vec<usize> = (0..layout.candidates).collect();
@@ -273,7 +273,7 @@ impl Trial<'_> {
         let all: Vec<usize> = (0..layout.candidates).collect();
         let mut noise = *start;
         for round in 0..=ALTERNATIONS {
-            let grams = self.moments.under(columns, &noise);
+            let grams = self.moments.under_in_all(columns, &noise);
             let fits = Fits::whole(&grams, &layout, 1.0)?;
             let solution = fits.solution(&all)?;
             let rotations = self.moments.rotations(columns, &solution, solution.len())?;

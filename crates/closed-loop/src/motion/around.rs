@@ -31,6 +31,8 @@ const MOST: usize = 4 * SIDE_WITH_RATES;
 const FEWEST: usize = 2;
 /// Samples nearer than this many steps hold the frame's own error.
 const NEAR: f64 = 0.9;
+/// No frame.
+const NOWHERE: usize = usize::MAX;
 
 /// The motion around a list of times.
 #[derive(Clone, Debug)]
@@ -67,7 +69,7 @@ impl Around {
         let distance = |k: usize| self.t_s.get(k).map_or(f64::INFINITY, |t| (t - t_s).abs());
         let before = |k: usize| k.checked_sub(1).map_or(f64::INFINITY, distance);
         let here = distance(hint);
-        if here < before(hint) && here <= distance(hint + 1) {
+        if here < before(hint) && here <= distance(hint.saturating_add(1)) {
             return Some(hint);
         }
         let after = self.t_s.partition_point(|&t| t < t_s);
@@ -180,7 +182,8 @@ fn unrolled(phi: &Vector3<f64>, v: &Vector3<f64>) -> Vector3<f64> {
 
 impl AttitudeSource for Around {
     fn attitude(&self, t_s: f64) -> Option<UnitQuaternion<f64>> {
-        self.attitude_near(t_s, &mut usize::MAX)
+        let mut nowhere = NOWHERE;
+        self.attitude_near(t_s, &mut nowhere)
     }
 
     fn attitude_near(&self, t_s: f64, hint: &mut usize) -> Option<UnitQuaternion<f64>> {
@@ -190,7 +193,8 @@ impl AttitudeSource for Around {
 
     /// To first order in the rotation from the frame's attitude.
     fn rate_rad_s(&self, t_s: f64) -> Option<Vector3<f64>> {
-        let (piece, s) = self.piece(t_s, &mut usize::MAX)?;
+        let mut nowhere = NOWHERE;
+        let (piece, s) = self.piece(t_s, &mut nowhere)?;
         // v' = -omega x v for vectors seen from the tracker
         Some(-piece.slope(s))
     }

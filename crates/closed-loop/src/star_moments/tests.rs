@@ -197,11 +197,11 @@ fn products_are_those_of_every_row() {
     for single in [false, true] {
         with_both(single, |moments, c, _, _| {
             let all: Vec<usize> = (0..moments.width()).collect();
-            let (sum, scalars) = moments.white_of(&all).sum(|_| true);
+            let (sum, scalars) = moments.white_of(&all).total();
             close(&sum, &(c.transpose() * c));
             assert!((scalars - c.nrows() as f64).abs() < 0.5);
             let some = [1, 4, 0, all.len() - 1];
-            let (sum, _) = moments.white_of(&some).sum(|_| true);
+            let (sum, _) = moments.white_of(&some).total();
             close(
                 &sum,
                 &(c.transpose() * c).select_rows(&some).select_columns(&some),
@@ -234,7 +234,7 @@ fn noise_that_frames_share_is_weighed_as_its_covariance_says() {
         let factor = covariance.cholesky().unwrap();
         let all: Vec<usize> = (0..moments.width()).collect();
         let grams = moments.under(&all, &noise);
-        let (sum, scalars) = grams.sum(|_| true);
+        let (sum, scalars) = grams.total();
         close(&sum, &(c.transpose() * factor.solve(c)));
         assert!((scalars - c.nrows() as f64).abs() < 0.5);
         let half = 0.5 * factor.ln_determinant();
@@ -265,7 +265,7 @@ fn a_free_attitude_leaves_what_no_rotation_explains() {
         let folds = Folds::cut(data.frames.frames());
         let (sum, scalars) = StarMoments::accumulate(&columns, &folds, Keep::Free)
             .white()
-            .sum(|_| true);
+            .total();
         let (c, turns) = dense(&columns);
         let (mut dense, mut count) = (DMatrix::zeros(c.ncols(), c.ncols()), 0);
         for frame in 0..data.frames.frames() {
