@@ -448,15 +448,9 @@ impl Track {
         let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
         let (oo, oy) = (dot(&one, &one), dot(&one, &y));
         let score = |at: &[usize]| -> Option<(usize, f64)> {
-            let mut steps = vec![0.0; n * at.len()];
-            for (step, &at) in steps.chunks_exact_mut(n).zip(at) {
-                step[at..].fill(1.0);
-            }
-            let mut columns: Vec<&mut [f64]> = steps.chunks_exact_mut(n).collect();
-            noise.whiten(&self.t_s, &self.weight, &mut columns);
-            let scores = columns.iter().zip(at).map(|(step, &at)| {
-                let (so, sy) = (dot(step, &one), dot(step, &y));
-                let ss = dot(step, step) - so * so / oo;
+            let scores = noise.steps(&self.t_s, &self.weight, at, [&one, &y]);
+            let scores = scores.into_iter().zip(at).map(|([ss, so, sy], &at)| {
+                let ss = ss - so * so / oo;
                 let score = sy - so * oy / oo;
                 (at, if ss > 0.0 { score * score / ss } else { 0.0 })
             });
@@ -465,11 +459,7 @@ impl Track {
         // coarse first: a step is seen from near by
         let stride = n.div_ceil(MOST_STEPS);
         let all: Vec<usize> = (MIN_SIDE..=n - MIN_SIDE).step_by(stride).collect();
-        let coarse = all
-            .chunks(64)
-            .filter_map(score)
-            .max_by(|a, b| a.1.total_cmp(&b.1))?
-            .0;
+        let coarse = score(&all)?.0;
         let first = coarse.saturating_sub(2 * stride).max(MIN_SIDE);
         let fine: Vec<usize> = (first..=(coarse + 2 * stride).min(n - MIN_SIDE)).collect();
         score(&fine).map(|(at, _)| at)
