@@ -37,7 +37,7 @@ pub(crate) struct StarColumns<'a> {
 /// The columns of some frames.
 #[derive(Clone, Debug)]
 pub(crate) struct Filled {
-    /// D: polynomials of position, a row a star.
+    /// D: polynomials of position, a column a star.
     pub(crate) shared: DMatrix<f64>,
     /// X and Y: everything that has no special form, a row a star.
     pub(crate) own: [DMatrix<f64>; 2],
@@ -57,20 +57,20 @@ impl Default for Filled {
 }
 
 impl Filled {
-    /// Rows for the columns of `layout`, all zero.
-    fn reset(&mut self, rows: usize, frames: usize, layout: &Layout) {
-        let clear = |m: &mut DMatrix<f64>, rows: usize, columns: usize| {
-            if m.shape() == (rows, columns) {
-                m.fill(0.0);
-            } else {
+    /// Rows for the columns of `layout`; the first `nuisance` own ones and the turns are zero.
+    fn reset(&mut self, rows: usize, frames: usize, layout: &Layout, nuisance: usize) {
+        let shape = |m: &mut DMatrix<f64>, rows: usize, columns: usize| {
+            if m.shape() != (rows, columns) {
                 *m = DMatrix::zeros(rows, columns);
             }
         };
-        clear(&mut self.shared, rows, layout.shared);
+        shape(&mut self.shared, layout.shared, rows);
         for own in &mut self.own {
-            clear(own, rows, layout.own.len());
+            shape(own, rows, layout.own.len());
+            own.columns_mut(0, nuisance).fill(0.0);
         }
-        clear(&mut self.turn, 3 * frames, layout.turn.len());
+        shape(&mut self.turn, 3 * frames, layout.turn.len());
+        self.turn.fill(0.0);
     }
 }
 
@@ -155,11 +155,11 @@ impl StarColumns<'_> {
         let data = self.data;
         let rows = data.frames.first_row[frames.start]..data.frames.first_row[frames.end];
         let n = rows.len();
-        out.reset(n, frames.len(), layout);
-        self.nuisance.fill(data, frames.clone(), out);
-        self.fill_turns(&data.frames.t_s[frames], &mut out.turn);
         let (misalignment, _, directions) = self.nuisance.parts();
         let mut column = misalignment + directions;
+        out.reset(n, frames.len(), layout, column);
+        self.nuisance.fill(data, frames.clone(), out);
+        self.fill_turns(&data.frames.t_s[frames], &mut out.turn);
         let seen = self.rows(rows.clone());
         let scale = data.camera.arcsec_per_px();
         let [x, y] = &mut out.own;
@@ -230,7 +230,7 @@ impl StarColumns<'_> {
         let rows = data.frames.first_row[frames.start]..data.frames.first_row[frames.end];
         let mut used = rows.len();
         for i in (0..rows.len()).filter(|i| data.outlier[rows.start + i]) {
-            out.shared.row_mut(i).fill(0.0);
+            out.shared.column_mut(i).fill(0.0);
             for own in &mut out.own {
                 own.row_mut(i).fill(0.0);
             }
@@ -255,7 +255,7 @@ impl StarColumns<'_> {
         let mut shift: [DVector<f64>; 2] = std::array::from_fn(|axis| {
             let shared =
                 DVector::from_fn(layout.shared, |k, _| amplitudes[layout.shared_at(k, axis)]);
-            &filled.shared * shared + filled.own[axis].columns(0, own.len()) * &own
+            filled.shared.tr_mul(&shared) + filled.own[axis].columns(0, own.len()) * &own
         });
         if !layout.turn.is_empty() {
             let turn = &filled.turn * of(&layout.turn);

@@ -16,6 +16,7 @@
 //!
 //! Source: the partitioned normal equations of bundle adjustment (Brown 1958).
 
+mod sums;
 #[cfg(test)]
 mod tests;
 
@@ -25,22 +26,16 @@ use std::sync::{Arc, OnceLock};
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use rayon::prelude::*;
 
+use self::sums::Sums;
 use crate::bins::Bins;
 use crate::common_noise::{CommonNoise, Filter, Rotations};
 use crate::folds::Folds;
-use crate::frame_rotation::rotation_row;
 use crate::gram::{BlockGrams, Gram};
-use crate::star_columns::{Filled, Layout, StarColumns};
-use crate::star_data::StarData;
+use crate::star_columns::StarColumns;
 
-/// Frames whose columns are filled at once: enough for the matrix product to
-/// dominate, few enough to stay in cache.
-const CHUNK_FRAMES: usize = 32;
 /// About as many bins as the rotations are averaged over at most.
 pub(crate) const MOST_BINS: usize = 1200;
 
-/// Two stars give four numbers for three angles; one gives none to spare.
-const SOLVING: usize = 2;
 /// A pivot below this share of its diagonal is rounding.
 const SINGULAR: f64 = 1e-12;
 
@@ -328,221 +323,6 @@ fn shared(matrix: &Arc<DMatrix<f64>>, columns: &[usize]) -> Arc<DMatrix<f64>> {
     }
 }
 
-/// Columns of a product that are formed at once: a product of columns with themselves
-/// needs only what lies below the diagonal.
-const PANEL: usize = 64;
-
-/// Sums of one block; columns stand in the order of [`Layout::places`].
-struct Sums {
-    layout: Layout,
-    /// D^T D.
-    shared: DMatrix<f64>,
-    /// [D^T X; D^T Y].
-    cross: DMatrix<f64>,
-    /// X^T X + Y^T Y, below the diagonal.
-    own: DMatrix<f64>,
-    /// Products of T with all columns.
-    turn: DMatrix<f64>,
-    scalars: usize,
-    /// M and N of each bin.
-    bins: Option<(DMatrix<f64>, Vec<Matrix3<f64>>)>,
-    /// Products of the rows of bins that have no attitude, and how many scalars.
-    lost: Option<(DMatrix<f64>, usize)>,
-}
-
-/// Scratch of the inner loop.
-#[derive(Default)]
-struct Scratch {
-    filled: Filled,
-    jacobian: Vec<[[f64; 3]; 2]>,
-    /// N of each frame.
-    normal: Vec<Matrix3<f64>>,
-    /// Columns of X or Y that are not all zero.
-    active: Vec<usize>,
-}
-
-impl Sums {
-    fn over(
-        columns: &StarColumns<'_>,
-        frames: Range<usize>,
-        bins: Option<&[Range<usize>]>,
-    ) -> Self {
-        let layout = columns.layout();
-        let (shared, own, turn) = (layout.shared, layout.own.len(), layout.turn.len());
-        let width = layout.width();
-        let mut sums = Self {
-            shared: DMatrix::zeros(shared, shared),
-            cross: DMatrix::zeros(2 * shared, own),
-            own: DMatrix::zeros(own, own),
-            turn: DMatrix::zeros(turn, width),
-            scalars: 0,
-            bins: bins.map(|b| {
-                (
-                    DMatrix::zeros(3 * b.len(), width),
-                    vec![Matrix3::zeros(); b.len()],
-                )
-            }),
-            lost: None,
-            layout,
-        };
-        let used = |frame: usize| {
-            let rows = columns.data.frames.rows_of(frame);
-            rows.filter(|&r| !columns.data.outlier[r]).count()
-        };
-        let without: Vec<bool> = bins.map_or_else(Vec::new, |ranges| {
-            let stars = |r: &Range<usize>| r.clone().map(used).sum::<usize>();
-            ranges.iter().map(|r| stars(r) < SOLVING).collect()
-        });
-        let mut scratch = Scratch::default();
-        let mut at = frames.start;
-        let mut bin = 0;
-        while at < frames.end {
-            let chunk = at..(at + CHUNK_FRAMES).min(frames.end);
-            at = chunk.end;
-            columns.fill(chunk.clone(), &sums.layout, &mut scratch.filled);
-            sums.scalars += 2 * columns.mask(chunk.clone(), &mut scratch.filled);
-            sums.add_rows(&mut scratch);
-            if bins.is_none() && turn == 0 {
-                continue;
-            }
-            let moments = moments(columns.data, chunk.clone(), &sums.layout, &mut scratch);
-            if turn > 0 {
-                let turned = scratch.filled.turn.transpose();
-                sums.turn.gemm(1.0, &turned, &moments, 1.0);
-            }
-            let Some(ranges) = bins else { continue };
-            for (k, frame) in chunk.enumerate() {
-                while ranges[bin].end <= frame {
-                    bin += 1;
-                }
-                if without[bin] {
-                    sums.lose(columns.data, frame, k, &scratch);
-                } else if let Some((kept, normals)) = &mut sums.bins {
-                    let mut kept = kept.fixed_rows_mut::<3>(3 * bin);
-                    kept += moments.fixed_rows::<3>(3 * k);
-                    normals[bin] += scratch.normal[k];
-                }
-            }
-        }
-        sums
-    }
-
-    /// Adds the products of D, X and Y.
-    fn add_rows(&mut self, scratch: &mut Scratch) {
-        let Scratch { filled, active, .. } = scratch;
-        let shared = filled.shared.transpose();
-        self.shared.gemm(1.0, &shared, &filled.shared, 1.0);
-        for (axis, own) in filled.own.iter().enumerate() {
-            let is_active = |c: &usize| own.column(*c).iter().any(|v| v.to_bits() << 1 != 0);
-            active.clear();
-            active.extend((0..own.ncols()).filter(is_active));
-            let gathered;
-            let own = if active.len() == own.ncols() {
-                own
-            } else {
-                gathered = own.select_columns(active.iter());
-                &gathered
-            };
-            let cross = &shared * own;
-            let first = axis * shared.nrows();
-            for (from, &to) in active.iter().enumerate() {
-                let mut into = self.cross.view_mut((first, to), (shared.nrows(), 1));
-                into += cross.column(from);
-            }
-            let transposed = own.transpose();
-            for start in (0..active.len()).step_by(PANEL) {
-                let panel = PANEL.min(active.len() - start);
-                let below = active.len() - start;
-                let product = transposed.rows(start, below) * own.columns(start, panel);
-                for (j, &to) in active[start..start + panel].iter().enumerate() {
-                    let mut into = self.own.column_mut(to);
-                    for (from, &row) in product.column(j).iter().zip(&active[start..]) {
-                        into[row] += from;
-                    }
-                }
-            }
-        }
-    }
-
-    /// Puts the rows of frame `k` of the chunk among those of no rotation.
-    fn lose(&mut self, data: &StarData, frame: usize, k: usize, scratch: &Scratch) {
-        let width = self.layout.width();
-        let (lost, scalars) = self
-            .lost
-            .get_or_insert_with(|| (DMatrix::zeros(width, width), 0));
-        let (shared, own) = (self.layout.shared, self.layout.own.len());
-        let filled = &scratch.filled;
-        let first = data.frames.first_row[frame - k];
-        for row in data.frames.rows_of(frame).filter(|&r| !data.outlier[r]) {
-            let jacobian = rotation_row(data, row);
-            let i = row - first;
-            for axis in 0..2 {
-                let mut line = DVector::zeros(width);
-                line.rows_mut(axis * shared, shared)
-                    .tr_copy_from(&filled.shared.row(i));
-                line.rows_mut(2 * shared, own)
-                    .tr_copy_from(&filled.own[axis].row(i));
-                let turned = filled.turn.fixed_rows::<3>(3 * k);
-                for (j, t) in turned.column_iter().enumerate() {
-                    line[2 * shared + own + j] = Vector3::from(jacobian[axis]).dot(&t);
-                }
-                lost.ger(1.0, &line, &line, 1.0);
-            }
-            *scalars += 2;
-        }
-    }
-
-    /// The products in the order of [`Layout::places`].
-    fn product(&self) -> DMatrix<f64> {
-        let (shared, own, width) = (
-            self.layout.shared,
-            self.layout.own.len(),
-            self.layout.width(),
-        );
-        let mut out = DMatrix::zeros(width, width);
-        for axis in 0..2 {
-            let at = axis * shared;
-            out.view_mut((at, at), (shared, shared))
-                .copy_from(&self.shared);
-        }
-        out.view_mut((2 * shared, 2 * shared), (own, own))
-            .copy_from(&self.own);
-        out.view_mut((2 * shared, 0), (own, 2 * shared))
-            .copy_from(&self.cross.transpose());
-        out.view_mut((2 * shared + own, 0), (self.layout.turn.len(), width))
-            .copy_from(&self.turn);
-        out.fill_upper_triangle_with_lower_triangle();
-        out
-    }
-
-    fn block(self) -> Block {
-        let mut rest = self.product();
-        let mut scalars = self.scalars;
-        if let Some((lost, count)) = &self.lost {
-            rest -= lost;
-            scalars -= count;
-        }
-        let places = self.layout.places();
-        let mut order = vec![0; places.len()];
-        for (from, to) in places.into_iter().enumerate() {
-            order[to] = from;
-        }
-        let width = order.len();
-        let mut block = Block {
-            rest: Arc::new(pick(&rest, &order)),
-            lost: self.lost.map(|(lost, _)| pick(&lost, &order)),
-            scalars: self.scalars as f64,
-            rest_scalars: scalars as f64,
-            theta: DMatrix::zeros(0, width),
-            inverse: Vec::new(),
-        };
-        if let Some((moments, normals)) = self.bins {
-            block.keep_apart(moments.select_columns(&order), &normals);
-        }
-        block
-    }
-}
-
 impl Block {
     /// Takes the rotations of bins with these M and N out of R.
     fn keep_apart(&mut self, mut moments: DMatrix<f64>, normals: &[Matrix3<f64>]) {
@@ -572,75 +352,4 @@ impl Block {
         rest.gemm(-1.0, &whitened.transpose(), &whitened, 1.0);
         self.theta = moments;
     }
-}
-
-/// A^T c of every frame and column, three rows a frame, and N of every frame.
-fn moments(
-    data: &StarData,
-    frames: Range<usize>,
-    layout: &Layout,
-    scratch: &mut Scratch,
-) -> DMatrix<f64> {
-    let first = data.frames.first_row[frames.start];
-    let last = data.frames.first_row[frames.end];
-    let Scratch {
-        filled,
-        jacobian,
-        normal,
-        ..
-    } = scratch;
-    jacobian.clear();
-    jacobian.extend((first..last).map(|row| {
-        if data.outlier[row] {
-            [[0.0; 3]; 2]
-        } else {
-            rotation_row(data, row)
-        }
-    }));
-    let of_frame: Vec<Range<usize>> = frames
-        .map(|k| {
-            let rows = data.frames.rows_of(k);
-            rows.start - first..rows.end - first
-        })
-        .collect();
-    normal.clear();
-    normal.extend(of_frame.iter().map(|rows| {
-        let axes = jacobian[rows.clone()].iter().flatten();
-        axes.fold(Matrix3::zeros(), |sum, a| {
-            let a = Vector3::from(*a);
-            sum + a * a.transpose()
-        })
-    }));
-    let (shared, own) = (layout.shared, layout.own.len());
-    let mut out = DMatrix::zeros(3 * of_frame.len(), layout.width());
-    let add = |out: &mut DMatrix<f64>, column: usize, axis: usize, values: &[f64]| {
-        for (k, rows) in of_frame.iter().enumerate() {
-            let mut sum = [0.0; 3];
-            for (j, v) in jacobian[rows.clone()].iter().zip(&values[rows.clone()]) {
-                for i in 0..3 {
-                    sum[i] += j[axis][i] * v;
-                }
-            }
-            for i in 0..3 {
-                out[(3 * k + i, column)] += sum[i];
-            }
-        }
-    };
-    let n = filled.shared.nrows();
-    for axis in 0..2 {
-        for k in 0..shared {
-            let values = &filled.shared.as_slice()[k * n..(k + 1) * n];
-            add(&mut out, axis * shared + k, axis, values);
-        }
-        for k in 0..own {
-            let values = &filled.own[axis].as_slice()[k * n..(k + 1) * n];
-            add(&mut out, 2 * shared + k, axis, values);
-        }
-    }
-    for (k, normal) in normal.iter().enumerate() {
-        let turned = normal * filled.turn.fixed_rows::<3>(3 * k);
-        out.view_mut((3 * k, 2 * shared + own), turned.shape())
-            .copy_from(&turned);
-    }
-    out
 }

@@ -8,8 +8,10 @@ use telemetry::Model;
 use super::*;
 use crate::coloured::Coloured;
 use crate::empirical::{Empirical, Variable};
+use crate::frame_rotation::rotation_row;
 use crate::nuisance::StarNuisance;
-use crate::star_data::Inputs;
+use crate::star_columns::Filled;
+use crate::star_data::{Inputs, StarData};
 
 /// The camera turns about an axis by a function of time.
 #[derive(Debug)]
@@ -127,7 +129,7 @@ fn dense(columns: &StarColumns<'_>) -> (DMatrix<f64>, Vec<(usize, Vector3<f64>)>
             for axis in 0..2 {
                 let mut line = vec![0.0; layout.width()];
                 for k in 0..layout.shared {
-                    line[layout.shared_at(k, axis)] = filled.shared[(row, k)];
+                    line[layout.shared_at(k, axis)] = filled.shared[(k, row)];
                 }
                 for (k, &place) in layout.own.iter().enumerate() {
                     line[place] = filled.own[axis][(row, k)];

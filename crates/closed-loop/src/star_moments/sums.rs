@@ -1,0 +1,409 @@
+//! The sums of one block, in one pass over its rows.
+//!
+//! Columns are filled a few frames at a time and turned over, so that the columns of one
+//! row lie side by side; those that are zero there are left out. What turns the camera
+//! acts through the moments of a frame alone, axis by axis,
+//!
+//! ```text
+//! M_k = A_k^T c     T^T A^T c = sum over axes and frames of T_k M_k     A^T A T = N_k T_k
+//! ```
+//!
+//! Source: matrix products by blocks.
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use nalgebra::{DMatrix, DMatrixView, DMatrixViewMut, DVector, Dyn, Matrix3, Vector3};
+
+use super::{Block, pick};
+use crate::frame_rotation::rotation_row;
+use crate::star_columns::{Filled, Layout, StarColumns};
+use crate::star_data::StarData;
+
+/// Frames whose columns are filled at once: enough for the matrix product to
+/// dominate, few enough to stay in cache.
+const CHUNK_FRAMES: usize = 16;
+/// Columns of a product that are formed at once: a product of columns with themselves
+/// needs only what lies below the diagonal.
+const PANEL: usize = 48;
+/// Columns that are turned over at once.
+const TURNED: usize = 8;
+/// Two stars give four numbers for three angles; one gives none to spare.
+const SOLVING: usize = 2;
+
+/// Sums of one block; columns stand in the order of [`Layout::places`].
+pub(super) struct Sums {
+    layout: Layout,
+    /// D^T D, below the diagonal.
+    shared: DMatrix<f64>,
+    /// [D^T X; D^T Y].
+    cross: DMatrix<f64>,
+    /// X^T X + Y^T Y, below the diagonal.
+    own: DMatrix<f64>,
+    /// Products of all columns with T.
+    turn: DMatrix<f64>,
+    scalars: usize,
+    /// M of each bin, three columns a bin, and N.
+    bins: Option<(DMatrix<f64>, Vec<Matrix3<f64>>)>,
+    /// Products of the rows of bins that have no attitude, and how many scalars.
+    lost: Option<(DMatrix<f64>, usize)>,
+}
+
+/// Scratch of the inner loop.
+#[derive(Default)]
+struct Scratch {
+    filled: Filled,
+    jacobian: Vec<[[f64; 3]; 2]>,
+    /// N of each frame.
+    normal: Vec<Matrix3<f64>>,
+    axes: [Compact; 2],
+    /// M about each axis, a column a frame.
+    moments: [DMatrix<f64>; 3],
+    /// What one frame adds to M.
+    frame: [Vec<f64>; 3],
+    turns: Compact,
+    product: Vec<f64>,
+}
+
+/// Columns that are not all zero, turned over: a column a row of the data.
+#[derive(Default)]
+struct Compact {
+    active: Vec<usize>,
+    values: Vec<f64>,
+}
+
+impl Compact {
+    /// Of every `step`th row of `columns` from `first` on.
+    fn fill(&mut self, columns: &DMatrix<f64>, first: usize, step: usize) {
+        let rows = columns.nrows() / step;
+        self.active.clear();
+        self.active.extend((0..columns.ncols()).filter(|&c| {
+            let all = &columns.as_slice()[c * columns.nrows()..(c + 1) * columns.nrows()];
+            let mut all = all.iter().skip(first).step_by(step);
+            all.any(|v| v.to_bits() << 1 != 0)
+        }));
+        let width = self.active.len();
+        self.values.clear();
+        self.values.resize(width * rows, 0.0);
+        for at in (0..width).step_by(TURNED) {
+            let some = at..(at + TURNED).min(width);
+            for i in 0..rows {
+                let line = &mut self.values[i * width + some.start..i * width + some.end];
+                for (out, &c) in line.iter_mut().zip(&self.active[some.clone()]) {
+                    *out = columns[(first + i * step, c)];
+                }
+            }
+        }
+    }
+
+    fn row(&self, i: usize) -> &[f64] {
+        let width = self.active.len();
+        &self.values[i * width..(i + 1) * width]
+    }
+
+    /// A row of the data is a column.
+    fn turned(&self) -> DMatrixView<'_, f64> {
+        let width = self.active.len();
+        let rows = self.values.len().checked_div(width).unwrap_or(0);
+        DMatrixView::from_slice(&self.values, width, rows)
+    }
+
+    /// Some of the columns as they were.
+    fn columns(&self, which: Range<usize>) -> DMatrixView<'_, f64, Dyn, Dyn> {
+        let width = self.active.len();
+        let rows = self.values.len() / width;
+        let values = &self.values[which.start..];
+        DMatrixView::from_slice_with_strides(values, rows, which.len(), width, 1)
+    }
+}
+
+/// A matrix of what was in `space`.
+fn matrix(space: &mut Vec<f64>, rows: usize, columns: usize) -> DMatrixViewMut<'_, f64> {
+    space.resize((rows * columns).max(space.len()), 0.0);
+    DMatrixViewMut::from_slice(space, rows, columns)
+}
+
+impl Sums {
+    pub(super) fn over(
+        columns: &StarColumns<'_>,
+        frames: Range<usize>,
+        bins: Option<&[Range<usize>]>,
+    ) -> Self {
+        let layout = columns.layout();
+        let (shared, own, turn) = (layout.shared, layout.own.len(), layout.turn.len());
+        let width = layout.width();
+        let mut sums = Self {
+            shared: DMatrix::zeros(shared, shared),
+            cross: DMatrix::zeros(2 * shared, own),
+            own: DMatrix::zeros(own, own),
+            turn: DMatrix::zeros(width, turn),
+            scalars: 0,
+            bins: bins.map(|b| {
+                (
+                    DMatrix::zeros(width, 3 * b.len()),
+                    vec![Matrix3::zeros(); b.len()],
+                )
+            }),
+            lost: None,
+            layout,
+        };
+        let used = |frame: usize| {
+            let rows = columns.data.frames.rows_of(frame);
+            rows.filter(|&r| !columns.data.outlier[r]).count()
+        };
+        let without: Vec<bool> = bins.map_or_else(Vec::new, |ranges| {
+            let stars = |r: &Range<usize>| r.clone().map(used).sum::<usize>();
+            ranges.iter().map(|r| stars(r) < SOLVING).collect()
+        });
+        let mut scratch = Scratch::default();
+        let mut at = frames.start;
+        let mut bin = 0;
+        while at < frames.end {
+            let chunk = at..(at + CHUNK_FRAMES).min(frames.end);
+            at = chunk.end;
+            columns.fill(chunk.clone(), &sums.layout, &mut scratch.filled);
+            sums.scalars += 2 * columns.mask(chunk.clone(), &mut scratch.filled);
+            sums.add_rows(&mut scratch);
+            if bins.is_none() && turn == 0 {
+                continue;
+            }
+            scratch.moments(columns.data, chunk.clone(), &sums.layout);
+            if turn > 0 {
+                sums.add_turns(&mut scratch);
+            }
+            let Some(ranges) = bins else { continue };
+            for (k, frame) in chunk.enumerate() {
+                while ranges[bin].end <= frame {
+                    bin += 1;
+                }
+                if without[bin] {
+                    sums.lose(columns.data, frame, k, &scratch);
+                } else if let Some((kept, normals)) = &mut sums.bins {
+                    for (axis, moments) in scratch.moments.iter().enumerate() {
+                        let mut kept = kept.column_mut(3 * bin + axis);
+                        kept += moments.column(k);
+                    }
+                    normals[bin] += scratch.normal[k];
+                }
+            }
+        }
+        sums
+    }
+
+    /// Adds the products of D, X and Y.
+    fn add_rows(&mut self, scratch: &mut Scratch) {
+        let Scratch {
+            filled,
+            axes,
+            product,
+            ..
+        } = scratch;
+        let shared = &filled.shared;
+        let n = shared.nrows();
+        let flipped = shared.transpose();
+        for start in (0..n).step_by(PANEL) {
+            let panel = start..(start + PANEL).min(n);
+            let left = shared.rows(start, n - start);
+            self.shared
+                .view_mut((start, start), (n - start, panel.len()))
+                .gemm(1.0, &left, &flipped.columns(start, panel.len()), 1.0);
+        }
+        for (axis, (own, compact)) in filled.own.iter().zip(axes).enumerate() {
+            compact.fill(own, 0, 1);
+            let (turned, width) = (compact.turned(), compact.active.len());
+            if width == 0 {
+                continue;
+            }
+            let mut cross = matrix(product, n, width);
+            cross.gemm(1.0, shared, &compact.columns(0..width), 0.0);
+            for (from, &to) in cross.column_iter().zip(&compact.active) {
+                let mut into = self.cross.view_mut((axis * n, to), (n, 1));
+                into += from;
+            }
+            for start in (0..width).step_by(PANEL) {
+                let panel = start..(start + PANEL).min(width);
+                let below = &compact.active[start..];
+                let mut product = matrix(product, below.len(), panel.len());
+                let left = turned.rows(start, below.len());
+                product.gemm(1.0, &left, &compact.columns(panel.clone()), 0.0);
+                for (from, &to) in product.column_iter().zip(&compact.active[panel]) {
+                    let mut into = self.own.column_mut(to);
+                    for (from, &row) in from.iter().zip(below) {
+                        into[row] += from;
+                    }
+                }
+            }
+        }
+    }
+
+    /// Adds the products of all columns with T.
+    fn add_turns(&mut self, scratch: &mut Scratch) {
+        let Scratch {
+            filled,
+            moments,
+            turns,
+            product,
+            ..
+        } = scratch;
+        for (axis, moments) in moments.iter().enumerate() {
+            turns.fill(&filled.turn, axis, 3);
+            let width = turns.active.len();
+            if width == 0 {
+                continue;
+            }
+            let mut product = matrix(product, moments.nrows(), width);
+            product.gemm(1.0, moments, &turns.columns(0..width), 0.0);
+            for (from, &to) in product.column_iter().zip(&turns.active) {
+                let mut into = self.turn.column_mut(to);
+                into += from;
+            }
+        }
+    }
+
+    /// Puts the rows of frame `k` of the chunk among those of no rotation.
+    fn lose(&mut self, data: &StarData, frame: usize, k: usize, scratch: &Scratch) {
+        let width = self.layout.width();
+        let (lost, scalars) = self
+            .lost
+            .get_or_insert_with(|| (DMatrix::zeros(width, width), 0));
+        let (shared, own) = (self.layout.shared, self.layout.own.len());
+        let filled = &scratch.filled;
+        let first = data.frames.first_row[frame - k];
+        for row in data.frames.rows_of(frame).filter(|&r| !data.outlier[r]) {
+            let jacobian = rotation_row(data, row);
+            let i = row - first;
+            for axis in 0..2 {
+                let mut line = DVector::zeros(width);
+                line.rows_mut(axis * shared, shared)
+                    .copy_from(&filled.shared.column(i));
+                line.rows_mut(2 * shared, own)
+                    .tr_copy_from(&filled.own[axis].row(i));
+                let turned = filled.turn.fixed_rows::<3>(3 * k);
+                for (j, t) in turned.column_iter().enumerate() {
+                    line[2 * shared + own + j] = Vector3::from(jacobian[axis]).dot(&t);
+                }
+                lost.ger(1.0, &line, &line, 1.0);
+            }
+            *scalars += 2;
+        }
+    }
+
+    /// The products in the order of [`Layout::places`].
+    fn product(&self) -> DMatrix<f64> {
+        let (shared, own, width) = (
+            self.layout.shared,
+            self.layout.own.len(),
+            self.layout.width(),
+        );
+        let mut out = DMatrix::zeros(width, width);
+        for axis in 0..2 {
+            let at = axis * shared;
+            out.view_mut((at, at), (shared, shared))
+                .copy_from(&self.shared);
+        }
+        out.view_mut((2 * shared, 2 * shared), (own, own))
+            .copy_from(&self.own);
+        out.view_mut((2 * shared, 0), (own, 2 * shared))
+            .copy_from(&self.cross.transpose());
+        out.view_mut((2 * shared + own, 0), (self.layout.turn.len(), width))
+            .copy_from(&self.turn.transpose());
+        out.fill_upper_triangle_with_lower_triangle();
+        out
+    }
+
+    pub(super) fn block(self) -> Block {
+        let mut rest = self.product();
+        let mut scalars = self.scalars;
+        if let Some((lost, count)) = &self.lost {
+            rest -= lost;
+            scalars -= count;
+        }
+        let places = self.layout.places();
+        let mut order = vec![0; places.len()];
+        for (from, to) in places.into_iter().enumerate() {
+            order[to] = from;
+        }
+        let width = order.len();
+        let mut block = Block {
+            rest: Arc::new(pick(&rest, &order)),
+            lost: self.lost.map(|(lost, _)| pick(&lost, &order)),
+            scalars: self.scalars as f64,
+            rest_scalars: scalars as f64,
+            theta: DMatrix::zeros(0, width),
+            inverse: Vec::new(),
+        };
+        if let Some((moments, normals)) = self.bins {
+            let moments = moments.select_rows(&order).transpose();
+            block.keep_apart(moments, &normals);
+        }
+        block
+    }
+}
+
+impl Scratch {
+    /// M of every frame and column, about each axis, and N of every frame.
+    fn moments(&mut self, data: &StarData, frames: Range<usize>, layout: &Layout) {
+        let first = data.frames.first_row[frames.start];
+        let last = data.frames.first_row[frames.end];
+        self.jacobian.clear();
+        self.jacobian.extend((first..last).map(|row| {
+            if data.outlier[row] {
+                [[0.0; 3]; 2]
+            } else {
+                rotation_row(data, row)
+            }
+        }));
+        let (shared, own) = (layout.shared, layout.own.len());
+        for moments in &mut self.moments {
+            if moments.shape() == (layout.width(), frames.len()) {
+                moments.fill(0.0);
+            } else {
+                *moments = DMatrix::zeros(layout.width(), frames.len());
+            }
+        }
+        self.normal.clear();
+        for (k, frame) in frames.enumerate() {
+            let mut normal = Matrix3::zeros();
+            let rows = data.frames.rows_of(frame);
+            for axis in 0..2 {
+                let compact = &self.axes[axis];
+                for sums in &mut self.frame {
+                    sums.clear();
+                    sums.resize(compact.active.len(), 0.0);
+                }
+                for i in rows.start - first..rows.end - first {
+                    let jacobian = self.jacobian[i][axis];
+                    let a = Vector3::from(jacobian);
+                    normal += a * a.transpose();
+                    let polynomials = &self.filled.shared.as_slice()[i * shared..(i + 1) * shared];
+                    for about in 0..3 {
+                        let from = (k * layout.width()) + axis * shared;
+                        let moments = &mut self.moments[about].as_mut_slice()[from..from + shared];
+                        add(moments, jacobian[about], polynomials);
+                        add(&mut self.frame[about], jacobian[about], compact.row(i));
+                    }
+                }
+                for about in 0..3 {
+                    let mut moments = self.moments[about].column_mut(k);
+                    for (sum, &place) in self.frame[about].iter().zip(&compact.active) {
+                        moments[2 * shared + place] += sum;
+                    }
+                }
+            }
+            for (j, turn) in self.filled.turn.column_iter().enumerate() {
+                let turned = normal * turn.fixed_rows::<3>(3 * k);
+                for about in 0..3 {
+                    self.moments[about][(2 * shared + own + j, k)] = turned[about];
+                }
+            }
+            self.normal.push(normal);
+        }
+    }
+}
+
+/// `sum += factor values`.
+fn add(sum: &mut [f64], factor: f64, values: &[f64]) {
+    for (sum, value) in sum.iter_mut().zip(values) {
+        *sum += factor * value;
+    }
+}
