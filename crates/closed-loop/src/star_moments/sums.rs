@@ -96,11 +96,6 @@ impl Compact {
         }
     }
 
-    fn row(&self, i: usize) -> &[f64] {
-        let width = self.active.len();
-        &self.values[i * width..(i + 1) * width]
-    }
-
     /// A row of the data is a column.
     fn turned(&self) -> DMatrixView<'_, f64> {
         let width = self.active.len();
@@ -363,29 +358,29 @@ impl Scratch {
         }
         self.normal.clear();
         for (k, frame) in frames.enumerate() {
-            let mut normal = Matrix3::zeros();
             let rows = data.frames.rows_of(frame);
-            for axis in 0..2 {
-                let compact = &self.axes[axis];
-                for sums in &mut self.frame {
-                    sums.clear();
-                    sums.resize(compact.active.len(), 0.0);
+            let rows = rows.start - first..rows.end - first;
+            let mut normal = Matrix3::zeros();
+            for a in self.jacobian[rows.clone()].iter().flatten() {
+                let a = Vector3::from(*a);
+                normal += a * a.transpose();
+            }
+            for (axis, compact) in self.axes.iter().enumerate() {
+                let turns = self.jacobian[rows.clone()].iter().map(|j| j[axis]);
+                let polynomials = &self.filled.shared.as_slice()[rows.start * shared..];
+                let [x, y, z] = &mut self.frame;
+                weigh(turns.clone(), polynomials, shared, [x, y, z]);
+                for (moments, sums) in self.moments.iter_mut().zip(&self.frame) {
+                    let from = k * layout.width() + axis * shared;
+                    moments.as_mut_slice()[from..from + shared].copy_from_slice(sums);
                 }
-                for i in rows.start - first..rows.end - first {
-                    let jacobian = self.jacobian[i][axis];
-                    let a = Vector3::from(jacobian);
-                    normal += a * a.transpose();
-                    let polynomials = &self.filled.shared.as_slice()[i * shared..(i + 1) * shared];
-                    for about in 0..3 {
-                        let from = (k * layout.width()) + axis * shared;
-                        let moments = &mut self.moments[about].as_mut_slice()[from..from + shared];
-                        add(moments, jacobian[about], polynomials);
-                        add(&mut self.frame[about], jacobian[about], compact.row(i));
-                    }
-                }
-                for about in 0..3 {
-                    let mut moments = self.moments[about].column_mut(k);
-                    for (sum, &place) in self.frame[about].iter().zip(&compact.active) {
+                let width = compact.active.len();
+                let values = &compact.values[rows.start * width..];
+                let [x, y, z] = &mut self.frame;
+                weigh(turns, values, width, [x, y, z]);
+                for (moments, sums) in self.moments.iter_mut().zip(&self.frame) {
+                    let mut moments = moments.column_mut(k);
+                    for (sum, &place) in sums.iter().zip(&compact.active) {
                         moments[2 * shared + place] += sum;
                     }
                 }
@@ -401,9 +396,41 @@ impl Scratch {
     }
 }
 
-/// `sum += factor values`.
-fn add(sum: &mut [f64], factor: f64, values: &[f64]) {
-    for (sum, value) in sum.iter_mut().zip(values) {
-        *sum += factor * value;
+/// Sums of rows of `values`, each `width` long, with the three weights of each row.
+fn weigh(
+    weights: impl Iterator<Item = [f64; 3]> + Clone,
+    values: &[f64],
+    width: usize,
+    out: [&mut Vec<f64>; 3],
+) {
+    // as many as registers hold
+    const LANES: usize = 8;
+    let [x, y, z] = out.map(|out| {
+        out.clear();
+        out.resize(width, 0.0);
+        &mut out[..]
+    });
+    let whole = width - width % LANES;
+    for at in (0..whole).step_by(LANES) {
+        let mut sums = [[0.0; LANES]; 3];
+        for (i, w) in weights.clone().enumerate() {
+            let row = &values[i * width + at..i * width + at + LANES];
+            for l in 0..LANES {
+                sums[0][l] += w[0] * row[l];
+                sums[1][l] += w[1] * row[l];
+                sums[2][l] += w[2] * row[l];
+            }
+        }
+        x[at..at + LANES].copy_from_slice(&sums[0]);
+        y[at..at + LANES].copy_from_slice(&sums[1]);
+        z[at..at + LANES].copy_from_slice(&sums[2]);
+    }
+    for at in whole..width {
+        for (i, w) in weights.clone().enumerate() {
+            let value = values[i * width + at];
+            x[at] += w[0] * value;
+            y[at] += w[1] * value;
+            z[at] += w[2] * value;
+        }
     }
 }
