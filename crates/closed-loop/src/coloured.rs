@@ -300,7 +300,7 @@ impl LogProduct {
         }
     }
 
-    pub(crate) fn ln(&self) -> f64 {
+    pub(crate) fn ln(self) -> f64 {
         self.ln + self.product.ln()
     }
 }

@@ -396,6 +396,7 @@ impl Fits {
             gram: vec![Gram::whole(alone)],
             scalars: vec![*scalars],
             log_scale: 0.0,
+            known: None,
         };
         Self::whole(&alone, &layout, guess)?.variance(&[])
     }

@@ -94,13 +94,34 @@ impl Gram {
         out
     }
 
-    fn add_to(&self, sum: &mut DMatrix<f64>) {
-        for (sum, own) in sum.iter_mut().zip(self.shared.iter()) {
-            *sum += self.weight * own;
+    /// Adds what lies below the diagonal, M only where it is not `known`.
+    fn add_to(&self, sum: &mut DMatrix<f64>, known: bool) {
+        if !known {
+            for (sum, own) in sum.iter_mut().zip(self.shared.iter()) {
+                *sum += self.weight * own;
+            }
         }
         if self.rows.nrows() > 0 {
-            sum.gemm(1.0, &self.rows.transpose(), &self.rows, 1.0);
+            add_products(&self.rows, sum);
         }
+    }
+}
+
+/// Columns of a product that are formed at once.
+const PANEL: usize = 96;
+
+/// Adds what lies below the diagonal of `E^T E`.
+pub(crate) fn add_products(rows: &DMatrix<f64>, sum: &mut DMatrix<f64>) {
+    let (flipped, n) = (rows.transpose(), rows.ncols());
+    for start in (0..n).step_by(PANEL) {
+        let panel = PANEL.min(n - start);
+        let below = flipped.rows(start, n - start);
+        sum.view_mut((start, start), (n - start, panel)).gemm(
+            1.0,
+            &below,
+            &rows.columns(start, panel),
+            1.0,
+        );
     }
 }
 
@@ -114,6 +135,8 @@ pub(crate) struct BlockGrams {
     /// What the log-likelihood of the scalars lacks to that of the measurements in
     /// arcsec, nats.
     pub(crate) log_scale: f64,
+    /// Where it is known, the sum of M over the blocks of each fold.
+    pub(crate) known: Option<Arc<Vec<DMatrix<f64>>>>,
 }
 
 /// Sums of Gram matrices and scalars over the blocks of each fold, and over all.
@@ -166,6 +189,7 @@ impl BlockGrams {
             gram,
             scalars,
             log_scale: 0.0,
+            known: None,
         }
     }
 
@@ -178,7 +202,10 @@ impl BlockGrams {
         let of = &folds.fold_of_block;
         let fold: Vec<_> = (0..folds.count)
             .into_par_iter()
-            .map(|f| self.sum(|b| of[b] == f))
+            .map(|f| {
+                let known = self.known.as_ref().map(|known| &known[f]);
+                self.sum(|b| of[b] == f, known)
+            })
             .collect();
         FoldSums {
             all: sum(self.width(), fold.iter()),
@@ -188,18 +215,27 @@ impl BlockGrams {
 
     /// The sum over all blocks.
     pub(crate) fn total(&self) -> (DMatrix<f64>, f64) {
-        self.sum(|_| true)
+        self.sum(|_| true, None)
     }
 
-    /// The sum over the blocks for which `wanted` is true.
-    fn sum(&self, wanted: impl Fn(usize) -> bool) -> (DMatrix<f64>, f64) {
+    /// The sum over the blocks for which `wanted` is true, over which the sum of M may be `known`.
+    fn sum(
+        &self,
+        wanted: impl Fn(usize) -> bool,
+        known: Option<&DMatrix<f64>>,
+    ) -> (DMatrix<f64>, f64) {
         let width = self.width();
-        let mut gram = DMatrix::zeros(width, width);
+        let mut gram = match (known, self.gram.first()) {
+            // the blocks are of one noise
+            (Some(known), Some(gram)) => known * gram.weight,
+            _ => DMatrix::zeros(width, width),
+        };
         let mut scalars = 0.0;
         for b in (0..self.gram.len()).filter(|&b| wanted(b)) {
-            self.gram[b].add_to(&mut gram);
+            self.gram[b].add_to(&mut gram, known.is_some());
             scalars += self.scalars[b];
         }
+        gram.fill_upper_triangle_with_lower_triangle();
         (gram, scalars)
     }
 }

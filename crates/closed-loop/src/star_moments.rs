@@ -30,7 +30,7 @@ use self::sums::Sums;
 use crate::bins::Bins;
 use crate::common_noise::{CommonNoise, Filter, Rotations};
 use crate::folds::Folds;
-use crate::gram::{BlockGrams, Gram};
+use crate::gram::{BlockGrams, Gram, add_products};
 use crate::star_columns::StarColumns;
 
 /// About as many bins as the rotations are averaged over at most.
@@ -116,7 +116,9 @@ pub(crate) struct StarMoments {
     frames: Vec<usize>,
     /// Sums over the blocks, once they are asked for: of R, and of the products under white noise.
     rest: OnceLock<DMatrix<f64>>,
+    rest_by_fold: OnceLock<Arc<Vec<DMatrix<f64>>>>,
     white: OnceLock<DMatrix<f64>>,
+    fold_of_block: Vec<usize>,
 }
 
 impl StarMoments {
@@ -151,6 +153,8 @@ impl StarMoments {
             t_s,
             frames,
             rest: OnceLock::new(),
+            rest_by_fold: OnceLock::new(),
+            fold_of_block: folds.fold_of_block.clone(),
             white: OnceLock::new(),
         }
     }
@@ -169,28 +173,56 @@ impl StarMoments {
             gram,
             scalars,
             log_scale: 0.0,
+            known: None,
         }
     }
 
     /// The sum over the blocks of the products under white noise, of some of the columns.
     pub(crate) fn white_in_all(&self, columns: &[usize]) -> BlockGrams {
         let white = self.white.get_or_init(|| {
+            let mut sum = self.rest().clone();
             let all: Vec<usize> = (0..self.width()).collect();
-            self.white_of(&all).total().0
+            for block in &self.blocks {
+                if let Some(lost) = &block.lost {
+                    sum += lost;
+                }
+                add_products(&block.whitened(&all), &mut sum);
+            }
+            sum.fill_upper_triangle_with_lower_triangle();
+            sum
         });
         BlockGrams {
             gram: vec![Gram::whole(pick(white, columns))],
             scalars: vec![self.blocks.iter().map(|b| b.scalars).sum()],
             log_scale: 0.0,
+            known: None,
         }
+    }
+
+    /// The sums of R over the blocks of each fold, where all columns are asked for.
+    fn known(&self, columns: &[usize]) -> Option<Arc<Vec<DMatrix<f64>>>> {
+        is_all(columns, self.width()).then(|| self.rest_by_fold().clone())
+    }
+
+    fn rest_by_fold(&self) -> &Arc<Vec<DMatrix<f64>>> {
+        self.rest_by_fold.get_or_init(|| {
+            let width = self.width();
+            let folds = 0..self.fold_of_block.iter().map(|f| f + 1).max().unwrap_or(0);
+            let of = |f| {
+                let own = self.blocks.iter().zip(&self.fold_of_block);
+                let own = own.filter(|(_, of)| **of == f);
+                own.fold(DMatrix::zeros(width, width), |sum, (b, _)| sum + &*b.rest)
+            };
+            Arc::new(folds.into_par_iter().map(of).collect())
+        })
     }
 
     /// The sum over the blocks of R.
     fn rest(&self) -> &DMatrix<f64> {
         self.rest.get_or_init(|| {
             let width = self.width();
-            let zeros = DMatrix::zeros(width, width);
-            self.blocks.iter().fold(zeros, |sum, b| sum + &*b.rest)
+            let parts = self.rest_by_fold().iter();
+            parts.fold(DMatrix::zeros(width, width), |sum, part| sum + part)
         })
     }
 
@@ -200,6 +232,9 @@ impl StarMoments {
             gram: self.blocks.par_iter().map(|b| b.gram(columns)).collect(),
             scalars: self.blocks.iter().map(|b| b.scalars).collect(),
             log_scale: 0.0,
+            known: self
+                .known(columns)
+                .filter(|_| self.blocks.iter().all(|b| b.lost.is_none())),
         }
     }
 
@@ -222,6 +257,7 @@ impl StarMoments {
             gram,
             scalars: self.blocks.iter().map(Block::solved_scalars).collect(),
             log_scale,
+            known: self.known(columns),
         }
     }
 
@@ -237,6 +273,7 @@ impl StarMoments {
             gram: vec![Gram::whole(gram)],
             scalars: vec![self.blocks.iter().map(Block::solved_scalars).sum()],
             log_scale,
+            known: None,
         }
     }
 
@@ -313,10 +350,13 @@ fn pick(matrix: &DMatrix<f64>, columns: &[usize]) -> DMatrix<f64> {
     })
 }
 
+fn is_all(columns: &[usize], width: usize) -> bool {
+    columns.len() == width && columns.iter().enumerate().all(|(i, &c)| i == c)
+}
+
 /// As [`pick`], without a copy where that is all.
 fn shared(matrix: &Arc<DMatrix<f64>>, columns: &[usize]) -> Arc<DMatrix<f64>> {
-    let all = columns.len() == matrix.ncols() && columns.iter().enumerate().all(|(i, &c)| i == c);
-    if all {
+    if is_all(columns, matrix.ncols()) {
         matrix.clone()
     } else {
         Arc::new(pick(matrix, columns))

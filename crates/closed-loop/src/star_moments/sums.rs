@@ -23,6 +23,8 @@ use crate::star_data::StarData;
 /// Frames whose columns are filled at once: enough for the matrix product to
 /// dominate, few enough to stay in cache.
 const CHUNK_FRAMES: usize = 16;
+/// Frames whose turns are multiplied at once.
+const TURN_FRAMES: usize = 4 * CHUNK_FRAMES;
 /// Columns of a product that are formed at once: a product of columns with themselves
 /// needs only what lies below the diagonal.
 const PANEL: usize = 48;
@@ -50,19 +52,38 @@ pub(super) struct Sums {
 }
 
 /// Scratch of the inner loop.
-#[derive(Default)]
 struct Scratch {
     filled: Filled,
     jacobian: Vec<[[f64; 3]; 2]>,
     /// N of each frame.
     normal: Vec<Matrix3<f64>>,
     axes: [Compact; 2],
-    /// M about each axis, a column a frame.
+    /// M about each axis, a column a frame, of the last frames; and their T.
     moments: [DMatrix<f64>; 3],
+    turn: DMatrix<f64>,
+    held: usize,
     /// What one frame adds to M.
     frame: [Vec<f64>; 3],
     turns: Compact,
     product: Vec<f64>,
+}
+
+impl Default for Scratch {
+    fn default() -> Self {
+        let empty = || DMatrix::zeros(0, 0);
+        Self {
+            filled: Filled::default(),
+            jacobian: Vec::new(),
+            normal: Vec::new(),
+            axes: Default::default(),
+            moments: [empty(), empty(), empty()],
+            turn: empty(),
+            held: 0,
+            frame: Default::default(),
+            turns: Compact::default(),
+            product: Vec::new(),
+        }
+    }
 }
 
 /// Columns that are not all zero, turned over: a column a row of the data.
@@ -73,13 +94,12 @@ struct Compact {
 }
 
 impl Compact {
-    /// Of every `step`th row of `columns` from `first` on.
-    fn fill(&mut self, columns: &DMatrix<f64>, first: usize, step: usize) {
-        let rows = columns.nrows() / step;
+    /// Of the first `rows` rows of `columns`.
+    fn fill(&mut self, columns: &DMatrixView<'_, f64>, rows: usize) {
         self.active.clear();
         self.active.extend((0..columns.ncols()).filter(|&c| {
-            let all = &columns.as_slice()[c * columns.nrows()..(c + 1) * columns.nrows()];
-            let mut all = all.iter().skip(first).step_by(step);
+            let column = columns.column(c);
+            let mut all = column.iter().take(rows);
             all.any(|v| v.to_bits() << 1 != 0)
         }));
         let width = self.active.len();
@@ -90,7 +110,7 @@ impl Compact {
             for i in 0..rows {
                 let line = &mut self.values[i * width + some.start..i * width + some.end];
                 for (out, &c) in line.iter_mut().zip(&self.active[some.clone()]) {
-                    *out = columns[(first + i * step, c)];
+                    *out = columns[(i, c)];
                 }
             }
         }
@@ -162,9 +182,12 @@ impl Sums {
             if bins.is_none() && turn == 0 {
                 continue;
             }
-            scratch.moments(columns.data, chunk.clone(), &sums.layout);
-            if turn > 0 {
+            let held = scratch.moments(columns.data, chunk.clone(), &sums.layout);
+            if turn > 0 && (scratch.held + CHUNK_FRAMES > TURN_FRAMES || at == frames.end) {
                 sums.add_turns(&mut scratch);
+            }
+            if turn == 0 {
+                scratch.held = 0;
             }
             let Some(ranges) = bins else { continue };
             for (k, frame) in chunk.enumerate() {
@@ -176,7 +199,7 @@ impl Sums {
                 } else if let Some((kept, normals)) = &mut sums.bins {
                     for (axis, moments) in scratch.moments.iter().enumerate() {
                         let mut kept = kept.column_mut(3 * bin + axis);
-                        kept += moments.column(k);
+                        kept += moments.column(held + k);
                     }
                     normals[bin] += scratch.normal[k];
                 }
@@ -204,7 +227,7 @@ impl Sums {
                 .gemm(1.0, &left, &flipped.columns(start, panel.len()), 1.0);
         }
         for (axis, (own, compact)) in filled.own.iter().zip(axes).enumerate() {
-            compact.fill(own, 0, 1);
+            compact.fill(&own.as_view(), own.nrows());
             let (turned, width) = (compact.turned(), compact.active.len());
             if width == 0 {
                 continue;
@@ -234,25 +257,30 @@ impl Sums {
     /// Adds the products of all columns with T.
     fn add_turns(&mut self, scratch: &mut Scratch) {
         let Scratch {
-            filled,
             moments,
+            turn,
+            held,
             turns,
             product,
             ..
         } = scratch;
+        let columns = turn.ncols() / 3;
         for (axis, moments) in moments.iter().enumerate() {
-            turns.fill(&filled.turn, axis, 3);
+            let own = turn.columns(axis * columns, columns);
+            turns.fill(&own, *held);
             let width = turns.active.len();
             if width == 0 {
                 continue;
             }
+            let moments = moments.columns(0, *held);
             let mut product = matrix(product, moments.nrows(), width);
-            product.gemm(1.0, moments, &turns.columns(0..width), 0.0);
+            product.gemm(1.0, &moments, &turns.columns(0..width), 0.0);
             for (from, &to) in product.column_iter().zip(&turns.active) {
                 let mut into = self.turn.column_mut(to);
                 into += from;
             }
         }
+        *held = 0;
     }
 
     /// Puts the rows of frame `k` of the chunk among those of no rotation.
@@ -336,8 +364,11 @@ impl Sums {
 }
 
 impl Scratch {
-    /// M of every frame and column, about each axis, and N of every frame.
-    fn moments(&mut self, data: &StarData, frames: Range<usize>, layout: &Layout) {
+    /// M of every frame and column, about each axis, and N of every frame; returns where the first
+    /// frame is held.
+    fn moments(&mut self, data: &StarData, frames: Range<usize>, layout: &Layout) -> usize {
+        let held = self.held;
+        self.held += frames.len();
         let first = data.frames.first_row[frames.start];
         let last = data.frames.first_row[frames.end];
         self.jacobian.clear();
@@ -349,11 +380,20 @@ impl Scratch {
             }
         }));
         let (shared, own) = (layout.shared, layout.own.len());
-        for moments in &mut self.moments {
-            if moments.shape() == (layout.width(), frames.len()) {
-                moments.fill(0.0);
-            } else {
-                *moments = DMatrix::zeros(layout.width(), frames.len());
+        let turns = layout.turn.len();
+        if self.turn.shape() != (TURN_FRAMES, 3 * turns) {
+            self.turn = DMatrix::zeros(TURN_FRAMES, 3 * turns);
+        }
+        for (axis, moments) in self.moments.iter_mut().enumerate() {
+            if moments.nrows() != layout.width() {
+                *moments = DMatrix::zeros(layout.width(), TURN_FRAMES);
+            }
+            moments.columns_mut(held, frames.len()).fill(0.0);
+            for (j, from) in self.filled.turn.column_iter().enumerate() {
+                let mut into = self.turn.column_mut(axis * turns + j);
+                for k in 0..frames.len() {
+                    into[held + k] = from[3 * k + axis];
+                }
             }
         }
         self.normal.clear();
@@ -371,7 +411,7 @@ impl Scratch {
                 let [x, y, z] = &mut self.frame;
                 weigh(turns.clone(), polynomials, shared, [x, y, z]);
                 for (moments, sums) in self.moments.iter_mut().zip(&self.frame) {
-                    let from = k * layout.width() + axis * shared;
+                    let from = (held + k) * layout.width() + axis * shared;
                     moments.as_mut_slice()[from..from + shared].copy_from_slice(sums);
                 }
                 let width = compact.active.len();
@@ -379,7 +419,7 @@ impl Scratch {
                 let [x, y, z] = &mut self.frame;
                 weigh(turns, values, width, [x, y, z]);
                 for (moments, sums) in self.moments.iter_mut().zip(&self.frame) {
-                    let mut moments = moments.column_mut(k);
+                    let mut moments = moments.column_mut(held + k);
                     for (sum, &place) in sums.iter().zip(&compact.active) {
                         moments[2 * shared + place] += sum;
                     }
@@ -388,11 +428,12 @@ impl Scratch {
             for (j, turn) in self.filled.turn.column_iter().enumerate() {
                 let turned = normal * turn.fixed_rows::<3>(3 * k);
                 for about in 0..3 {
-                    self.moments[about][(2 * shared + own + j, k)] = turned[about];
+                    self.moments[about][(2 * shared + own + j, held + k)] = turned[about];
                 }
             }
             self.normal.push(normal);
         }
+        held
     }
 }
 
