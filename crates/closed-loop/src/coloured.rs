@@ -23,6 +23,7 @@
 
 use argmin::core::{CostFunction, Executor};
 use argmin::solver::neldermead::NelderMead;
+use rayon::prelude::*;
 
 /// White plus first-order Gauss-Markov noise of one axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -130,8 +131,10 @@ impl Coloured {
         };
         // A likelihood in the correlation time has more than one hill: start on each.
         let best = [3.0 * step, (step * span).sqrt(), 0.1 * span]
-            .into_iter()
+            .into_par_iter()
             .filter_map(|tau| problem.climb([0.7_f64.ln(), 0.7_f64.ln(), tau.ln()], -0.7))
+            .collect::<Vec<_>>()
+            .into_iter()
             .max_by(|a, b| a.0.total_cmp(&b.0));
         // Two more parameters must earn their keep (Akaike).
         match best {

@@ -102,7 +102,7 @@ impl Gram {
             }
         }
         if self.rows.nrows() > 0 {
-            add_products(&self.rows, sum);
+            add_products(1.0, &self.rows, sum);
         }
     }
 }
@@ -110,14 +110,14 @@ impl Gram {
 /// Columns of a product that are formed at once.
 const PANEL: usize = 96;
 
-/// Adds what lies below the diagonal of `E^T E`.
-pub(crate) fn add_products(rows: &DMatrix<f64>, sum: &mut DMatrix<f64>) {
+/// Adds what lies below the diagonal of `factor E^T E`.
+pub(crate) fn add_products(factor: f64, rows: &DMatrix<f64>, sum: &mut DMatrix<f64>) {
     let (flipped, n) = (rows.transpose(), rows.ncols());
     for start in (0..n).step_by(PANEL) {
         let panel = PANEL.min(n - start);
         let below = flipped.rows(start, n - start);
         sum.view_mut((start, start), (n - start, panel)).gemm(
-            1.0,
+            factor,
             &below,
             &rows.columns(start, panel),
             1.0,

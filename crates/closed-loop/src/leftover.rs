@@ -85,12 +85,22 @@ impl Leftover {
 /// Searches `tracks`.
 pub(crate) fn describe(tracks: &[Track]) -> Leftover {
     let alpha = FAMILY_ALPHA / (2.0 * tracks.len().max(1) as f64);
-    let each: Vec<_> = tracks
+    let thinned: Vec<Track> = tracks
         .par_iter()
         .map(Track::thinned)
         .filter(|track| track.t_s.len() >= MIN_POINTS)
-        .map(|mut track| {
-            let lines = track.lines(alpha);
+        .collect();
+    // most series have the same times, and one plan serves them
+    let first = |k: usize| thinned[..k].iter().position(|t| t.t_s == thinned[k].t_s);
+    let plans: Vec<Option<LombScargle>> = (0..thinned.len())
+        .into_par_iter()
+        .map(|k| first(k).is_none().then(|| thinned[k].plan())?)
+        .collect();
+    let each: Vec<_> = (0..thinned.len())
+        .into_par_iter()
+        .map(|k| {
+            let mut track = thinned[k].clone();
+            let lines = track.lines(alpha, plans[first(k).unwrap_or(k)].as_ref());
             let jumps = track.jumps(alpha);
             (track, lines, jumps)
         })
@@ -273,11 +283,11 @@ impl Track {
     }
 
     /// Frequencies of lines; they are taken out of the series.
-    fn lines(&mut self, alpha: f64) -> Vec<f64> {
+    fn lines(&mut self, alpha: f64, plan: Option<&LombScargle>) -> Vec<f64> {
         let mut found: Vec<f64> = Vec::new();
         let whole = self.clone();
         while found.len() < MOST {
-            let Some(f) = self.strongest_line(alpha) else {
+            let Some(f) = plan.and_then(|plan| self.strongest_line(alpha, plan)) else {
                 break;
             };
             found.push(f);
@@ -316,8 +326,8 @@ impl Track {
         columns
     }
 
-    /// The frequency of the most certain line, if it is beyond doubt.
-    fn strongest_line(&self, alpha: f64) -> Option<f64> {
+    /// Frequencies at which lines are looked for; `None` where the span is too short for any.
+    fn plan(&self) -> Option<LombScargle> {
         let span = self.span();
         let highest = 0.5 / median_step(&self.t_s)?;
         let step = 1.0 / (FINER as f64 * span);
@@ -332,7 +342,6 @@ impl Track {
             reason = "a positive number of grid points, limited by the number of samples"
         )]
         let bins = bins as usize;
-        let white = self.whitened(&self.noise(), &self.value);
         let settings = LombScargleSettings {
             first_hz: first,
             step_hz: step,
@@ -340,11 +349,16 @@ impl Track {
             floating_mean: true,
             fs_hz: 1.0,
         };
-        let power = LombScargle::new(&self.t_s, settings)
-            .ok()?
-            .process(&white)
-            .ok()?
-            .psd;
+        LombScargle::new(&self.t_s, settings).ok()
+    }
+
+    /// The frequency of the most certain line, if it is beyond doubt.
+    fn strongest_line(&self, alpha: f64, plan: &LombScargle) -> Option<f64> {
+        let (span, bins) = (self.span(), plan.bins());
+        let step = 1.0 / (FINER as f64 * span);
+        let first = MIN_CYCLES / span;
+        let white = self.whitened(&self.noise(), &self.value);
+        let power = plan.process(&white).ok()?.psd;
         let near = |k: usize| -> (f64, f64) {
             let (mut sum, mut count) = (0.0, 0.0);
             for j in GUARD + 1..=GUARD + AROUND {

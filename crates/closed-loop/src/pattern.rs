@@ -634,12 +634,16 @@ struct Own {
 
 impl Own {
     fn excludes(&self, k: [f64; 2]) -> bool {
-        let cycles = |x: f64, y: f64| {
-            ((k[0].abs() - x) * self.extent[0]).hypot((k[1].abs() - y) * self.extent[1])
+        let within = |x: f64, y: f64, cycles: f64| {
+            let (x, y) = (
+                (k[0].abs() - x) * self.extent[0],
+                (k[1].abs() - y) * self.extent[1],
+            );
+            x * x + y * y < cycles * cycles
         };
-        cycles(0.0, 0.0) < self.cycles
-            || cycles(1.0, 0.0) < PHASE_GUARD
-            || cycles(0.0, 1.0) < PHASE_GUARD
+        within(0.0, 0.0, self.cycles)
+            || within(1.0, 0.0, PHASE_GUARD)
+            || within(0.0, 1.0, PHASE_GUARD)
     }
 }
 

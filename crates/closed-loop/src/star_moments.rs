@@ -186,7 +186,7 @@ impl StarMoments {
                 if let Some(lost) = &block.lost {
                     sum += lost;
                 }
-                add_products(&block.whitened(&all), &mut sum);
+                add_products(1.0, &block.whitened(&all), &mut sum);
             }
             sum.fill_upper_triangle_with_lower_triangle();
             sum
@@ -389,7 +389,8 @@ impl Block {
             }
         }
         let rest = Arc::make_mut(&mut self.rest);
-        rest.gemm(-1.0, &whitened.transpose(), &whitened, 1.0);
+        add_products(-1.0, &whitened, rest);
+        rest.fill_upper_triangle_with_lower_triangle();
         self.theta = moments;
     }
 }

@@ -229,10 +229,13 @@ impl Trial<'_> {
     /// `chosen` at the better of two starts: all that fits taken out, or `noise`.
     fn score(&self, chosen: &[usize], noise: &CommonNoise) -> Option<Scored> {
         let columns = self.columns(chosen);
-        let (noise, rotations, loglik) = [self.taken_out(&columns), Some(*noise)]
+        let (out, given) = rayon::join(
+            || self.climb(&columns, &self.taken_out(&columns)?),
+            || self.climb(&columns, noise),
+        );
+        let (noise, rotations, loglik) = [out, given]
             .into_iter()
             .flatten()
-            .filter_map(|start| self.climb(&columns, &start))
             .max_by(|a, b| a.2.total_cmp(&b.2))?;
         let layout = self.layout(&columns);
         let grams = self.moments.under(&columns, &noise);

@@ -311,45 +311,58 @@ impl Sums {
         }
     }
 
-    /// The products in the order of [`Layout::places`].
-    fn product(&self) -> DMatrix<f64> {
+    /// The products, in the order of the Gram matrix.
+    fn product(&self, places: &[usize]) -> DMatrix<f64> {
         let (shared, own, width) = (
-            self.layout.shared,
+            2 * self.layout.shared,
             self.layout.own.len(),
             self.layout.width(),
         );
         let mut out = DMatrix::zeros(width, width);
-        for axis in 0..2 {
-            let at = axis * shared;
-            out.view_mut((at, at), (shared, shared))
-                .copy_from(&self.shared);
+        let mut put = |i: usize, j: usize, value: f64| {
+            out[(places[i], places[j])] = value;
+            out[(places[j], places[i])] = value;
+        };
+        for axis in [0, self.layout.shared] {
+            for j in 0..self.layout.shared {
+                for i in j..self.layout.shared {
+                    put(axis + i, axis + j, self.shared[(i, j)]);
+                }
+            }
         }
-        out.view_mut((2 * shared, 2 * shared), (own, own))
-            .copy_from(&self.own);
-        out.view_mut((2 * shared, 0), (own, 2 * shared))
-            .copy_from(&self.cross.transpose());
-        out.view_mut((2 * shared + own, 0), (self.layout.turn.len(), width))
-            .copy_from(&self.turn.transpose());
-        out.fill_upper_triangle_with_lower_triangle();
+        for j in 0..own {
+            for i in j..own {
+                put(shared + i, shared + j, self.own[(i, j)]);
+            }
+            for i in 0..shared {
+                put(i, shared + j, self.cross[(i, j)]);
+            }
+        }
+        for j in 0..self.layout.turn.len() {
+            for i in 0..width {
+                put(i, shared + own + j, self.turn[(i, j)]);
+            }
+        }
         out
     }
 
     pub(super) fn block(self) -> Block {
-        let mut rest = self.product();
+        let places = self.layout.places();
+        let mut order = vec![0; places.len()];
+        for (from, &to) in places.iter().enumerate() {
+            order[to] = from;
+        }
+        let mut rest = self.product(&places);
+        let lost = self.lost.as_ref().map(|(lost, _)| pick(lost, &order));
         let mut scalars = self.scalars;
-        if let Some((lost, count)) = &self.lost {
+        if let (Some((_, count)), Some(lost)) = (&self.lost, &lost) {
             rest -= lost;
             scalars -= count;
         }
-        let places = self.layout.places();
-        let mut order = vec![0; places.len()];
-        for (from, to) in places.into_iter().enumerate() {
-            order[to] = from;
-        }
         let width = order.len();
         let mut block = Block {
-            rest: Arc::new(pick(&rest, &order)),
-            lost: self.lost.map(|(lost, _)| pick(&lost, &order)),
+            rest: Arc::new(rest),
+            lost,
             scalars: self.scalars as f64,
             rest_scalars: scalars as f64,
             theta: DMatrix::zeros(0, width),
