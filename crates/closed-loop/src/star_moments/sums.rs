@@ -94,14 +94,13 @@ struct Compact {
 }
 
 impl Compact {
-    /// Of the first `rows` rows of `columns`.
-    fn fill(&mut self, columns: &DMatrixView<'_, f64>, rows: usize) {
+    /// Of the first `rows` entries of each of `columns`, which are `stride` long.
+    fn fill(&mut self, columns: &[f64], stride: usize, rows: usize) {
+        let column = |c: usize| &columns[c * stride..c * stride + rows];
+        let count = columns.len().checked_div(stride).unwrap_or(0);
         self.active.clear();
-        self.active.extend((0..columns.ncols()).filter(|&c| {
-            let column = columns.column(c);
-            let mut all = column.iter().take(rows);
-            all.any(|v| v.to_bits() << 1 != 0)
-        }));
+        self.active
+            .extend((0..count).filter(|&c| !is_zero(column(c))));
         let width = self.active.len();
         self.values.clear();
         self.values.resize(width * rows, 0.0);
@@ -110,7 +109,7 @@ impl Compact {
             for i in 0..rows {
                 let line = &mut self.values[i * width + some.start..i * width + some.end];
                 for (out, &c) in line.iter_mut().zip(&self.active[some.clone()]) {
-                    *out = columns[(i, c)];
+                    *out = columns[c * stride + i];
                 }
             }
         }
@@ -130,6 +129,14 @@ impl Compact {
         let values = &self.values[which.start..];
         DMatrixView::from_slice_with_strides(values, rows, which.len(), width, 1)
     }
+}
+
+/// Whether all are zero, of either sign.
+fn is_zero(values: &[f64]) -> bool {
+    const LANES: usize = 8;
+    let mut chunks = values.chunks_exact(LANES);
+    let bits = |values: &[f64]| values.iter().fold(0, |all, v| all | v.to_bits());
+    chunks.all(|some| bits(some) << 1 == 0) && bits(chunks.remainder()) << 1 == 0
 }
 
 /// A matrix of what was in `space`.
@@ -227,7 +234,7 @@ impl Sums {
                 .gemm(1.0, &left, &flipped.columns(start, panel.len()), 1.0);
         }
         for (axis, (own, compact)) in filled.own.iter().zip(axes).enumerate() {
-            compact.fill(&own.as_view(), own.nrows());
+            compact.fill(own.as_slice(), own.nrows(), own.nrows());
             let (turned, width) = (compact.turned(), compact.active.len());
             if width == 0 {
                 continue;
@@ -266,8 +273,9 @@ impl Sums {
         } = scratch;
         let columns = turn.ncols() / 3;
         for (axis, moments) in moments.iter().enumerate() {
-            let own = turn.columns(axis * columns, columns);
-            turns.fill(&own, *held);
+            let stride = turn.nrows();
+            let own = axis * columns * stride..(axis + 1) * columns * stride;
+            turns.fill(&turn.as_slice()[own], stride, *held);
             let width = turns.active.len();
             if width == 0 {
                 continue;
