@@ -77,10 +77,10 @@ impl Candidate for Turn {
 }
 
 /// Stars that drift, their number changing, one row an outlier; `single`: frames of one star.
-fn data(single: bool) -> StarData {
+fn data(single: bool, number: usize) -> StarData {
     let camera = Camera::from_fov_deg([1024, 1024], [20.0, 20.0]).unwrap();
     let mut frames = StarFrames::new();
-    for k in 0..40_usize {
+    for k in 0..number {
         let t = 0.5 * k as f64 + if k > 25 { 3.0 } else { 0.0 };
         frames.begin(t);
         let stars = if k % 7 == 3 { 4 } else { 5 };
@@ -148,7 +148,17 @@ fn with_both(
     single: bool,
     check: impl Fn(&StarMoments, &DMatrix<f64>, &[(usize, Vector3<f64>)], &StarData),
 ) {
-    let data = data(single);
+    with_blocks(single, 40, Folds::cut, check);
+}
+
+/// As [`with_both`], of so many frames in the blocks of these folds.
+fn with_blocks(
+    single: bool,
+    frames: usize,
+    folds: impl Fn(usize) -> Folds,
+    check: impl Fn(&StarMoments, &DMatrix<f64>, &[(usize, Vector3<f64>)], &StarData),
+) {
+    let data = data(single, frames);
     let model = Model::parse(
         "format = \"boresight-model/1\"\n[tracker]\npixels = [1024, 1024]\nfov_deg = [20.0, 20.0]\n\
          [noise]\ntemporal_arcsec = 7.0\ndistortion_arcsec = 3.0\ndistortion_order = 2\n",
@@ -181,7 +191,7 @@ fn with_both(
         residuals: &residuals,
         motion: None,
     };
-    let folds = Folds::cut(data.frames.frames());
+    let folds = folds(data.frames.frames());
     let bins = Bins::cut(&data.frames.t_s, &folds, MOST_BINS);
     let moments = StarMoments::accumulate(&columns(&one), &folds, Keep::Bins(&bins));
     let (c, turns) = dense(&columns(&two));
@@ -208,6 +218,35 @@ fn products_are_those_of_every_row() {
                 &sum,
                 &(c.transpose() * c).select_rows(&some).select_columns(&some),
             );
+        });
+    }
+}
+
+/// A block of many chunks, of which the last is cut short, and more turns than are held at once.
+#[test]
+fn long_blocks_are_no_different() {
+    let noise = CommonNoise {
+        centroid: 4.0,
+        reference: [Coloured {
+            white: 0.5,
+            slow: 1.5,
+            tau_s: 8.0,
+        }; 3],
+    };
+    for folds in [Folds::whole, Folds::cut] {
+        with_blocks(true, 171, folds, |moments, c, _, _| {
+            let all: Vec<usize> = (0..moments.width()).collect();
+            let dense = c.transpose() * c;
+            close(&moments.white_of(&all).total().0, &dense);
+            close(&moments.white_in_all(&all).total().0, &dense);
+            let some = [1, 4, 0, all.len() - 1];
+            for columns in [&all[..], &some] {
+                let blocks = moments.under(columns, &noise);
+                let sum = moments.under_in_all(columns, &noise);
+                close(&sum.total().0, &blocks.total().0);
+                assert!((sum.total().1 - blocks.total().1).abs() < 1e-9);
+                assert!((sum.log_scale - blocks.log_scale).abs() < 1e-9);
+            }
         });
     }
 }
@@ -253,7 +292,7 @@ fn noise_that_frames_share_is_weighed_as_its_covariance_says() {
 #[test]
 fn a_free_attitude_leaves_what_no_rotation_explains() {
     for single in [false, true] {
-        let data = data(single);
+        let data = data(single, 40);
         let nuisance = StarNuisance::declared(&Model::default(), &data);
         let residual: [Vec<f64>; 2] =
             std::array::from_fn(|a| data.modelled[a].iter().map(|v| (0.3 * v).sin()).collect());
