@@ -23,6 +23,7 @@
 
 use argmin::core::{CostFunction, Executor};
 use argmin::solver::neldermead::NelderMead;
+use rayon::prelude::*;
 
 /// White plus first-order Gauss-Markov noise of one axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -49,18 +50,14 @@ impl Coloured {
         let (r, s) = (self.white * self.white, self.slow * self.slow);
         let mut variance = s;
         let mut out = Vec::with_capacity(t_s.len());
-        // Steps repeat: one exponential serves them all.
-        let mut known = (f64::NAN, 0.0_f64);
+        let mut known = Known::default();
         for k in 0..t_s.len() {
             let step = if k == 0 {
                 f64::INFINITY
             } else {
                 t_s[k] - t_s[k - 1]
             };
-            if step.to_bits() != known.0.to_bits() {
-                known = (step, (-step / self.tau_s).exp());
-            }
-            let decay = known.1;
+            let decay = known.decay(step, self.tau_s);
             variance = decay * decay * variance + s * (1.0 - decay * decay);
             if count[k] <= 0.0 {
                 out.push([decay, 0.0, 0.0]);
@@ -76,18 +73,31 @@ impl Coloured {
 
     /// Log-likelihood of `y`, nats.
     pub(crate) fn log_likelihood(&self, t_s: &[f64], y: &[f64], count: &[f64]) -> f64 {
-        let mut mean = 0.0;
-        let mut total = 0.0;
-        for (k, [decay, gain, weight]) in self.gains(t_s, count).into_iter().enumerate() {
+        let (r, s) = (self.white * self.white, self.slow * self.slow);
+        let (mut variance, mut mean, mut last_s) = (s, 0.0, f64::NEG_INFINITY);
+        let (mut squares, mut kept) = (0.0, 0.0);
+        let mut determinant = LogProduct::default();
+        let mut known = Known::default();
+        for ((&t_s, &y), &count) in t_s.iter().zip(y).zip(count) {
+            let decay = known.decay(t_s - last_s, self.tau_s);
+            last_s = t_s;
+            let square = decay * decay;
+            variance = square * variance + s * (1.0 - square);
             mean *= decay;
-            if count[k] <= 0.0 {
+            if count <= 0.0 {
                 continue;
             }
-            let e = y[k] - mean;
+            let innovation = variance + r / count;
+            let inverse = 1.0 / innovation;
+            let gain = variance * inverse;
+            let e = y - mean;
             mean += gain * e;
-            total += weight.ln() - 0.5 * (std::f64::consts::TAU.ln() + (e * weight).powi(2));
+            variance *= 1.0 - gain;
+            squares += e * e * inverse;
+            determinant.times(innovation);
+            kept += 1.0;
         }
-        total
+        -0.5 * (squares + determinant.ln() + kept * std::f64::consts::TAU.ln())
     }
 
     /// Noise of greatest likelihood for a series about zero. With too few rows
@@ -121,8 +131,10 @@ impl Coloured {
         };
         // A likelihood in the correlation time has more than one hill: start on each.
         let best = [3.0 * step, (step * span).sqrt(), 0.1 * span]
-            .into_iter()
+            .into_par_iter()
             .filter_map(|tau| problem.climb([0.7_f64.ln(), 0.7_f64.ln(), tau.ln()], -0.7))
+            .collect::<Vec<_>>()
+            .into_iter()
             .max_by(|a, b| a.0.total_cmp(&b.0));
         // Two more parameters must earn their keep (Akaike).
         match best {
@@ -180,6 +192,43 @@ impl Coloured {
         Some([covariance[(1, 1)].sqrt(), covariance[(2, 2)].sqrt()])
     }
 
+    /// Products of whitened steps (0 before each of the rows `at`, 1 from there on) with themselves and
+    /// with two whitened series.
+    pub(crate) fn steps(
+        &self,
+        t_s: &[f64],
+        count: &[f64],
+        at: &[usize],
+        with: [&[f64]; 2],
+    ) -> Vec<[f64; 3]> {
+        // side by side: each is a chain of products
+        const LANES: usize = 8;
+        let gains = self.gains(t_s, count);
+        let mut out = Vec::with_capacity(at.len());
+        for at in at.chunks(LANES) {
+            let mut mean = [0.0; LANES];
+            let mut sums = [[0.0; LANES]; 3];
+            let mut from = [usize::MAX; LANES];
+            from[..at.len()].copy_from_slice(at);
+            let first = at.iter().copied().min().unwrap_or(0);
+            let with = with.map(|w| &w[first..]);
+            for (j, [decay, gain, weight]) in gains[first..].iter().enumerate() {
+                for l in 0..LANES {
+                    let step = f64::from(u8::from(first + j >= from[l]));
+                    let before = mean[l] * decay;
+                    let e = step - before;
+                    let white = e * weight;
+                    mean[l] = before + gain * e;
+                    sums[0][l] += white * white;
+                    sums[1][l] += white * with[0][j];
+                    sums[2][l] += white * with[1][j];
+                }
+            }
+            out.extend((0..at.len()).map(|l| [sums[0][l], sums[1][l], sums[2][l]]));
+        }
+        out
+    }
+
     /// Whitens a series in place: independent, unit variance; masked rows are 0.
     pub(crate) fn whiten(&self, t_s: &[f64], count: &[f64], columns: &mut [&mut [f64]]) {
         let gains = self.gains(t_s, count);
@@ -196,6 +245,66 @@ impl Coloured {
                 column[k] = e * weight;
             }
         }
+    }
+}
+
+/// Steps repeat: one exponential serves them all.
+#[derive(Clone, Copy, Debug)]
+struct Known {
+    step_s: f64,
+    decay: f64,
+}
+
+impl Default for Known {
+    fn default() -> Self {
+        Self {
+            step_s: f64::NAN,
+            decay: 0.0,
+        }
+    }
+}
+
+impl Known {
+    fn decay(&mut self, step_s: f64, tau_s: f64) -> f64 {
+        // alike but for the rounding of times
+        let alike = (step_s - self.step_s).abs() <= 1e-9 * step_s;
+        if !alike || step_s.is_infinite() {
+            *self = Self {
+                step_s,
+                decay: (-step_s / tau_s).exp(),
+            };
+        }
+        self.decay
+    }
+}
+
+/// The logarithm of a long product of positive numbers, without one for each.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct LogProduct {
+    product: f64,
+    ln: f64,
+}
+
+impl Default for LogProduct {
+    fn default() -> Self {
+        Self {
+            product: 1.0,
+            ln: 0.0,
+        }
+    }
+}
+
+impl LogProduct {
+    pub(crate) fn times(&mut self, factor: f64) {
+        self.product *= factor;
+        if !(1e-120..1e120).contains(&self.product) {
+            self.ln += self.product.ln();
+            self.product = 1.0;
+        }
+    }
+
+    pub(crate) fn ln(self) -> f64 {
+        self.ln + self.product.ln()
     }
 }
 

@@ -77,7 +77,7 @@ impl Rotations {
 
     /// The noise of greatest likelihood; started from `near` where there is one.
     pub(crate) fn noise(&self, near: Option<&CommonNoise>) -> CommonNoise {
-        let reference = std::array::from_fn(|axis| {
+        let of = |axis: usize| {
             let (y, count) = (&self.mean[axis], &self.count[axis]);
             let fitted = match near.map(|n| n.reference[axis]) {
                 Some(known) if known.slow > 0.0 => Coloured {
@@ -88,7 +88,9 @@ impl Rotations {
                 _ => Coloured::fit(&self.t_s, y, count),
             };
             self.beside_centroids(axis, fitted)
-        });
+        };
+        let (x, (y, z)) = rayon::join(|| of(0), || rayon::join(|| of(1), || of(2)));
+        let reference = [x, y, z];
         CommonNoise {
             centroid: self.centroid,
             reference,

@@ -167,7 +167,19 @@ impl Candidate for Empirical {
         out.y.fill(0.0);
         let per_arcsec = camera.arcsec_per_px().map(|s| 1.0 / s);
         let half = camera.half_size_px();
+        // of a time, which the rows of a frame share
+        let mut of_frame = [0.0; ORDERS];
         for i in 0..n {
+            if i == 0 || rows.t_s[i].to_bits() != rows.t_s[i - 1].to_bits() {
+                let t_s = rows.t_s[i];
+                of_frame = match &self.variable {
+                    Variable::Time => legendre(self.scaled(t_s)),
+                    Variable::Housekeeping(_, series) => {
+                        legendre(series.at(t_s).map_or(0.0, |v| self.scaled(v)))
+                    }
+                    _ => of_frame,
+                };
+            }
             let mut put = |k: usize, dx: f64, dy: f64| {
                 out.x[k * n + i] = dx * per_arcsec[0];
                 out.y[k * n + i] = dy * per_arcsec[1];
@@ -183,13 +195,9 @@ impl Candidate for Empirical {
                 }
             };
             match &self.variable {
-                Variable::Time => fields(legendre(self.scaled(rows.t_s[i]))),
+                Variable::Time | Variable::Housekeeping(..) => fields(of_frame),
                 Variable::Magnitude => fields(legendre(self.scaled(rows.mag[i]))),
                 Variable::Colour => fields(legendre(self.scaled(rows.bv[i]))),
-                Variable::Housekeeping(_, series) => {
-                    let z = series.at(rows.t_s[i]).map_or(0.0, |v| self.scaled(v));
-                    fields(legendre(z));
-                }
                 Variable::Position(axis) => {
                     let p = if *axis == 0 {
                         rows.x_px[i]
@@ -207,15 +215,10 @@ impl Candidate for Empirical {
                     } else {
                         rows.y_px[i]
                     };
-                    let phase = camera.phase_rad(p);
-                    for (k, g) in [
-                        phase.sin(),
-                        phase.cos(),
-                        (2.0 * phase).sin(),
-                        (2.0 * phase).cos(),
-                    ]
-                    .into_iter()
-                    .enumerate()
+                    let (sin, cos) = camera.phase_rad(p).sin_cos();
+                    for (k, g) in [sin, cos, 2.0 * sin * cos, 1.0 - 2.0 * sin * sin]
+                        .into_iter()
+                        .enumerate()
                     {
                         if *axis == 0 {
                             put(k, g, 0.0);

@@ -52,7 +52,10 @@ use rayon::prelude::*;
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
 
 use crate::folds::Folds;
-use crate::gram::BlockGrams;
+use crate::gram::{BlockGrams, FoldSums, Gram};
+
+#[cfg(test)]
+mod tests;
 
 /// The columns of a Gram matrix, in their order.
 #[derive(Clone, Debug, Default)]
@@ -94,62 +97,52 @@ struct Eliminated {
     nuisance: DMatrix<f64>,
     /// Training Gram of the candidates and the residual (last), nuisance removed.
     train: DMatrix<f64>,
+    /// What the prior adds to the diagonal of the nuisance's normal matrix.
+    prior: Vec<f64>,
     /// ln det of the nuisance's normal matrix.
     log_det: f64,
     /// Training scalars.
     scalars: f64,
     /// Training scalars less the nuisance freedom.
     freedom: f64,
-    /// Gram of what is judged in the transformed columns, and its scalars.
-    blocks: Vec<(DMatrix<f64>, f64)>,
 }
 
 impl Eliminated {
     fn new(
-        grams: &BlockGrams,
+        (gram, scalars): &(DMatrix<f64>, f64),
         layout: &Layout,
         variance: f64,
-        fold: Option<usize>,
-        train: impl Fn(usize) -> bool,
-        judged: impl Fn(usize) -> bool + Sync,
+        pick: &[usize],
     ) -> Option<Self> {
         let n = layout.nuisance_precision.len();
-        let (gram, scalars) = grams.sum(train);
-        let pick = layout.picked(fold);
         let mut normal = gram.view((0, 0), (n, n)).into_owned();
         // A column that nothing constrains (a gauge freedom, a star never seen in
         // training) gets a precision far below what one scalar of data brings.
         let floor = 1e-10 * normal.diagonal().max().max(f64::MIN_POSITIVE);
-        for (k, &precision) in layout.nuisance_precision.iter().enumerate() {
-            normal[(k, k)] += precision * variance + floor;
+        let priors = layout.nuisance_precision.iter();
+        let prior: Vec<f64> = priors.map(|p| p * variance + floor).collect();
+        for (k, prior) in prior.iter().enumerate() {
+            normal[(k, k)] += prior;
         }
-        let cross = picked(&gram, 0..n, &pick);
+        let cross = picked(gram, 0..n, pick);
         let (nuisance, log_det) = if n == 0 {
             (cross.clone(), 0.0)
         } else {
             let factor = Cholesky::new(normal)?;
             (factor.solve(&cross), factor.ln_determinant())
         };
-        let mut reduced = both(&gram, &pick);
+        let mut reduced = both(gram, pick);
         reduced.gemm(-1.0, &cross.transpose(), &nuisance, 1.0);
-        let blocks = (0..grams.gram.len())
-            .into_par_iter()
-            .filter(|&b| judged(b))
-            .map(|b| {
-                let gram = transformed(&grams.gram[b], n, &pick, &nuisance);
-                (gram, grams.scalars[b])
-            })
-            .collect();
         // Columns under a tight prior cost less than one degree of freedom each;
         // counting them whole is the cautious side.
         let freedom = (scalars - n as f64).max(1.0);
         Some(Self {
             nuisance,
             train: reduced,
+            prior,
             log_det,
-            scalars,
+            scalars: *scalars,
             freedom,
-            blocks,
         })
     }
 
@@ -172,6 +165,32 @@ impl Eliminated {
         let beta = factor.solve(&score);
         Some((beta, factor))
     }
+
+    /// Amplitudes of `set`, and the noise variance beside them.
+    fn trained(&self, set: &[usize]) -> Option<(DVector<f64>, f64)> {
+        let (beta, _) = self.amplitudes(set)?;
+        let last = self.train.ncols() - 1;
+        let explained: f64 = (0..set.len())
+            .map(|i| beta[i] * self.train[(set[i], last)])
+            .sum();
+        let freedom = (self.freedom - set.len() as f64).max(1.0);
+        let variance = (self.train[(last, last)] - explained) / freedom;
+        Some((beta, variance.max(f64::MIN_POSITIVE)))
+    }
+
+    /// Nuisance amplitudes of the residual less `beta` times `set`.
+    fn left(&self, set: &[usize], beta: &DVector<f64>) -> DVector<f64> {
+        less(&self.nuisance, set, beta)
+    }
+}
+
+/// The last column less `beta` times the columns `set`.
+fn less(columns: &DMatrix<f64>, set: &[usize], beta: &DVector<f64>) -> DVector<f64> {
+    let mut out = columns.column(columns.ncols() - 1).into_owned();
+    for (&c, b) in set.iter().zip(beta.iter()) {
+        out.axpy(-b, &columns.column(c), 1.0);
+    }
+    out
 }
 
 /// `T^T G T` for `T = [-W; I]` over the picked columns.
@@ -221,17 +240,25 @@ fn both(gram: &DMatrix<f64>, pick: &[usize]) -> DMatrix<f64> {
 }
 
 /// What a set of candidate columns does outside the folds it was fitted on.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct OutOfFold {
-    /// Squared error of each block, predicted from the other folds.
+    /// Squared error of each fold, or block, predicted from the other folds.
     pub(crate) sse: Vec<f64>,
-    /// Log-likelihood of each block, nats, noise variance from the other folds.
+    /// Log-likelihood of each, nats, noise variance from the other folds.
     pub(crate) loglik: Vec<f64>,
-    /// Scalars of each block.
+    /// Scalars of each.
     pub(crate) scalars: Vec<f64>,
 }
 
 impl OutOfFold {
+    fn add(&mut self, error: f64, scalars: f64, variance: f64) {
+        let constant = (std::f64::consts::TAU * variance).ln();
+        self.sse.push(error);
+        self.loglik
+            .push(-0.5 * (scalars * constant + error / variance));
+        self.scalars.push(scalars);
+    }
+
     pub(crate) fn total_loglik(&self) -> f64 {
         self.loglik.iter().sum()
     }
@@ -323,9 +350,15 @@ fn f_tail(f: f64, p: f64, blocks: f64) -> f64 {
 /// All fits that selection needs, on one set of Grams.
 #[derive(Clone, Debug)]
 pub(crate) struct Fits {
+    layout: Layout,
     folds: Vec<Eliminated>,
+    /// Gram of each fold in the columns of its fit, and its scalars.
+    held: Vec<(DMatrix<f64>, f64)>,
     all: Eliminated,
-    blocks: usize,
+    grams: BlockGrams,
+    fold_of_block: Vec<usize>,
+    /// `G W - 2 G_nc` of each block with W of all data: what makes T^T G T of any few columns.
+    inner: Vec<DMatrix<f64>>,
     /// [`Folds::prior_blocks`].
     prior: f64,
 }
@@ -340,56 +373,78 @@ impl Fits {
         layout: &Layout,
         variance: f64,
     ) -> Option<Self> {
-        let of = &folds.fold_of_block;
+        Self::of(grams, &grams.by_fold(folds), folds, layout, variance)
+    }
+
+    /// As [`new`](Self::new) where the sums over the folds are there already.
+    pub(crate) fn of(
+        grams: &BlockGrams,
+        sums: &FoldSums,
+        folds: &Folds,
+        layout: &Layout,
+        variance: f64,
+    ) -> Option<Self> {
+        let n = layout.nuisance_precision.len();
         let by_fold = (0..folds.count)
             .into_par_iter()
             .map(|f| {
-                Eliminated::new(
-                    grams,
-                    layout,
-                    variance,
-                    Some(f),
-                    |b| of[b] != f,
-                    |b| of[b] == f,
-                )
+                let pick = layout.picked(Some(f));
+                let fold = Eliminated::new(&sums.without(f), layout, variance, &pick)?;
+                let (own, scalars) = &sums.fold[f];
+                let held = transformed(own, n, &pick, &fold.nuisance);
+                Some((fold, (held, *scalars)))
             })
             .collect::<Option<Vec<_>>>()?;
-        let all = Eliminated::new(grams, layout, variance, None, |_| true, |_| true)?;
+        let (by_fold, held) = by_fold.into_iter().unzip();
+        let pick = layout.picked(None);
+        let all = Eliminated::new(&sums.all, layout, variance, &pick)?;
+        let inner = grams
+            .gram
+            .par_iter()
+            .map(|g| g.inner(&all.nuisance, &pick))
+            .collect();
         Some(Self {
+            layout: layout.clone(),
             folds: by_fold,
+            held,
             all,
-            blocks: of.len(),
+            grams: grams.clone(),
+            fold_of_block: folds.fold_of_block.clone(),
+            inner,
             prior: folds.prior_blocks,
         })
     }
 
     /// Noise variance of a scalar where no candidate is in the model, from a first guess.
-    pub(crate) fn noise_alone(grams: &BlockGrams, layout: &Layout, guess: f64) -> Option<f64> {
+    pub(crate) fn noise_alone(sums: &FoldSums, layout: &Layout, guess: f64) -> Option<f64> {
+        let (gram, scalars) = &sums.all;
         let n = layout.nuisance_precision.len();
-        let (whole, scalars) = grams.sum(|_| true);
-        let alone = BlockGrams {
-            gram: vec![
-                whole
-                    .remove_columns(n, layout.candidates)
-                    .remove_rows(n, layout.candidates),
-            ],
-            scalars: vec![scalars],
-            log_scale: 0.0,
-        };
+        let kept: Vec<usize> = (0..n).chain(n + layout.candidates..gram.ncols()).collect();
+        let alone = gram.select_columns(&kept).select_rows(&kept);
         let layout = Layout {
             candidates: 0,
             ..layout.clone()
+        };
+        let alone = BlockGrams {
+            gram: vec![Gram::whole(alone)],
+            scalars: vec![*scalars],
+            log_scale: 0.0,
+            known: None,
         };
         Self::whole(&alone, &layout, guess)?.variance(&[])
     }
 
     /// As [`new`](Self::new), on all data alone: for what asks nothing of the folds.
     pub(crate) fn whole(grams: &BlockGrams, layout: &Layout, variance: f64) -> Option<Self> {
-        let all = Eliminated::new(grams, layout, variance, None, |_| true, |_| false)?;
+        let all = Eliminated::new(&grams.total(), layout, variance, &layout.picked(None))?;
         Some(Self {
+            layout: layout.clone(),
             folds: Vec::new(),
+            held: Vec::new(),
             all,
-            blocks: grams.gram.len(),
+            grams: grams.clone(),
+            fold_of_block: Vec::new(),
+            inner: Vec::new(),
             prior: 0.0,
         })
     }
@@ -404,33 +459,41 @@ impl Fits {
         ))
     }
 
-    /// Out-of-fold error of the candidate columns `set`; `None` if they cannot
+    /// Out-of-fold error of the candidate columns `set`, fold by fold; `None` if they cannot
     /// be told apart in some fold.
     pub(crate) fn out_of_fold(&self, set: &[usize]) -> Option<OutOfFold> {
-        let (mut sse, mut loglik, mut count) = (Vec::new(), Vec::new(), Vec::new());
-        for fold in &self.folds {
-            let (beta, _) = fold.amplitudes(set)?;
-            let last = fold.train.ncols() - 1;
-            let train_sse = fold.train[(last, last)]
-                - (0..set.len())
-                    .map(|i| beta[i] * fold.train[(set[i], last)])
-                    .sum::<f64>();
-            let variance =
-                (train_sse / (fold.freedom - set.len() as f64).max(1.0)).max(f64::MIN_POSITIVE);
-            for (gram, scalars) in &fold.blocks {
-                let error = quadratic(gram, set, &beta);
-                sse.push(error);
-                count.push(*scalars);
-                loglik.push(
-                    -0.5 * (scalars * (std::f64::consts::TAU * variance).ln() + error / variance),
-                );
-            }
+        let mut out = OutOfFold::default();
+        for (fold, (gram, scalars)) in self.folds.iter().zip(&self.held) {
+            let (beta, variance) = fold.trained(set)?;
+            out.add(quadratic(gram, set, &beta), *scalars, variance);
         }
-        Some(OutOfFold {
-            sse,
-            loglik,
-            scalars: count,
-        })
+        Some(out)
+    }
+
+    /// As [`out_of_fold`](Self::out_of_fold), block by block.
+    pub(crate) fn out_of_fold_by_block(&self, set: &[usize]) -> Option<OutOfFold> {
+        let n = self.layout.nuisance_precision.len();
+        let trained: Vec<(DVector<f64>, f64)> = (0..self.folds.len())
+            .map(|f| {
+                let fold = &self.folds[f];
+                let (beta, variance) = fold.trained(set)?;
+                let residual = self.layout.residual(Some(f));
+                let mut z = DVector::zeros(n + self.layout.candidates + self.layout.residuals);
+                z[residual] = 1.0;
+                for (&c, b) in set.iter().zip(beta.iter()) {
+                    z[n + c] = -b;
+                }
+                z.rows_mut(0, n).axpy(-1.0, &fold.left(set, &beta), 1.0);
+                Some((z, variance))
+            })
+            .collect::<Option<_>>()?;
+        let mut out = OutOfFold::default();
+        for (b, &f) in self.fold_of_block.iter().enumerate() {
+            let (z, variance) = &trained[f];
+            let error = self.grams.gram[b].quadratic(z).max(0.0);
+            out.add(error, self.grams.scalars[b], *variance);
+        }
+        Some(out)
     }
 
     /// Log-likelihood of all data at the best amplitudes of `set`, the nuisance
@@ -456,44 +519,42 @@ impl Fits {
         beta: &DVector<f64>,
     ) -> DVector<f64> {
         let eliminated = fold.map_or(&self.all, |f| &self.folds[f]);
-        let mut nuisance = eliminated
-            .nuisance
-            .column(eliminated.nuisance.ncols() - 1)
-            .into_owned();
-        for (i, &c) in set.iter().enumerate() {
-            nuisance.axpy(-beta[i], &eliminated.nuisance.column(c), 1.0);
-        }
-        nuisance
+        eliminated.left(set, beta)
     }
 
     /// Joint estimate of `set` on all data.
     pub(crate) fn estimate(&self, set: &[usize]) -> Option<Estimate> {
         let (value, factor) = self.all.amplitudes(set)?;
-        let last = self.all.train.ncols() - 1;
+        let n = self.layout.nuisance_precision.len();
+        let residual = self.layout.residual(None);
         let p = set.len();
+        // M = T^T G T of a block: M_ij = G_ij + (W_i inner_j + inner_i W_j) / 2
+        let w = &self.all.nuisance;
+        let left = self.all.left(set, &value);
         let mut spread = DMatrix::zeros(p, p);
-        for (gram, _) in &self.all.blocks {
+        for (gram, inner) in self.grams.gram.iter().zip(&self.inner) {
+            let within = less(inner, set, &value);
             let score = DVector::from_fn(p, |i, _| {
-                gram[(set[i], last)]
-                    - (0..p)
-                        .map(|j| gram[(set[i], set[j])] * value[j])
-                        .sum::<f64>()
+                let row = n + set[i];
+                let own = (0..p)
+                    .map(|j| gram.at(row, n + set[j]) * value[j])
+                    .sum::<f64>();
+                let cross = w.column(set[i]).dot(&within) + inner.column(set[i]).dot(&left);
+                gram.at(row, residual) - own + 0.5 * cross
             });
             spread.ger(1.0, &score, &score, 1.0);
         }
-        let b = self.blocks as f64;
+        let b = self.grams.gram.len() as f64;
         // Small-sample factor of the cluster-robust variance.
         spread *= b / (b - 1.0).max(1.0);
         let variance = self.variance(set)?;
+        // S less the sum of M is what the prior adds
         for i in 0..p {
             for j in 0..p {
-                let own: f64 = self
-                    .all
-                    .blocks
-                    .iter()
-                    .map(|(gram, _)| gram[(set[i], set[j])])
+                let prior: f64 = (0..n)
+                    .map(|k| self.all.prior[k] * w[(k, set[i])] * w[(k, set[j])])
                     .sum();
-                spread[(i, j)] += variance * (self.all.train[(set[i], set[j])] - own);
+                spread[(i, j)] += variance * prior;
             }
         }
         let inverse = factor.inverse();
@@ -554,189 +615,4 @@ fn quadratic(gram: &DMatrix<f64>, set: &[usize], beta: &DVector<f64>) -> f64 {
         }
     }
     error.max(0.0)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::gram::Design;
-    use rand_core::SeedableRng;
-    use rand_distr::{Distribution, StandardNormal};
-    use rand_xoshiro::Xoshiro256PlusPlus;
-
-    /// One scalar a frame: two nuisance columns, three candidates, one residual.
-    struct Table(DMatrix<f64>);
-
-    impl Design for Table {
-        fn width(&self) -> usize {
-            self.0.ncols()
-        }
-        fn fill(&self, frames: Range<usize>, out: &mut DMatrix<f64>) -> usize {
-            *out = self.0.rows(frames.start, frames.len()).into_owned();
-            frames.len()
-        }
-    }
-
-    /// Smooth regressors; AR(1) noise of correlation `rho`; the first candidate acts with `size`.
-    fn table(frames: usize, rho: f64, size: f64, seed: u64) -> Table {
-        let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-        let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
-        let phase: Vec<f64> = (0..3).map(|_| 3.0 * normal()).collect();
-        let mut noise = normal();
-        let mut out = DMatrix::zeros(frames, 6);
-        for k in 0..frames {
-            let t = k as f64 / frames as f64;
-            noise = rho * noise + (1.0 - rho * rho).sqrt() * normal();
-            out[(k, 0)] = 1.0;
-            out[(k, 1)] = t;
-            for c in 0..3 {
-                out[(k, 2 + c)] = (40.0 * (c as f64 + 1.0) * t + phase[c]).sin();
-            }
-            out[(k, 5)] = 0.7 - 0.3 * t + size * out[(k, 2)] + noise;
-        }
-        Table(out)
-    }
-
-    fn fits(table: &Table, precision: [f64; 2]) -> (Fits, Folds) {
-        let folds = Folds::cut(table.0.nrows());
-        let grams = BlockGrams::accumulate(table, &folds);
-        let layout = Layout {
-            nuisance_precision: precision.to_vec(),
-            candidates: 3,
-            residuals: 1,
-        };
-        (Fits::new(&grams, &folds, &layout, 1.0).unwrap(), folds)
-    }
-
-    /// The same numbers by brute force: solve on four folds, predict the fifth.
-    #[test]
-    fn out_of_fold_error_equals_a_direct_fit() {
-        let table = table(400, 0.0, 1.0, 1);
-        let precision = [0.0, 25.0];
-        let (fits, folds) = fits(&table, precision);
-        let fold = folds.fold_of_frame();
-        let mut direct = 0.0;
-        for f in 0..5 {
-            let train: Vec<usize> = (0..400).filter(|&k| fold[k] != f).collect();
-            let a = DMatrix::from_fn(train.len(), 4, |i, j| table.0[(train[i], [0, 1, 2, 4][j])]);
-            let r = DVector::from_fn(train.len(), |i, _| table.0[(train[i], 5)]);
-            let mut normal = a.transpose() * &a;
-            normal[(1, 1)] += precision[1];
-            let x = normal.lu().solve(&(a.transpose() * r)).unwrap();
-            for k in (0..400).filter(|&k| fold[k] == f) {
-                let model: f64 = (0..4).map(|j| x[j] * table.0[(k, [0, 1, 2, 4][j])]).sum();
-                direct += (table.0[(k, 5)] - model).powi(2);
-            }
-        }
-        let ours = fits.out_of_fold(&[0, 2]).unwrap().total_sse();
-        assert!(
-            (ours / direct - 1.0).abs() < 1e-9,
-            "{ours} against {direct}"
-        );
-    }
-
-    /// Under noise that is correlated over 8 frames (blocks hold 33) the chance of
-    /// p < 0.05 without an effect is 0.05: over 400 seeds its standard error is
-    /// 0.011. Ordinary least squares would raise it to about 0.5.
-    #[test]
-    fn p_values_hold_under_coloured_noise() {
-        let alarms = (0..400)
-            .filter(|&seed| {
-                let (fits, _) = fits(&table(2000, 0.88, 0.0, seed), [0.0; 2]);
-                fits.estimate(&[0, 1]).unwrap().p_value(&[0]) < 0.05
-            })
-            .count();
-        let rate = alarms as f64 / 400.0;
-        assert!((rate - 0.05).abs() < 5.0 * 0.011, "false alarm rate {rate}");
-    }
-
-    /// The same for three parameters at once, correlated over 1.4 frames (what leaks over the edges of
-    /// blocks counts three times).
-    #[test]
-    fn p_values_of_several_parameters_hold() {
-        let all = [0, 1, 2];
-        let alarms = (0..400)
-            .filter(|&seed| {
-                let (fits, _) = fits(&table(2000, 0.5, 0.0, seed), [0.0; 2]);
-                fits.estimate(&all).unwrap().p_value(&all) < 0.05
-            })
-            .count();
-        let rate = alarms as f64 / 400.0;
-        assert!((rate - 0.05).abs() < 5.0 * 0.011, "false alarm rate {rate}");
-    }
-
-    /// An estimate of uncorrelated parameters whose covariance, `sigma` squared, comes from 60 blocks; white
-    /// noise would make it 1.
-    fn drawn(value: &[f64], sigma: &[f64], normal: &mut dyn FnMut() -> f64) -> Estimate {
-        let p = value.len();
-        let mut covariance = DMatrix::zeros(p, p);
-        for _ in 0..59 {
-            let s = DVector::from_fn(p, |i, _| sigma[i] * normal());
-            covariance.ger(1.0 / 59.0, &s, &s, 1.0);
-        }
-        Estimate {
-            value: DVector::from_row_slice(value),
-            covariance,
-            white: DMatrix::identity(p, p),
-            blocks: 60,
-        }
-    }
-
-    /// Six parameters, q = 45: the logarithm of p is -16.9 if all is known. 60 blocks cost three nats; to
-    /// know all of a 6 x 6 covariance from them (Hotelling) costs five.
-    #[test]
-    fn several_parameters_lose_little_to_the_few_blocks() {
-        let mut rng = Xoshiro256PlusPlus::seed_from_u64(9);
-        let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
-        let all: Vec<usize> = (0..6).collect();
-        let known = ChiSquared::new(6.0).unwrap().sf(45.0).ln();
-        let lost: f64 = (0..400)
-            .map(|_| {
-                let value = [45.0_f64.sqrt(), 0.0, 0.0, 0.0, 0.0, 0.0];
-                let estimate = drawn(&value, &[1.0; 6], &mut normal);
-                (estimate.p_value(&all).ln() - known) / 400.0
-            })
-            .sum();
-        assert!((0.0..4.0).contains(&lost), "{lost} nats");
-    }
-
-    /// One amplitude scatters ten times as wide (in variance) as white noise, two do not: 200 alarms are
-    /// expected of 200 000 at 0.1 %, with a standard error of 14, and a fifth more is what the formula is
-    /// off by. Without the tail of the widest alone it is off by 70 %.
-    #[test]
-    fn unequal_variances_raise_no_false_alarms() {
-        let mut rng = Xoshiro256PlusPlus::seed_from_u64(7);
-        let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
-        let sigma = [10.0_f64.sqrt(), 1.0, 1.0];
-        let alarms = (0..200_000)
-            .filter(|_| {
-                let value = sigma.map(|s| s * normal());
-                drawn(&value, &sigma, &mut normal).p_value(&[0, 1, 2]) < 1e-3
-            })
-            .count();
-        assert!((130..290).contains(&alarms), "{alarms}");
-    }
-
-    /// z of the estimate has unit rms over 300 seeds, to 5/sqrt(600).
-    #[test]
-    fn sigmas_are_honest_under_coloured_noise() {
-        let mut sum = 0.0;
-        for seed in 0..300 {
-            let (fits, _) = fits(&table(2000, 0.88, 2.0, 1000 + seed), [0.0; 2]);
-            let estimate = fits.estimate(&[0]).unwrap();
-            sum += ((estimate.value[0] - 2.0) / estimate.sigma(0)).powi(2);
-        }
-        let rms = (sum / 300.0_f64).sqrt();
-        assert!((rms - 1.0).abs() < 5.0 / 600.0_f64.sqrt(), "rms z {rms}");
-    }
-
-    #[test]
-    fn a_set_that_cannot_be_told_apart_is_refused() {
-        let mut table = table(400, 0.0, 1.0, 1);
-        let copy = table.0.column(2).into_owned();
-        table.0.set_column(3, &(2.0 * copy));
-        let (fits, _) = fits(&table, [0.0; 2]);
-        assert!(fits.estimate(&[0]).is_some());
-        assert!(fits.estimate(&[0, 1]).is_none());
-    }
 }

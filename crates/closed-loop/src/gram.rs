@@ -13,8 +13,9 @@
 //! Not physics: linear least squares.
 
 use std::ops::Range;
+use std::sync::Arc;
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use crate::folds::Folds;
@@ -33,16 +34,137 @@ pub(crate) trait Design: Sync {
     fn fill(&self, frames: Range<usize>, out: &mut DMatrix<f64>) -> usize;
 }
 
+/// The Gram matrix of one block,
+///
+/// ```text
+/// G = weight M + E^T E
+/// ```
+///
+/// with a matrix M that fits at several noises share, and a few rows E that are one noise's own.
+#[derive(Clone, Debug)]
+pub(crate) struct Gram {
+    weight: f64,
+    shared: Arc<DMatrix<f64>>,
+    rows: Arc<DMatrix<f64>>,
+}
+
+impl Gram {
+    pub(crate) fn new(weight: f64, shared: Arc<DMatrix<f64>>, rows: DMatrix<f64>) -> Self {
+        Self {
+            weight,
+            shared,
+            rows: Arc::new(rows),
+        }
+    }
+
+    pub(crate) fn whole(shared: impl Into<Arc<DMatrix<f64>>>) -> Self {
+        let shared = shared.into();
+        let rows = DMatrix::zeros(0, shared.ncols());
+        Self::new(1.0, shared, rows)
+    }
+
+    pub(crate) fn at(&self, i: usize, j: usize) -> f64 {
+        self.weight * self.shared[(i, j)] + self.rows.column(i).dot(&self.rows.column(j))
+    }
+
+    /// `z^T G z`.
+    pub(crate) fn quadratic(&self, z: &DVector<f64>) -> f64 {
+        let own = (&*self.rows * z).norm_squared();
+        self.weight * z.dot(&(&*self.shared * z)) + own
+    }
+
+    /// `G_n W - 2 G_nc` with the first columns n and the columns c.
+    pub(crate) fn inner(&self, w: &DMatrix<f64>, columns: &[usize]) -> DMatrix<f64> {
+        let n = w.nrows();
+        let mut out = DMatrix::zeros(n, columns.len());
+        for (&column, mut out) in columns.iter().zip(out.column_iter_mut()) {
+            out.axpy(
+                -2.0 * self.weight,
+                &self.shared.column(column).rows(0, n),
+                0.0,
+            );
+        }
+        out.gemm(self.weight, &self.shared.view((0, 0), (n, n)), w, 1.0);
+        if self.rows.nrows() > 0 {
+            let first = self.rows.columns(0, n);
+            let mut left = self.rows.select_columns(columns);
+            left.gemm(1.0, &first, w, -2.0);
+            out.gemm(1.0, &first.transpose(), &left, 1.0);
+        }
+        out
+    }
+
+    /// Adds what lies below the diagonal, M only where it is not `known`.
+    fn add_to(&self, sum: &mut DMatrix<f64>, known: bool) {
+        if !known {
+            for (sum, own) in sum.iter_mut().zip(self.shared.iter()) {
+                *sum += self.weight * own;
+            }
+        }
+        if self.rows.nrows() > 0 {
+            add_products(1.0, &self.rows, sum);
+        }
+    }
+}
+
+/// Columns of a product that are formed at once.
+const PANEL: usize = 96;
+
+/// Adds what lies below the diagonal of `factor E^T E`.
+pub(crate) fn add_products(factor: f64, rows: &DMatrix<f64>, sum: &mut DMatrix<f64>) {
+    let (flipped, n) = (rows.transpose(), rows.ncols());
+    for start in (0..n).step_by(PANEL) {
+        let panel = PANEL.min(n - start);
+        let below = flipped.rows(start, n - start);
+        sum.view_mut((start, start), (n - start, panel)).gemm(
+            factor,
+            &below,
+            &rows.columns(start, panel),
+            1.0,
+        );
+    }
+}
+
 /// Gram matrices per block.
 #[derive(Clone, Debug)]
 pub(crate) struct BlockGrams {
-    /// One width x width matrix a block.
-    pub(crate) gram: Vec<DMatrix<f64>>,
+    /// One of width x width a block.
+    pub(crate) gram: Vec<Gram>,
     /// How many scalars each block holds.
     pub(crate) scalars: Vec<f64>,
     /// What the log-likelihood of the scalars lacks to that of the measurements in
     /// arcsec, nats.
     pub(crate) log_scale: f64,
+    /// Where it is known, the sum of M over the blocks of each fold.
+    pub(crate) known: Option<Arc<Vec<DMatrix<f64>>>>,
+}
+
+/// Sums of Gram matrices and scalars over the blocks of each fold, and over all.
+#[derive(Clone, Debug)]
+pub(crate) struct FoldSums {
+    pub(crate) fold: Vec<(DMatrix<f64>, f64)>,
+    pub(crate) all: (DMatrix<f64>, f64),
+}
+
+impl FoldSums {
+    /// The sum over all folds but one: a sum, not a difference, so that a column which lives in that fold
+    /// alone is exactly nothing.
+    pub(crate) fn without(&self, fold: usize) -> (DMatrix<f64>, f64) {
+        let others = self.fold.iter().enumerate().filter(|(f, _)| *f != fold);
+        sum(self.all.0.nrows(), others.map(|(_, s)| s))
+    }
+}
+
+fn sum<'a>(
+    width: usize,
+    parts: impl Iterator<Item = &'a (DMatrix<f64>, f64)>,
+) -> (DMatrix<f64>, f64) {
+    let mut out = (DMatrix::zeros(width, width), 0.0);
+    for (gram, scalars) in parts {
+        out.0 += gram;
+        out.1 += scalars;
+    }
+    out
 }
 
 impl BlockGrams {
@@ -60,25 +182,60 @@ impl BlockGrams {
                 gram.gemm(1.0, &rows.transpose(), &rows, 1.0);
                 at = end;
             }
-            (gram, scalars as f64)
+            (Gram::whole(gram), scalars as f64)
         });
         let (gram, scalars) = blocks.unzip();
         Self {
             gram,
             scalars,
             log_scale: 0.0,
+            known: None,
         }
     }
 
-    /// The sum over the blocks for which `wanted` is true.
-    pub(crate) fn sum(&self, wanted: impl Fn(usize) -> bool) -> (DMatrix<f64>, f64) {
-        let width = self.gram[0].nrows();
-        let mut gram = DMatrix::zeros(width, width);
+    fn width(&self) -> usize {
+        self.gram.first().map_or(0, |g| g.shared.ncols())
+    }
+
+    /// The sums over the folds.
+    pub(crate) fn by_fold(&self, folds: &Folds) -> FoldSums {
+        let of = &folds.fold_of_block;
+        let fold: Vec<_> = (0..folds.count)
+            .into_par_iter()
+            .map(|f| {
+                let known = self.known.as_ref().map(|known| &known[f]);
+                self.sum(|b| of[b] == f, known)
+            })
+            .collect();
+        FoldSums {
+            all: sum(self.width(), fold.iter()),
+            fold,
+        }
+    }
+
+    /// The sum over all blocks.
+    pub(crate) fn total(&self) -> (DMatrix<f64>, f64) {
+        self.sum(|_| true, None)
+    }
+
+    /// The sum over the blocks for which `wanted` is true, over which the sum of M may be `known`.
+    fn sum(
+        &self,
+        wanted: impl Fn(usize) -> bool,
+        known: Option<&DMatrix<f64>>,
+    ) -> (DMatrix<f64>, f64) {
+        let width = self.width();
+        let mut gram = match (known, self.gram.first()) {
+            // the blocks are of one noise
+            (Some(known), Some(gram)) => known * gram.weight,
+            _ => DMatrix::zeros(width, width),
+        };
         let mut scalars = 0.0;
         for b in (0..self.gram.len()).filter(|&b| wanted(b)) {
-            gram += &self.gram[b];
+            self.gram[b].add_to(&mut gram, known.is_some());
             scalars += self.scalars[b];
         }
+        gram.fill_upper_triangle_with_lower_triangle();
         (gram, scalars)
     }
 }

@@ -286,7 +286,12 @@ fn score(
     rivals: &mut Vec<Rival>,
 ) -> Result<Scored, CloseError> {
     let fitted = fit(evidence, folds, &borrowed(phase))?;
-    let scored = |set: &[usize]| fitted.fits.out_of_fold(set).map(|o| Score::new(&o, folds));
+    let scored = |set: &[usize]| {
+        fitted
+            .fits
+            .out_of_fold_by_block(set)
+            .map(|o| Score::new(&o, folds))
+    };
     let alone = scored(&[]).ok_or(CloseError::Singular)?;
     let best = (0..phase.len())
         .filter(|&g| !fitted.groups[g].columns.is_empty())

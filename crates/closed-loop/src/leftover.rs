@@ -88,12 +88,22 @@ impl Leftover {
 /// Searches `tracks`.
 pub(crate) fn describe(tracks: &[Track]) -> Leftover {
     let alpha = FAMILY_ALPHA / (2.0 * tracks.len().max(1) as f64);
-    let each: Vec<_> = tracks
+    let thinned: Vec<Track> = tracks
         .par_iter()
         .map(Track::thinned)
         .filter(|track| track.t_s.len() >= MIN_POINTS)
-        .map(|mut track| {
-            let lines = track.lines(alpha);
+        .collect();
+    // most series have the same times, and one plan serves them
+    let first = |k: usize| thinned[..k].iter().position(|t| t.t_s == thinned[k].t_s);
+    let plans: Vec<Option<LombScargle>> = (0..thinned.len())
+        .into_par_iter()
+        .map(|k| first(k).is_none().then(|| thinned[k].plan())?)
+        .collect();
+    let each: Vec<_> = (0..thinned.len())
+        .into_par_iter()
+        .map(|k| {
+            let mut track = thinned[k].clone();
+            let lines = track.lines(alpha, plans[first(k).unwrap_or(k)].as_ref());
             let jumps = track.jumps(alpha);
             (track, lines, jumps)
         })
@@ -281,11 +291,11 @@ impl Track {
     }
 
     /// Frequencies of lines that the declared model does not make; all are taken out of the series.
-    fn lines(&mut self, alpha: f64) -> Vec<f64> {
+    fn lines(&mut self, alpha: f64, plan: Option<&LombScargle>) -> Vec<f64> {
         let mut found: Vec<f64> = Vec::new();
         let whole = self.clone();
         while found.len() < MOST {
-            let Some(f) = self.strongest_line(alpha) else {
+            let Some(f) = plan.and_then(|plan| self.strongest_line(alpha, plan)) else {
                 break;
             };
             found.push(f);
@@ -331,8 +341,8 @@ impl Track {
         columns
     }
 
-    /// The frequency of the most certain line, if it is beyond doubt.
-    fn strongest_line(&self, alpha: f64) -> Option<f64> {
+    /// Frequencies at which lines are looked for; `None` where the span is too short for any.
+    fn plan(&self) -> Option<LombScargle> {
         let span = self.span();
         let highest = 0.5 / median_step(&self.t_s)?;
         let step = 1.0 / (FINER as f64 * span);
@@ -347,7 +357,6 @@ impl Track {
             reason = "a positive number of grid points, limited by the number of samples"
         )]
         let bins = bins as usize;
-        let white = self.whitened(&self.noise(), &self.value);
         let settings = LombScargleSettings {
             first_hz: first,
             step_hz: step,
@@ -355,11 +364,16 @@ impl Track {
             floating_mean: true,
             fs_hz: 1.0,
         };
-        let power = LombScargle::new(&self.t_s, settings)
-            .ok()?
-            .process(&white)
-            .ok()?
-            .psd;
+        LombScargle::new(&self.t_s, settings).ok()
+    }
+
+    /// The frequency of the most certain line, if it is beyond doubt.
+    fn strongest_line(&self, alpha: f64, plan: &LombScargle) -> Option<f64> {
+        let (span, bins) = (self.span(), plan.bins());
+        let step = 1.0 / (FINER as f64 * span);
+        let first = MIN_CYCLES / span;
+        let white = self.whitened(&self.noise(), &self.value);
+        let power = plan.process(&white).ok()?.psd;
         let near = |k: usize| -> (f64, f64) {
             let (mut sum, mut count) = (0.0, 0.0);
             for j in GUARD + 1..=GUARD + AROUND {
@@ -466,15 +480,9 @@ impl Track {
         let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
         let (oo, oy) = (dot(&one, &one), dot(&one, &y));
         let score = |at: &[usize]| -> Option<(usize, f64)> {
-            let mut steps = vec![0.0; n * at.len()];
-            for (step, &at) in steps.chunks_exact_mut(n).zip(at) {
-                step[at..].fill(1.0);
-            }
-            let mut columns: Vec<&mut [f64]> = steps.chunks_exact_mut(n).collect();
-            noise.whiten(&self.t_s, &self.weight, &mut columns);
-            let scores = columns.iter().zip(at).map(|(step, &at)| {
-                let (so, sy) = (dot(step, &one), dot(step, &y));
-                let ss = dot(step, step) - so * so / oo;
+            let scores = noise.steps(&self.t_s, &self.weight, at, [&one, &y]);
+            let scores = scores.into_iter().zip(at).map(|([ss, so, sy], &at)| {
+                let ss = ss - so * so / oo;
                 let score = sy - so * oy / oo;
                 (at, if ss > 0.0 { score * score / ss } else { 0.0 })
             });
@@ -483,11 +491,7 @@ impl Track {
         // coarse first: a step is seen from near by
         let stride = n.div_ceil(MOST_STEPS);
         let all: Vec<usize> = (MIN_SIDE..=n - MIN_SIDE).step_by(stride).collect();
-        let coarse = all
-            .chunks(64)
-            .filter_map(score)
-            .max_by(|a, b| a.1.total_cmp(&b.1))?
-            .0;
+        let coarse = score(&all)?.0;
         let first = coarse.saturating_sub(2 * stride).max(MIN_SIDE);
         let fine: Vec<usize> = (first..=(coarse + 2 * stride).min(n - MIN_SIDE)).collect();
         score(&fine).map(|(at, _)| at)

@@ -332,7 +332,7 @@ pub(crate) fn information(
             .map(|c| c.coefficients().len())
             .sum::<usize>(),
     );
-    let (gram, _) = evidence.grams(folds, candidates).sum(|_| true);
+    let (gram, _) = evidence.grams(folds, candidates).total();
     let own = gram.view((n, n), (p, p)).into_owned();
     if n == 0 {
         return Some(own / variance);

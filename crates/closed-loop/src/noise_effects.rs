@@ -81,11 +81,20 @@ impl NoiseEffects {
         let square = |r: usize| {
             (data.velocity[0][r] * degrees[0]).powi(2) + (data.velocity[1][r] * degrees[1]).powi(2)
         };
+        // rows of one star grow alike
+        let mut of_star = vec![0.0; data.stars.len()];
+        for &r in rows.iter().filter(|&&r| declared[r].is_finite()) {
+            of_star[data.star[r]] += declared[r];
+        }
+        let grown = |slope: f64| {
+            let each = data.stars.iter().zip(&of_star);
+            let each = each.filter(|(star, _)| star.mag.is_finite());
+            let more = |mag: f64| 10_f64.powf(0.4 * slope * (mag - 5.0)) - 1.0;
+            each.map(|(star, sum)| sum * more(star.mag)).sum::<f64>() / rows.len().max(1) as f64
+        };
         for entry in &mut self.considered {
             entry.needed = match entry.id.as_str() {
-                MAGNITUDE => steepest(wanted, &|slope| {
-                    mean(&|r| declared[r] * (10_f64.powf(0.4 * slope * (data.mag[r] - 5.0)) - 1.0))
-                }),
+                MAGNITUDE => steepest(wanted, &grown),
                 RATE => Some((wanted / mean(&square)).sqrt()),
                 OUTLIERS => Some(wanted / (SPIKE * SPIKE * mean(&|r| declared[r]))),
                 _ => None,

@@ -121,7 +121,7 @@ impl StarNuisance {
         let first = data.frames.first_row[frames.start];
         let scale = data.camera.arcsec_per_px();
         let per_rad = scale.map(|s| s / focal_plane::ARCSEC_PER_RAD);
-        let (misalignment, polynomials, _) = self.parts();
+        let (misalignment, _, _) = self.parts();
         let mut basis = vec![0.0; self.moments.len()];
         for frame in frames {
             for row in data.frames.rows_of(frame) {
@@ -140,8 +140,10 @@ impl StarNuisance {
                 }
                 if let Some((order, _)) = self.distortion {
                     DistortionField::basis_into(order, data.camera.normalised(at), &mut basis);
-                    for k in 0..polynomials {
-                        out.shared[(i, k)] = basis[k + 1] - self.moments[k + 1];
+                    let polynomials = out.shared.column_mut(i);
+                    let basis = basis[1..].iter().zip(&self.moments[1..]);
+                    for (out, (value, mean)) in polynomials.into_iter().zip(basis) {
+                        *out = value - mean;
                     }
                 }
                 if self.directions > 0 {

@@ -83,11 +83,12 @@ pub(crate) fn fit_grams(
         residuals: evidence.residual_columns(),
     };
     let guess = evidence.variance_guess();
-    let variance = Fits::noise_alone(grams, &layout, guess)
+    let sums = grams.by_fold(folds);
+    let variance = Fits::noise_alone(&sums, &layout, guess)
         .unwrap_or(guess)
         .max(f64::MIN_POSITIVE);
-    let fits = Fits::new(grams, folds, &layout, variance).ok_or(CloseError::Singular)?;
-    let (whole, scalars) = grams.sum(|_| true);
+    let fits = Fits::of(grams, &sums, folds, &layout, variance).ok_or(CloseError::Singular)?;
+    let (whole, scalars) = sums.all;
     let first = layout.nuisance_precision.len();
     let mut groups = Vec::new();
     let mut column = 0;

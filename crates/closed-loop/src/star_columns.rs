@@ -39,7 +39,7 @@ pub(crate) struct StarColumns<'a> {
 /// The columns of some frames.
 #[derive(Clone, Debug)]
 pub(crate) struct Filled {
-    /// D: polynomials of position, a row a star.
+    /// D: polynomials of position, a column a star.
     pub(crate) shared: DMatrix<f64>,
     /// X and Y: everything that has no special form, a row a star.
     pub(crate) own: [DMatrix<f64>; 2],
@@ -59,20 +59,20 @@ impl Default for Filled {
 }
 
 impl Filled {
-    /// Rows for the columns of `layout`, all zero.
-    fn reset(&mut self, rows: usize, frames: usize, layout: &Layout) {
-        let clear = |m: &mut DMatrix<f64>, rows: usize, columns: usize| {
-            if m.shape() == (rows, columns) {
-                m.fill(0.0);
-            } else {
+    /// Rows for the columns of `layout`; the first `nuisance` own ones and the turns are zero.
+    fn reset(&mut self, rows: usize, frames: usize, layout: &Layout, nuisance: usize) {
+        let shape = |m: &mut DMatrix<f64>, rows: usize, columns: usize| {
+            if m.shape() != (rows, columns) {
                 *m = DMatrix::zeros(rows, columns);
             }
         };
-        clear(&mut self.shared, rows, layout.shared);
+        shape(&mut self.shared, layout.shared, rows);
         for own in &mut self.own {
-            clear(own, rows, layout.own.len());
+            shape(own, rows, layout.own.len());
+            own.columns_mut(0, nuisance).fill(0.0);
         }
-        clear(&mut self.turn, 3 * frames, layout.turn.len());
+        shape(&mut self.turn, 3 * frames, layout.turn.len());
+        self.turn.fill(0.0);
     }
 }
 
@@ -157,11 +157,11 @@ impl StarColumns<'_> {
         let data = self.data;
         let rows = data.frames.first_row[frames.start]..data.frames.first_row[frames.end];
         let n = rows.len();
-        out.reset(n, frames.len(), layout);
-        self.nuisance.fill(data, frames.clone(), out);
-        self.fill_turns(&data.frames.t_s[frames], &mut out.turn);
         let (misalignment, _, directions) = self.nuisance.parts();
         let mut column = misalignment + directions;
+        out.reset(n, frames.len(), layout, column);
+        self.nuisance.fill(data, frames.clone(), out);
+        self.fill_turns(&data.frames.t_s[frames], &mut out.turn);
         let seen = self.rows(rows.clone());
         let scale = data.camera.arcsec_per_px();
         let [x, y] = &mut out.own;
@@ -239,18 +239,16 @@ impl StarColumns<'_> {
     pub(crate) fn weigh(&self, frames: Range<usize>, out: &mut Filled) -> usize {
         let data = self.data;
         let rows = data.frames.first_row[frames.start]..data.frames.first_row[frames.end];
-        let scaled = |m: &mut DMatrix<f64>| {
-            if m.is_empty() {
-                return;
-            }
-            for column in m.as_mut_slice().chunks_exact_mut(rows.len()) {
-                for (v, row) in column.iter_mut().zip(rows.clone()) {
-                    *v *= self.weight_of(row);
+        for (i, row) in rows.clone().enumerate() {
+            scale(out.shared.column_mut(i).as_mut_slice(), self.weight_of(row));
+        }
+        for own in out.own.iter_mut().filter(|m| !m.is_empty()) {
+            for column in own.as_mut_slice().chunks_exact_mut(rows.len()) {
+                for (v, row) in column.chunks_exact_mut(1).zip(rows.clone()) {
+                    scale(v, self.weight_of(row));
                 }
             }
-        };
-        scaled(&mut out.shared);
-        out.own.iter_mut().for_each(scaled);
+        }
         rows.clone().filter(|&row| !data.outlier[row]).count()
     }
 
@@ -270,7 +268,7 @@ impl StarColumns<'_> {
         let mut shift: [DVector<f64>; 2] = std::array::from_fn(|axis| {
             let shared =
                 DVector::from_fn(layout.shared, |k, _| amplitudes[layout.shared_at(k, axis)]);
-            &filled.shared * shared + filled.own[axis].columns(0, own.len()) * &own
+            filled.shared.tr_mul(&shared) + filled.own[axis].columns(0, own.len()) * &own
         });
         if !layout.turn.is_empty() {
             let turn = &filled.turn * of(&layout.turn);
@@ -286,5 +284,14 @@ impl StarColumns<'_> {
             }
         }
         shift
+    }
+}
+
+/// Weighs `values`; what does not count is zero, whatever it was.
+fn scale(values: &mut [f64], weight: f64) {
+    if weight > 0.0 {
+        values.iter_mut().for_each(|v| *v *= weight);
+    } else {
+        values.fill(0.0);
     }
 }

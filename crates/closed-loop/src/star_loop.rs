@@ -109,7 +109,7 @@ fn trace(
     progress: &dyn Fn(&str),
 ) -> Result<Closed, CloseError> {
     progress("residuals of the declared model");
-    let before = settle(data, situation, phase, folds)?;
+    let settled = settle(data, situation, phase, folds)?;
 
     let around: Option<Box<dyn AttitudeSource>> = match &situation.reference {
         Some(_) => resolved_motion(situation, &data.frames.t_s),
@@ -191,9 +191,16 @@ fn trace(
         level: searched.evidence.as_ref().unwrap_or(level),
         found: &searched.found,
         wander: searched.wander.as_ref(),
-        before: &before,
+        settled: &settled,
         image: image.as_ref().zip(formed.as_ref()),
     })
+}
+
+/// The declared model at its best.
+struct Settled {
+    before: Residuals,
+    /// Log-likelihood out of fold; `None` where rows were left out since.
+    loglik: Option<f64>,
 }
 
 /// Fits what the declared model leaves unknown, moves the modelled positions and
@@ -203,19 +210,21 @@ fn settle(
     situation: &Situation<'_>,
     phase: &centroid::CentroidError,
     folds: &Folds,
-) -> Result<Residuals, CloseError> {
+) -> Result<Settled, CloseError> {
     let mut round = 0;
     loop {
-        let before = {
+        let (before, loglik) = {
             let evidence = evidence(data, situation, vec![data.measured_residual()], None);
             let fitted = fit(&evidence, folds, &[])?;
             let amplitudes = amplitudes(&fitted, folds, &[], 0).ok_or(CloseError::Singular)?;
-            evidence.residuals(folds, &[], &amplitudes)
+            let loglik = fitted.fits.out_of_fold(&[]).map(|o| o.total_loglik());
+            (evidence.residuals(folds, &[], &amplitudes), loglik)
         };
         let added = data.mark_outliers(&before.axes);
         round += 1;
         if round >= SETTLING_ROUNDS && (added == 0 || round > 3 * SETTLING_ROUNDS) {
-            return Ok(before);
+            let loglik = loglik.filter(|_| added == 0);
+            return Ok(Settled { before, loglik });
         }
         if data.free_attitude {
             data.turn_frames(&before.modelled);
@@ -339,7 +348,7 @@ struct Finish<'a> {
     level: &'a StarEvidence<'a>,
     found: &'a Found,
     wander: Option<&'a Wander>,
-    before: &'a Residuals,
+    settled: &'a Settled,
     image: Option<(&'a ImageLevel, &'a Formed)>,
 }
 
@@ -395,7 +404,7 @@ impl Finish<'_> {
 fn finish(f: &Finish<'_>) -> Result<Closed, CloseError> {
     let chosen = &f.found.selection.chosen;
     let plain = f.residuals(chosen)?;
-    let whole = f.power(f.before);
+    let whole = f.power(&f.settled.before);
     let mut explained = Vec::new();
     let mut last = f.power(&f.residuals(&[])?);
     for k in 1..=chosen.len() {
@@ -519,8 +528,13 @@ fn finish(f: &Finish<'_>) -> Result<Closed, CloseError> {
     let attitude_rms = |series: &[Vec<f64>; 3], outlier: &[bool]| {
         std::array::from_fn(|a| figures::rms(&series[a], outlier).unwrap_or(f64::NAN))
     };
-    let before_fit = fit(f.measured, f.folds, &[])?;
-    let before_loglik = before_fit.fits.out_of_fold(&[]).map(|o| o.total_loglik());
+    let before_loglik = match f.settled.loglik {
+        Some(known) => Some(known),
+        None => {
+            let fitted = fit(f.measured, f.folds, &[])?;
+            fitted.fits.out_of_fold(&[]).map(|o| o.total_loglik())
+        }
+    };
     let set = columns_of(&f.found.fitted.groups, &added);
     let after_loglik = f
         .found
@@ -540,7 +554,7 @@ fn finish(f: &Finish<'_>) -> Result<Closed, CloseError> {
         },
         before: f.errors(
             f.situation.model,
-            f.before,
+            &f.settled.before,
             before_loglik,
             attitude
                 .as_ref()
@@ -560,7 +574,7 @@ fn finish(f: &Finish<'_>) -> Result<Closed, CloseError> {
         unattributed,
     };
     let [ax, ay]: [Vec<f64>; 2] = after.axes.try_into().unwrap_or_default();
-    let [bx, by]: [Vec<f64>; 2] = f.before.axes.clone().try_into().unwrap_or_default();
+    let [bx, by]: [Vec<f64>; 2] = f.settled.before.axes.clone().try_into().unwrap_or_default();
     let fold_of_frame = f.folds.column();
     let frames = &f.data.frames;
     let fold = (0..frames.frames())
@@ -650,7 +664,7 @@ fn attitude_residuals(f: &Finish<'_>, after: &Residuals) -> Option<AttitudeResid
             })
             .collect()
     };
-    let (shift_before, shift_after) = (shift(f.before), shift(after));
+    let (shift_before, shift_after) = (shift(&f.settled.before), shift(after));
     let fold = f.folds.column();
     let own: BTreeMap<u64, usize> = table
         .t_s

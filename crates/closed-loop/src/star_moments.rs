@@ -16,29 +16,26 @@
 //!
 //! Source: the partitioned normal equations of bundle adjustment (Brown 1958).
 
+mod sums;
 #[cfg(test)]
 mod tests;
 
 use std::ops::Range;
+use std::sync::{Arc, OnceLock};
 
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use rayon::prelude::*;
 
+use self::sums::Sums;
 use crate::bins::Bins;
 use crate::common_noise::{CommonNoise, Filter, Rotations};
 use crate::folds::Folds;
-use crate::frame_rotation::rotation_row;
-use crate::gram::BlockGrams;
-use crate::star_columns::{Filled, Layout, StarColumns};
+use crate::gram::{BlockGrams, Gram, add_products};
+use crate::star_columns::StarColumns;
 
-/// Frames whose columns are filled at once: enough for the matrix product to
-/// dominate, few enough to stay in cache.
-const CHUNK_FRAMES: usize = 32;
 /// About as many bins as the rotations are averaged over at most.
 pub(crate) const MOST_BINS: usize = 1200;
 
-/// Two stars give four numbers for three angles; one gives none to spare.
-const SOLVING: usize = 2;
 /// A pivot below this share of its diagonal is rounding.
 const SINGULAR: f64 = 1e-12;
 
@@ -57,7 +54,7 @@ pub(crate) enum Keep<'a> {
 #[derive(Clone, Debug)]
 struct Block {
     /// R; G where no rotation is kept apart.
-    rest: DMatrix<f64>,
+    rest: Arc<DMatrix<f64>>,
     /// Products of the rows of bins without an attitude; they are not in R.
     lost: Option<DMatrix<f64>>,
     /// Scalars of G and of R.
@@ -71,11 +68,16 @@ struct Block {
 
 impl Block {
     /// G of some columns.
-    fn gram(&self, columns: &[usize]) -> DMatrix<f64> {
-        let mut gram = pick(&self.rest, columns);
-        if let Some(lost) = &self.lost {
-            gram += pick(lost, columns);
-        }
+    fn gram(&self, columns: &[usize]) -> Gram {
+        let rest = match &self.lost {
+            Some(lost) => Arc::new(pick(&self.rest, columns) + pick(lost, columns)),
+            None => shared(&self.rest, columns),
+        };
+        Gram::new(1.0, rest, self.whitened(columns))
+    }
+
+    /// Rows whose products are what the rotations take out of G.
+    fn whitened(&self, columns: &[usize]) -> DMatrix<f64> {
         let mut whitened = self.theta.select_columns(columns);
         for (bin, inverse) in self.inverse.iter().enumerate() {
             let root = inverse.and_then(|v| v.cholesky()?.l().try_inverse());
@@ -84,8 +86,12 @@ impl Block {
                 .fixed_rows_mut::<3>(3 * bin)
                 .copy_from(&(root.unwrap_or_else(Matrix3::zeros) * part));
         }
-        gram.gemm(1.0, &whitened.transpose(), &whitened, 1.0);
-        gram
+        whitened
+    }
+
+    /// Scalars of R and of the bins' rotations.
+    fn solved_scalars(&self) -> f64 {
+        self.rest_scalars + 3.0 * self.inverse.iter().flatten().count() as f64
     }
 
     /// The block with every bin's rotation thrown away.
@@ -108,6 +114,11 @@ pub(crate) struct StarMoments {
     t_s: Vec<f64>,
     /// Frames of each bin.
     frames: Vec<usize>,
+    /// Sums over the blocks, once they are asked for: of R, and of the products under white noise.
+    rest: OnceLock<DMatrix<f64>>,
+    rest_by_fold: OnceLock<Arc<Vec<DMatrix<f64>>>>,
+    white: OnceLock<DMatrix<f64>>,
+    fold_of_block: Vec<usize>,
 }
 
 impl StarMoments {
@@ -141,6 +152,10 @@ impl StarMoments {
             blocks,
             t_s,
             frames,
+            rest: OnceLock::new(),
+            rest_by_fold: OnceLock::new(),
+            fold_of_block: folds.fold_of_block.clone(),
+            white: OnceLock::new(),
         }
     }
 
@@ -151,14 +166,64 @@ impl StarMoments {
             .into_iter()
             .map(|b| {
                 debug_assert!(b.inverse.is_empty(), "rotations are in no block");
-                (b.rest, b.scalars)
+                (Gram::whole(b.rest), b.scalars)
             })
             .unzip();
         BlockGrams {
             gram,
             scalars,
             log_scale: 0.0,
+            known: None,
         }
+    }
+
+    /// The sum over the blocks of the products under white noise, of some of the columns.
+    pub(crate) fn white_in_all(&self, columns: &[usize]) -> BlockGrams {
+        let white = self.white.get_or_init(|| {
+            let mut sum = self.rest().clone();
+            let all: Vec<usize> = (0..self.width()).collect();
+            for block in &self.blocks {
+                if let Some(lost) = &block.lost {
+                    sum += lost;
+                }
+                add_products(1.0, &block.whitened(&all), &mut sum);
+            }
+            sum.fill_upper_triangle_with_lower_triangle();
+            sum
+        });
+        BlockGrams {
+            gram: vec![Gram::whole(pick(white, columns))],
+            scalars: vec![self.blocks.iter().map(|b| b.scalars).sum()],
+            log_scale: 0.0,
+            known: None,
+        }
+    }
+
+    /// The sums of R over the blocks of each fold, where all columns are asked for.
+    fn known(&self, columns: &[usize]) -> Option<Arc<Vec<DMatrix<f64>>>> {
+        is_all(columns, self.width()).then(|| self.rest_by_fold().clone())
+    }
+
+    fn rest_by_fold(&self) -> &Arc<Vec<DMatrix<f64>>> {
+        self.rest_by_fold.get_or_init(|| {
+            let width = self.width();
+            let folds = 0..self.fold_of_block.iter().map(|f| f + 1).max().unwrap_or(0);
+            let of = |f| {
+                let own = self.blocks.iter().zip(&self.fold_of_block);
+                let own = own.filter(|(_, of)| **of == f);
+                own.fold(DMatrix::zeros(width, width), |sum, (b, _)| sum + &*b.rest)
+            };
+            Arc::new(folds.into_par_iter().map(of).collect())
+        })
+    }
+
+    /// The sum over the blocks of R.
+    fn rest(&self) -> &DMatrix<f64> {
+        self.rest.get_or_init(|| {
+            let width = self.width();
+            let parts = self.rest_by_fold().iter();
+            parts.fold(DMatrix::zeros(width, width), |sum, part| sum + part)
+        })
     }
 
     /// The products of some of the columns under white noise.
@@ -167,6 +232,9 @@ impl StarMoments {
             gram: self.blocks.par_iter().map(|b| b.gram(columns)).collect(),
             scalars: self.blocks.iter().map(|b| b.scalars).collect(),
             log_scale: 0.0,
+            known: self
+                .known(columns)
+                .filter(|_| self.blocks.iter().all(|b| b.lost.is_none())),
         }
     }
 
@@ -177,6 +245,41 @@ impl StarMoments {
 
     /// The products of `columns` under `noise`: of scalars of unit variance.
     pub(crate) fn under(&self, columns: &[usize], noise: &CommonNoise) -> BlockGrams {
+        let weight = noise.centroid.powi(-2);
+        let (log_scale, innovations) = self.innovations(columns, noise);
+        let gram = self
+            .blocks
+            .par_iter()
+            .zip(innovations)
+            .map(|(k, e)| Gram::new(weight, shared(&k.rest, columns), e))
+            .collect();
+        BlockGrams {
+            gram,
+            scalars: self.blocks.iter().map(Block::solved_scalars).collect(),
+            log_scale,
+            known: self.known(columns),
+        }
+    }
+
+    /// The sum over the blocks of [`under`](Self::under).
+    pub(crate) fn under_in_all(&self, columns: &[usize], noise: &CommonNoise) -> BlockGrams {
+        let weight = noise.centroid.powi(-2);
+        let (log_scale, innovations) = self.innovations(columns, noise);
+        let mut gram = pick(self.rest(), columns) * weight;
+        for e in innovations {
+            gram.gemm(1.0, &e.transpose(), &e, 1.0);
+        }
+        BlockGrams {
+            gram: vec![Gram::whole(gram)],
+            scalars: vec![self.blocks.iter().map(Block::solved_scalars).sum()],
+            log_scale,
+            known: None,
+        }
+    }
+
+    /// Whitened innovations of the rotations, block by block, and what the log-likelihood of scalars
+    /// under `noise` lacks.
+    fn innovations(&self, columns: &[usize], noise: &CommonNoise) -> (f64, Vec<DMatrix<f64>>) {
         let inverse: Vec<Option<Matrix3<f64>>> = self
             .blocks
             .iter()
@@ -184,33 +287,16 @@ impl StarMoments {
             .collect();
         let filter = Filter::new(noise, &self.t_s, &self.frames, &inverse);
         let mut log_scale = filter.log_scale;
-        let weight = noise.centroid.powi(-2);
         let mut first = 0;
-        let mut jobs = Vec::with_capacity(self.blocks.len());
+        let mut out = Vec::with_capacity(self.blocks.len());
         let mut state = vec![Vector3::zeros(); columns.len()];
         for k in &self.blocks {
             let steps = first..first + k.inverse.len();
             first = steps.end;
             log_scale -= k.rest_scalars * noise.centroid.ln();
-            jobs.push((k, filter.innovations(steps, &k.theta, columns, &mut state)));
+            out.push(filter.innovations(steps, &k.theta, columns, &mut state));
         }
-        let gram = jobs
-            .into_par_iter()
-            .map(|(k, e)| {
-                let mut gram = pick(&k.rest, columns) * weight;
-                gram.gemm(1.0, &e.transpose(), &e, 1.0);
-                gram
-            })
-            .collect();
-        let scalars = self.blocks.iter().map(|k| {
-            let solved = k.inverse.iter().flatten().count();
-            k.rest_scalars + 3.0 * solved as f64
-        });
-        BlockGrams {
-            gram,
-            scalars: scalars.collect(),
-            log_scale,
-        }
+        (log_scale, out)
     }
 
     /// Rotations of the last of `columns` less `beta` times the others; `freedom` is
@@ -226,11 +312,11 @@ impl StarMoments {
             columns.len(),
             beta.iter().map(|b| -b).chain(std::iter::once(1.0)),
         );
-        let (mut sse, mut rest) = (0.0, 0.0);
+        let sse = left.dot(&(pick(self.rest(), columns) * &left));
+        let mut rest = 0.0;
         let mut mean: [Vec<f64>; 3] = std::array::from_fn(|_| Vec::with_capacity(self.t_s.len()));
         let mut count = mean.clone();
         for kept in &self.blocks {
-            sse += left.dot(&(pick(&kept.rest, columns) * &left));
             rest += kept.rest_scalars;
             let mut theta = kept.theta.column(residual).into_owned();
             for (&column, b) in fitted.iter().zip(beta.iter()) {
@@ -264,219 +350,16 @@ fn pick(matrix: &DMatrix<f64>, columns: &[usize]) -> DMatrix<f64> {
     })
 }
 
-/// Columns of a product that are formed at once: a product of columns with themselves
-/// needs only what lies below the diagonal.
-const PANEL: usize = 64;
-
-/// Sums of one block; columns stand in the order of [`Layout::places`].
-struct Sums {
-    layout: Layout,
-    /// D^T D.
-    shared: DMatrix<f64>,
-    /// [D^T X; D^T Y].
-    cross: DMatrix<f64>,
-    /// X^T X + Y^T Y, below the diagonal.
-    own: DMatrix<f64>,
-    /// Products of T with all columns.
-    turn: DMatrix<f64>,
-    scalars: usize,
-    /// M and N of each bin.
-    bins: Option<(DMatrix<f64>, Vec<Matrix3<f64>>)>,
-    /// Products of the rows of bins that have no attitude, and how many scalars.
-    lost: Option<(DMatrix<f64>, usize)>,
+fn is_all(columns: &[usize], width: usize) -> bool {
+    columns.len() == width && columns.iter().enumerate().all(|(i, &c)| i == c)
 }
 
-/// Scratch of the inner loop.
-#[derive(Default)]
-struct Scratch {
-    filled: Filled,
-    jacobian: Vec<[[f64; 3]; 2]>,
-    /// N of each frame.
-    normal: Vec<Matrix3<f64>>,
-    /// Columns of X or Y that are not all zero.
-    active: Vec<usize>,
-}
-
-impl Sums {
-    fn over(
-        columns: &StarColumns<'_>,
-        frames: Range<usize>,
-        bins: Option<&[Range<usize>]>,
-    ) -> Self {
-        let layout = columns.layout();
-        let (shared, own, turn) = (layout.shared, layout.own.len(), layout.turn.len());
-        let width = layout.width();
-        let mut sums = Self {
-            shared: DMatrix::zeros(shared, shared),
-            cross: DMatrix::zeros(2 * shared, own),
-            own: DMatrix::zeros(own, own),
-            turn: DMatrix::zeros(turn, width),
-            scalars: 0,
-            bins: bins.map(|b| {
-                (
-                    DMatrix::zeros(3 * b.len(), width),
-                    vec![Matrix3::zeros(); b.len()],
-                )
-            }),
-            lost: None,
-            layout,
-        };
-        let used = |frame: usize| {
-            let rows = columns.data.frames.rows_of(frame);
-            rows.filter(|&r| !columns.data.outlier[r]).count()
-        };
-        let without: Vec<bool> = bins.map_or_else(Vec::new, |ranges| {
-            let stars = |r: &Range<usize>| r.clone().map(used).sum::<usize>();
-            ranges.iter().map(|r| stars(r) < SOLVING).collect()
-        });
-        let mut scratch = Scratch::default();
-        let mut at = frames.start;
-        let mut bin = 0;
-        while at < frames.end {
-            let chunk = at..(at + CHUNK_FRAMES).min(frames.end);
-            at = chunk.end;
-            columns.fill(chunk.clone(), &sums.layout, &mut scratch.filled);
-            sums.scalars += 2 * columns.weigh(chunk.clone(), &mut scratch.filled);
-            sums.add_rows(&mut scratch);
-            if bins.is_none() && turn == 0 {
-                continue;
-            }
-            let moments = moments(columns, chunk.clone(), &sums.layout, &mut scratch);
-            if turn > 0 {
-                let turned = scratch.filled.turn.transpose();
-                sums.turn.gemm(1.0, &turned, &moments, 1.0);
-            }
-            let Some(ranges) = bins else { continue };
-            for (k, frame) in chunk.enumerate() {
-                while ranges[bin].end <= frame {
-                    bin += 1;
-                }
-                if without[bin] {
-                    sums.lose(columns, frame, k, &scratch);
-                } else if let Some((kept, normals)) = &mut sums.bins {
-                    let mut kept = kept.fixed_rows_mut::<3>(3 * bin);
-                    kept += moments.fixed_rows::<3>(3 * k);
-                    normals[bin] += scratch.normal[k];
-                }
-            }
-        }
-        sums
-    }
-
-    /// Adds the products of D, X and Y.
-    fn add_rows(&mut self, scratch: &mut Scratch) {
-        let Scratch { filled, active, .. } = scratch;
-        let shared = filled.shared.transpose();
-        self.shared.gemm(1.0, &shared, &filled.shared, 1.0);
-        for (axis, own) in filled.own.iter().enumerate() {
-            let is_active = |c: &usize| own.column(*c).iter().any(|v| v.to_bits() << 1 != 0);
-            active.clear();
-            active.extend((0..own.ncols()).filter(is_active));
-            let gathered;
-            let own = if active.len() == own.ncols() {
-                own
-            } else {
-                gathered = own.select_columns(active.iter());
-                &gathered
-            };
-            let cross = &shared * own;
-            let first = axis * shared.nrows();
-            for (from, &to) in active.iter().enumerate() {
-                let mut into = self.cross.view_mut((first, to), (shared.nrows(), 1));
-                into += cross.column(from);
-            }
-            let transposed = own.transpose();
-            for start in (0..active.len()).step_by(PANEL) {
-                let panel = PANEL.min(active.len() - start);
-                let below = active.len() - start;
-                let product = transposed.rows(start, below) * own.columns(start, panel);
-                for (j, &to) in active[start..start + panel].iter().enumerate() {
-                    let mut into = self.own.column_mut(to);
-                    for (from, &row) in product.column(j).iter().zip(&active[start..]) {
-                        into[row] += from;
-                    }
-                }
-            }
-        }
-    }
-
-    /// Puts the rows of frame `k` of the chunk among those of no rotation.
-    fn lose(&mut self, columns: &StarColumns<'_>, frame: usize, k: usize, scratch: &Scratch) {
-        let data = columns.data;
-        let width = self.layout.width();
-        let (lost, scalars) = self
-            .lost
-            .get_or_insert_with(|| (DMatrix::zeros(width, width), 0));
-        let (shared, own) = (self.layout.shared, self.layout.own.len());
-        let filled = &scratch.filled;
-        let first = data.frames.first_row[frame - k];
-        for row in data.frames.rows_of(frame).filter(|&r| !data.outlier[r]) {
-            let jacobian = weighed_rotation(columns, row);
-            let i = row - first;
-            for axis in 0..2 {
-                let mut line = DVector::zeros(width);
-                line.rows_mut(axis * shared, shared)
-                    .tr_copy_from(&filled.shared.row(i));
-                line.rows_mut(2 * shared, own)
-                    .tr_copy_from(&filled.own[axis].row(i));
-                let turned = filled.turn.fixed_rows::<3>(3 * k);
-                for (j, t) in turned.column_iter().enumerate() {
-                    line[2 * shared + own + j] = Vector3::from(jacobian[axis]).dot(&t);
-                }
-                lost.ger(1.0, &line, &line, 1.0);
-            }
-            *scalars += 2;
-        }
-    }
-
-    /// The products in the order of [`Layout::places`].
-    fn product(&self) -> DMatrix<f64> {
-        let (shared, own, width) = (
-            self.layout.shared,
-            self.layout.own.len(),
-            self.layout.width(),
-        );
-        let mut out = DMatrix::zeros(width, width);
-        for axis in 0..2 {
-            let at = axis * shared;
-            out.view_mut((at, at), (shared, shared))
-                .copy_from(&self.shared);
-        }
-        out.view_mut((2 * shared, 2 * shared), (own, own))
-            .copy_from(&self.own);
-        out.view_mut((2 * shared, 0), (own, 2 * shared))
-            .copy_from(&self.cross.transpose());
-        out.view_mut((2 * shared + own, 0), (self.layout.turn.len(), width))
-            .copy_from(&self.turn);
-        out.fill_upper_triangle_with_lower_triangle();
-        out
-    }
-
-    fn block(self) -> Block {
-        let mut rest = self.product();
-        let mut scalars = self.scalars;
-        if let Some((lost, count)) = &self.lost {
-            rest -= lost;
-            scalars -= count;
-        }
-        let places = self.layout.places();
-        let mut order = vec![0; places.len()];
-        for (from, to) in places.into_iter().enumerate() {
-            order[to] = from;
-        }
-        let width = order.len();
-        let mut block = Block {
-            rest: pick(&rest, &order),
-            lost: self.lost.map(|(lost, _)| pick(&lost, &order)),
-            scalars: self.scalars as f64,
-            rest_scalars: scalars as f64,
-            theta: DMatrix::zeros(0, width),
-            inverse: Vec::new(),
-        };
-        if let Some((moments, normals)) = self.bins {
-            block.keep_apart(moments.select_columns(&order), &normals);
-        }
-        block
+/// As [`pick`], without a copy where that is all.
+fn shared(matrix: &Arc<DMatrix<f64>>, columns: &[usize]) -> Arc<DMatrix<f64>> {
+    if is_all(columns, matrix.ncols()) {
+        matrix.clone()
+    } else {
+        Arc::new(pick(matrix, columns))
     }
 }
 
@@ -505,83 +388,9 @@ impl Block {
                 self.inverse.push(None);
             }
         }
-        self.rest.gemm(-1.0, &whitened.transpose(), &whitened, 1.0);
+        let rest = Arc::make_mut(&mut self.rest);
+        add_products(-1.0, &whitened, rest);
+        rest.fill_upper_triangle_with_lower_triangle();
         self.theta = moments;
     }
-}
-
-/// Rotation columns of a row, times its weight.
-fn weighed_rotation(columns: &StarColumns<'_>, row: usize) -> [[f64; 3]; 2] {
-    let weight = columns.weight_of(row);
-    if weight > 0.0 {
-        rotation_row(columns.data, row).map(|axis| axis.map(|a| weight * a))
-    } else {
-        [[0.0; 3]; 2]
-    }
-}
-
-/// A^T c of every frame and column, three rows a frame, and N of every frame.
-fn moments(
-    columns: &StarColumns<'_>,
-    frames: Range<usize>,
-    layout: &Layout,
-    scratch: &mut Scratch,
-) -> DMatrix<f64> {
-    let data = columns.data;
-    let first = data.frames.first_row[frames.start];
-    let last = data.frames.first_row[frames.end];
-    let Scratch {
-        filled,
-        jacobian,
-        normal,
-        ..
-    } = scratch;
-    jacobian.clear();
-    jacobian.extend((first..last).map(|row| weighed_rotation(columns, row)));
-    let of_frame: Vec<Range<usize>> = frames
-        .map(|k| {
-            let rows = data.frames.rows_of(k);
-            rows.start - first..rows.end - first
-        })
-        .collect();
-    normal.clear();
-    normal.extend(of_frame.iter().map(|rows| {
-        let axes = jacobian[rows.clone()].iter().flatten();
-        axes.fold(Matrix3::zeros(), |sum, a| {
-            let a = Vector3::from(*a);
-            sum + a * a.transpose()
-        })
-    }));
-    let (shared, own) = (layout.shared, layout.own.len());
-    let mut out = DMatrix::zeros(3 * of_frame.len(), layout.width());
-    let add = |out: &mut DMatrix<f64>, column: usize, axis: usize, values: &[f64]| {
-        for (k, rows) in of_frame.iter().enumerate() {
-            let mut sum = [0.0; 3];
-            for (j, v) in jacobian[rows.clone()].iter().zip(&values[rows.clone()]) {
-                for i in 0..3 {
-                    sum[i] += j[axis][i] * v;
-                }
-            }
-            for i in 0..3 {
-                out[(3 * k + i, column)] += sum[i];
-            }
-        }
-    };
-    let n = filled.shared.nrows();
-    for axis in 0..2 {
-        for k in 0..shared {
-            let values = &filled.shared.as_slice()[k * n..(k + 1) * n];
-            add(&mut out, axis * shared + k, axis, values);
-        }
-        for k in 0..own {
-            let values = &filled.own[axis].as_slice()[k * n..(k + 1) * n];
-            add(&mut out, 2 * shared + k, axis, values);
-        }
-    }
-    for (k, normal) in normal.iter().enumerate() {
-        let turned = normal * filled.turn.fixed_rows::<3>(3 * k);
-        out.view_mut((3 * k, 2 * shared + own), turned.shape())
-            .copy_from(&turned);
-    }
-    out
 }

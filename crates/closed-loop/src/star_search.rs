@@ -304,7 +304,7 @@ impl Trial<'_> {
 
     /// Noise of what is left once white evidence has fitted all of `columns`.
     fn taken_out(&self, columns: &[usize]) -> Option<CommonNoise> {
-        let grams = self.moments.white_of(columns);
+        let grams = self.moments.white_in_all(columns);
         let layout = self.layout(columns);
         let fits = Fits::whole(&grams, &layout, self.variance)?;
         let all: Vec<usize> = (0..layout.candidates).collect();
@@ -316,10 +316,13 @@ impl Trial<'_> {
     /// `chosen` at the better of two starts: all that fits taken out, or `noise`.
     fn score(&self, chosen: &[usize], noise: &CommonNoise) -> Option<Scored> {
         let columns = self.columns(chosen);
-        let (noise, rotations, loglik) = [self.taken_out(&columns), Some(*noise)]
+        let (out, given) = rayon::join(
+            || self.climb(&columns, &self.taken_out(&columns)?),
+            || self.climb(&columns, noise),
+        );
+        let (noise, rotations, loglik) = [out, given]
             .into_iter()
             .flatten()
-            .filter_map(|start| self.climb(&columns, &start))
             .max_by(|a, b| a.2.total_cmp(&b.2))?;
         let layout = self.layout(&columns);
         let grams = self.moments.under(&columns, &noise);
@@ -364,7 +367,7 @@ impl Trial<'_> {
         let all: Vec<usize> = (0..layout.candidates).collect();
         let mut noise = *start;
         for round in 0..=ALTERNATIONS {
-            let grams = self.moments.under(columns, &noise);
+            let grams = self.moments.under_in_all(columns, &noise);
             let fits = Fits::whole(&grams, &layout, 1.0)?;
             let solution = fits.solution(&all)?;
             let rotations = self.moments.rotations(columns, &solution, solution.len())?;

@@ -15,6 +15,7 @@ use telemetry::report::{
 };
 use telemetry::{Bundle, Model, ModelKind};
 
+use rayon::prelude::*;
 use spectra::Psd;
 
 use crate::ensemble::ensemble;
@@ -105,19 +106,20 @@ pub fn compare(
     let mut notes = first_notes(&residual);
     let models: Vec<&Model> = std::iter::once(model).chain(others).collect();
     let mut flights = vec![];
-    let mut first = vec![];
     for model in &models {
-        let flight = Flight::new(
+        flights.push(Flight::new(
             model,
             bundle,
             &truth,
             &residual.t_s,
             settings.seed,
             &mut notes,
-        )?;
-        first.push(flight.draw(0)?);
-        flights.push(flight);
+        )?);
     }
+    let first: Vec<[Vec<f64>; 3]> = flights
+        .par_iter()
+        .map(|flight| flight.draw(0))
+        .collect::<Result<_, _>>()?;
     let lost: Vec<bool> = (0..residual.t_s.len())
         .map(|k| first.iter().any(|theta| missing(theta, k)))
         .collect();
@@ -160,6 +162,7 @@ pub fn compare(
         let draws = |whole: bool| {
             ensemble(&plans, settings.draws, |draw| {
                 let mut theta = match whole {
+                    true if draw == 0 => first.clone(),
                     true => flight.draw(draw)?,
                     false => flight.processes_alone(draw)?,
                 };

@@ -135,10 +135,15 @@ impl Candidate for SmearCandidate {
         check_columns(1, rows.len(), out.x.len());
         let mut path = Path::new(camera, rows);
         let squared = self.about_s * self.about_s;
+        // the turns of the rows of one frame
+        let mut turns = [None; GAUSS_LEGENDRE_8.len()];
         for i in 0..rows.len() {
+            if i == 0 || rows.t_s[i].to_bits() != rows.t_s[i - 1].to_bits() {
+                turns = GAUSS_LEGENDRE_8.map(|(node, _)| path.turn(i, 0.5 * self.about_s * node));
+            }
             let mut mean = [0.0; 2];
-            for (node, weight) in GAUSS_LEGENDRE_8 {
-                let [dx, dy] = path.shift(i, 0.5 * self.about_s * node);
+            for ((node, weight), turn) in GAUSS_LEGENDRE_8.into_iter().zip(&turns) {
+                let [dx, dy] = path.shift_by(i, 0.5 * self.about_s * node, turn.as_ref());
                 mean[0] += 0.5 * weight * dx;
                 mean[1] += 0.5 * weight * dy;
             }

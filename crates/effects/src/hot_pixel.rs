@@ -137,10 +137,16 @@ impl Shift for HotPixel {
     fn coefficients(&self) -> Vec<Coefficient> {
         vec![Coefficient::new("strength", "", 0.03)]
     }
+    fn reaches(&self, at: Pixel) -> bool {
+        (self.at.x - at.x).abs() <= self.half_width_px
+            && (self.at.y - at.y).abs() <= self.half_width_px
+    }
     fn terms(&self, star: &StarView, out: &mut [[f64; 2]]) {
-        let [dx, dy] = [self.at.x - star.at.x, self.at.y - star.at.y];
-        let inside = dx.abs() <= self.half_width_px && dy.abs() <= self.half_width_px;
-        out[0] = if inside { [dx, dy] } else { [0.0; 2] };
+        out[0] = if self.reaches(star.at) {
+            [self.at.x - star.at.x, self.at.y - star.at.y]
+        } else {
+            [0.0; 2]
+        };
     }
     fn parameters(&self, values: &[f64]) -> Vec<Parameter> {
         vec![

@@ -7,7 +7,7 @@
 //!
 //! Source: the frames of `focal_plane` (`v_tracker = q v_inertial`).
 
-use focal_plane::{AttitudeSource, Camera, Pixel};
+use focal_plane::{AttitudeSource, Camera};
 use nalgebra::UnitQuaternion;
 
 use crate::StarRows;
@@ -30,6 +30,7 @@ pub(crate) struct Path<'a> {
     rows: &'a StarRows<'a>,
     /// The attitude of the last row's time: rows of one frame share it.
     last: Option<(u64, UnitQuaternion<f64>)>,
+    hint: usize,
 }
 
 impl<'a> Path<'a> {
@@ -38,31 +39,45 @@ impl<'a> Path<'a> {
             camera,
             rows,
             last: None,
+            hint: 0,
         }
     }
 
     /// Shift of row `i` between its time and `d_s` later, px.
     pub(crate) fn shift(&mut self, i: usize, d_s: f64) -> [f64; 2] {
+        let turn = self.turn(i, d_s);
+        self.shift_by(i, d_s, turn.as_ref())
+    }
+
+    /// How the tracker turns between the time of row `i` and `d_s` later: the same for all rows of a
+    /// frame. `None` without an attitude to follow.
+    pub(crate) fn turn(&mut self, i: usize, d_s: f64) -> Option<UnitQuaternion<f64>> {
+        let (t_s, attitude) = (self.rows.t_s[i], self.rows.attitude?);
+        let now = match self.last {
+            Some((bits, q)) if bits == t_s.to_bits() => q,
+            _ => attitude.attitude_near(t_s, &mut self.hint)?,
+        };
+        self.last = Some((t_s.to_bits(), now));
+        let later = attitude.attitude_near(t_s + d_s, &mut self.hint)?;
+        Some(later * now.inverse())
+    }
+
+    /// Shift of row `i` by a [`turn`](Self::turn), px.
+    pub(crate) fn shift_by(
+        &self,
+        i: usize,
+        d_s: f64,
+        turn: Option<&UnitQuaternion<f64>>,
+    ) -> [f64; 2] {
         let at = self.rows.at(i);
-        match self.seen(i, d_s) {
+        let later = turn.and_then(|q| self.camera.project(&(q * self.camera.direction(at))));
+        match later {
             Some(later) => [later.x - at.x, later.y - at.y],
             None => [
                 d_s * (self.rows.vx_px_s[i] + 0.5 * d_s * self.rows.ax_px_s2[i]),
                 d_s * (self.rows.vy_px_s[i] + 0.5 * d_s * self.rows.ay_px_s2[i]),
             ],
         }
-    }
-
-    fn seen(&mut self, i: usize, d_s: f64) -> Option<Pixel> {
-        let (t_s, attitude) = (self.rows.t_s[i], self.rows.attitude?);
-        let now = match self.last {
-            Some((bits, q)) if bits == t_s.to_bits() => q,
-            _ => attitude.attitude(t_s)?,
-        };
-        self.last = Some((t_s.to_bits(), now));
-        let later = attitude.attitude(t_s + d_s)?;
-        let v = self.camera.direction(self.rows.at(i));
-        self.camera.project(&(later * (now.inverse() * v)))
     }
 }
 

@@ -128,6 +128,11 @@ struct Phase {
     orders: Vec<u32>,
 }
 
+/// Sine and cosine of a sum of two angles.
+fn turned((sin, cos): (f64, f64), (by_sin, by_cos): (f64, f64)) -> (f64, f64) {
+    (sin * by_cos + cos * by_sin, cos * by_cos - sin * by_sin)
+}
+
 impl Shift for Phase {
     fn id(&self) -> &'static str {
         ID
@@ -156,9 +161,17 @@ impl Shift for Phase {
             self.camera.phase_rad(star.at.x),
             self.camera.phase_rad(star.at.y),
         );
+        // each order is one turn from the one before
+        let [first_x, first_y] = [phi_x, phi_y].map(f64::sin_cos);
+        let (mut x, mut y, mut at) = (first_x, first_y, 1);
         for (terms, &k) in out.chunks_exact_mut(4).zip(&self.orders) {
-            let (sin_x, cos_x) = (f64::from(k) * phi_x).sin_cos();
-            let (sin_y, cos_y) = (f64::from(k) * phi_y).sin_cos();
+            if k < at {
+                (x, y, at) = (first_x, first_y, 1);
+            }
+            while at < k {
+                (x, y, at) = (turned(x, first_x), turned(y, first_y), at + 1);
+            }
+            let ((sin_x, cos_x), (sin_y, cos_y)) = (x, y);
             terms[0] = [sin_x / scale_x, 0.0];
             terms[1] = [cos_x / scale_x, 0.0];
             terms[2] = [0.0, sin_y / scale_y];

@@ -37,6 +37,11 @@ pub(crate) trait Shift: Clone + Debug + Send + Sync + 'static {
     }
     /// Coefficients in the order of the terms.
     fn coefficients(&self) -> Vec<Coefficient>;
+    /// Whether it acts on a star there at all.
+    fn reaches(&self, at: Pixel) -> bool {
+        let _ = at;
+        true
+    }
     /// Shift per unit of each coefficient, px.
     fn terms(&self, star: &StarView, out: &mut [[f64; 2]]);
     /// Reported parameters of these values.
@@ -139,7 +144,12 @@ impl<S: Shift> Candidate for ShiftCandidate<S> {
         let (n, p) = (rows.len(), self.coefficients.len());
         check_columns(p, n, out.x.len());
         let mut terms = [[0.0; 2]; MAX_TERMS];
+        out.x.fill(0.0);
+        out.y.fill(0.0);
         for i in 0..n {
+            if !self.shift.reaches(rows.at(i)) {
+                continue;
+            }
             self.shift.terms(&rows.view(i), &mut terms[..p]);
             for (j, term) in terms[..p].iter().enumerate() {
                 out.x[j * n + i] = term[0];

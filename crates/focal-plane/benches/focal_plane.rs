@@ -106,6 +106,24 @@ fn attitudes(c: &mut Criterion) {
                 .sum::<f64>()
         });
     });
+    // fourteen rows of a frame, each at its own instant
+    let rows: Vec<f64> = (0..4096)
+        .map(|i| 1.1 * f64::from(i / 14) + 1e-3 * f64::from((i * 5) % 14 - 7))
+        .filter(|t| *t >= 0.0)
+        .collect();
+    group.bench_function("attitude_of_rows", |b| {
+        let each = rows.iter().filter_map(|&t| series.attitude(t));
+        b.iter(|| each.clone().map(|q| q.w).sum::<f64>());
+    });
+    group.bench_function("attitude_near_of_rows", |b| {
+        b.iter(|| {
+            let mut hint = 0;
+            rows.iter()
+                .filter_map(|&t| series.attitude_near(t, &mut hint))
+                .map(|q| q.w)
+                .sum::<f64>()
+        });
+    });
     group.bench_function("rotation_vector", |b| {
         let q = series.quaternions();
         b.iter(|| {

@@ -43,6 +43,13 @@ pub trait AttitudeSource: Send + Sync {
     /// First and last time with an attitude, s.
     fn span_s(&self) -> [f64; 2];
 
+    /// [`attitude`](Self::attitude) for times that follow one another closely: `hint` is where the last
+    /// one was found, and any value is right. The same answer, without a search.
+    fn attitude_near(&self, t_s: f64, hint: &mut usize) -> Option<UnitQuaternion<f64>> {
+        let _ = hint;
+        self.attitude(t_s)
+    }
+
     /// [`attitude`](Self::attitude) for many times, all four components NaN where it gives `None`.
     ///
     /// # Panics
@@ -63,6 +70,9 @@ impl<S: AttitudeSource + ?Sized> AttitudeSource for &S {
     fn span_s(&self) -> [f64; 2] {
         (**self).span_s()
     }
+    fn attitude_near(&self, t_s: f64, hint: &mut usize) -> Option<UnitQuaternion<f64>> {
+        (**self).attitude_near(t_s, hint)
+    }
     fn attitude_into(&self, t_s: &[f64], out: QuaternionsMut<'_>) {
         (**self).attitude_into(t_s, out);
     }
@@ -77,6 +87,9 @@ impl<S: AttitudeSource + ?Sized> AttitudeSource for Box<S> {
     }
     fn span_s(&self) -> [f64; 2] {
         (**self).span_s()
+    }
+    fn attitude_near(&self, t_s: f64, hint: &mut usize) -> Option<UnitQuaternion<f64>> {
+        (**self).attitude_near(t_s, hint)
     }
     fn attitude_into(&self, t_s: &[f64], out: QuaternionsMut<'_>) {
         (**self).attitude_into(t_s, out);

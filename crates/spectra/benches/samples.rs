@@ -83,13 +83,16 @@ fn lomb_scargle(c: &mut Criterion) {
         floating_mean: true,
         fs_hz: 1.0,
     };
-    let plan = LombScargle::new(&t_s, settings).expect("plan");
+    let plan = LombScargle::new(&t_s, settings.clone()).expect("plan");
     let (mut scratch, mut psd) = (plan.make_scratch(), vec![0.0; bins]);
     let mut group = c.benchmark_group("lomb_scargle");
     // samples times bins
     group.throughput(Throughput::Elements(u64::from(samples) * bins as u64));
     group.bench_function("1024_bins", |b| {
         b.iter(|| plan.process_into(black_box(&x), &mut scratch, &mut psd));
+    });
+    group.bench_function("plan_of_1024_bins", |b| {
+        b.iter(|| LombScargle::new(black_box(&t_s), settings.clone()));
     });
     group.finish();
 }

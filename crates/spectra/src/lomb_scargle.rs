@@ -272,31 +272,55 @@ impl Phasors {
         ]
     }
 
+    /// Sums over the samples of a few numbers made of cosine and sine, each in eight parts that fill a
+    /// vector register.
+    fn sums<const N: usize>(&self, of: impl Fn(f64, f64) -> [f64; N]) -> [f64; N] {
+        const LANES: usize = 8;
+        let mut parts = [[0.0; LANES]; N];
+        let (cos, sin) = (self.cos.chunks_exact(LANES), self.sin.chunks_exact(LANES));
+        let rest = cos.remainder().iter().zip(sin.remainder());
+        for (c, s) in cos.zip(sin) {
+            for l in 0..LANES {
+                let values = of(c[l], s[l]);
+                for n in 0..N {
+                    parts[n][l] += values[n];
+                }
+            }
+        }
+        for (c, s) in rest {
+            let values = of(*c, *s);
+            for n in 0..N {
+                parts[n][0] += values[n];
+            }
+        }
+        parts.map(|part| part.iter().sum())
+    }
+
     /// The averages of the present frequency.
     fn bin(&self, floating_mean: bool) -> Bin {
         let count = self.cos.len() as f64;
-        let mean = |f: &dyn Fn(f64, f64) -> f64| -> f64 {
-            let pairs = self.cos.iter().zip(&self.sin);
-            pairs.map(|(c, s)| f(*c, *s)).sum::<f64>() / count
-        };
-        let [mean_cos, mean_sin] = if floating_mean {
-            [mean(&|c, _| c), mean(&|_, s| s)]
-        } else {
-            [0.0; 2]
-        };
-        let cc = mean(&|c, _| c * c) - mean_cos * mean_cos;
-        let ss = mean(&|_, s| s * s) - mean_sin * mean_sin;
-        let cs = mean(&|c, s| c * s) - mean_cos * mean_sin;
+        let means = self.sums(|c, s| [c, s, c * c, s * s, c * s]);
+        let [c, s, cc, ss, cs] = means.map(|sum| sum / count);
+        let [mean_cos, mean_sin] = if floating_mean { [c, s] } else { [0.0; 2] };
+        let cc = cc - mean_cos * mean_cos;
+        let ss = ss - mean_sin * mean_sin;
+        let cs = cs - mean_cos * mean_sin;
         let (sin_tau, cos_tau) = (0.5 * (2.0 * cs).atan2(cc - ss)).sin_cos();
         // summed at this phase, where the smaller of the two keeps its digits
-        let along = mean(&|c, s| ((c - mean_cos) * cos_tau + (s - mean_sin) * sin_tau).powi(2));
-        let across = mean(&|c, s| ((s - mean_sin) * cos_tau - (c - mean_cos) * sin_tau).powi(2));
-        let inverse = |v: f64| if v > NOTHING { 1.0 / v } else { 0.0 };
+        let squares = self.sums(|c, s| {
+            let (c, s) = (c - mean_cos, s - mean_sin);
+            let (along, across) = (c * cos_tau + s * sin_tau, s * cos_tau - c * sin_tau);
+            [along * along, across * across]
+        });
+        let inverse = |sum: f64| {
+            let v = sum / count;
+            if v > NOTHING { 1.0 / v } else { 0.0 }
+        };
         Bin {
             cos_tau,
             sin_tau,
-            inverse_cc: inverse(along),
-            inverse_ss: inverse(across),
+            inverse_cc: inverse(squares[0]),
+            inverse_ss: inverse(squares[1]),
         }
     }
 }

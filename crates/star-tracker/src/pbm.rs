@@ -330,10 +330,11 @@ impl Pbm {
 
     /// Step 1 where rows are exposed at their own instants or over a time.
     fn ideal_row_by_row(&self, truth: &dyn AttitudeSource, rows: Rows<'_>, scratch: &mut Scratch) {
+        let mut hint = 0;
         for k in 0..rows.frames() {
             for row in rows.of(k) {
                 let star = rows.view(k, row, Pixel::default());
-                let at = self.exposed(truth, star, rows.direction(row));
+                let at = self.exposed(truth, star, rows.direction(row), &mut hint);
                 let Pixel { x, y } = at.unwrap_or(Pixel {
                     x: f64::NAN,
                     y: f64::NAN,
@@ -350,20 +351,28 @@ impl Pbm {
         truth: &dyn AttitudeSource,
         mut star: StarView,
         u: Vector3<f64>,
+        hint: &mut usize,
     ) -> Option<Pixel> {
         let u = self.apparent(&star, u);
         let mut t_s = self.instant_s(&star);
+        let mut last_s = f64::INFINITY;
         for _ in 0..INSTANT_STEPS {
-            star.at = self.seen_at(truth, t_s, &star, &u)?;
-            let next_s = self.instant_s(&star);
-            let moved_s = (next_s - t_s).abs();
-            t_s = next_s;
-            if moved_s <= INSTANT_TOLERANCE_S {
+            star.at = self.seen_at(truth, t_s, &star, &u, hint)?;
+            let step_s = self.instant_s(&star) - t_s;
+            // steps shrink by one factor: their sum (Aitken 1926)
+            let shrinks = step_s / last_s;
+            t_s += if shrinks.abs() < 0.5 {
+                step_s / (1.0 - shrinks)
+            } else {
+                step_s
+            };
+            last_s = step_s;
+            if step_s.abs() <= INSTANT_TOLERANCE_S {
                 break;
             }
         }
         if self.exposure_s <= 0.0 {
-            return self.seen_at(truth, t_s, &star, &u);
+            return Some(star.at);
         }
         let half_s = 0.5 * self.exposure_s;
         let [first_s, last_s] = truth.span_s();
@@ -372,7 +381,7 @@ impl Pbm {
         }
         let mut mean = Pixel::default();
         for (node, weight) in GAUSS_LEGENDRE_8 {
-            let at = self.seen_at(truth, t_s + half_s * node, &star, &u)?;
+            let at = self.seen_at(truth, t_s + half_s * node, &star, &u, hint)?;
             mean.x += 0.5 * weight * at.x;
             mean.y += 0.5 * weight * at.y;
         }
@@ -385,8 +394,9 @@ impl Pbm {
         t_s: f64,
         star: &StarView,
         u: &Vector3<f64>,
+        hint: &mut usize,
     ) -> Option<Pixel> {
-        let q = self.misaligned(t_s, truth.attitude(t_s)?);
+        let q = self.misaligned(t_s, truth.attitude_near(t_s, hint)?);
         self.camera.project(&self.in_tracker(star, q * u))
     }
 

@@ -31,6 +31,8 @@ const MOST: usize = 4 * SIDE_WITH_RATES;
 const FEWEST: usize = 2;
 /// Samples nearer than this many steps hold the frame's own error.
 const NEAR: f64 = 0.9;
+/// No frame.
+const NOWHERE: usize = usize::MAX;
 
 /// The motion around a list of times.
 #[derive(Clone, Debug)]
@@ -62,14 +64,24 @@ impl Around {
         }
     }
 
-    fn piece(&self, t_s: f64) -> Option<(&Piece, f64)> {
+    /// The frame nearest to a time, looked for around `hint` first.
+    fn nearest(&self, t_s: f64, hint: usize) -> Option<usize> {
+        let distance = |k: usize| self.t_s.get(k).map_or(f64::INFINITY, |t| (t - t_s).abs());
+        let before = |k: usize| k.checked_sub(1).map_or(f64::INFINITY, distance);
+        let here = distance(hint);
+        if here < before(hint) && here <= distance(hint.saturating_add(1)) {
+            return Some(hint);
+        }
         let after = self.t_s.partition_point(|&t| t < t_s);
-        let distance = |k: usize| (self.t_s[k] - t_s).abs();
-        let nearest = (after.saturating_sub(1)..=after)
+        (after.saturating_sub(1)..=after)
             .filter(|&k| k < self.t_s.len())
-            .min_by(|&a, &b| distance(a).total_cmp(&distance(b)))?;
-        let s = t_s - self.t_s[nearest];
-        let piece = self.pieces[nearest].as_ref()?;
+            .min_by(|&a, &b| distance(a).total_cmp(&distance(b)))
+    }
+
+    fn piece(&self, t_s: f64, hint: &mut usize) -> Option<(&Piece, f64)> {
+        *hint = self.nearest(t_s, *hint)?;
+        let s = t_s - self.t_s[*hint];
+        let piece = self.pieces[*hint].as_ref()?;
         (s.abs() <= self.reach_s).then_some((piece, s))
     }
 }
@@ -143,15 +155,22 @@ impl Piece {
         })
     }
 
-    /// The polynomial and its slope.
-    fn at(&self, s: f64) -> [Vector3<f64>; 2] {
+    fn value(&self, s: f64) -> Vector3<f64> {
+        let mut value = Vector3::zeros();
+        for j in (0..self.count).rev() {
+            value = value * (s - self.nodes[j]) + self.newton[j];
+        }
+        value
+    }
+
+    fn slope(&self, s: f64) -> Vector3<f64> {
         let (mut value, mut slope) = (Vector3::zeros(), Vector3::zeros());
         for j in (0..self.count).rev() {
             let d = s - self.nodes[j];
             slope = slope * d + value;
             value = value * d + self.newton[j];
         }
-        [value, slope]
+        slope
     }
 }
 
@@ -163,15 +182,21 @@ fn unrolled(phi: &Vector3<f64>, v: &Vector3<f64>) -> Vector3<f64> {
 
 impl AttitudeSource for Around {
     fn attitude(&self, t_s: f64) -> Option<UnitQuaternion<f64>> {
-        let (piece, s) = self.piece(t_s)?;
-        Some(rotation_from_vector(&piece.at(s)[0]) * piece.q)
+        let mut nowhere = NOWHERE;
+        self.attitude_near(t_s, &mut nowhere)
+    }
+
+    fn attitude_near(&self, t_s: f64, hint: &mut usize) -> Option<UnitQuaternion<f64>> {
+        let (piece, s) = self.piece(t_s, hint)?;
+        Some(rotation_from_vector(&piece.value(s)) * piece.q)
     }
 
     /// To first order in the rotation from the frame's attitude.
     fn rate_rad_s(&self, t_s: f64) -> Option<Vector3<f64>> {
-        let (piece, s) = self.piece(t_s)?;
+        let mut nowhere = NOWHERE;
+        let (piece, s) = self.piece(t_s, &mut nowhere)?;
         // v' = -omega x v for vectors seen from the tracker
-        Some(-piece.at(s)[1])
+        Some(-piece.slope(s))
     }
 
     fn span_s(&self) -> [f64; 2] {

@@ -108,7 +108,7 @@ pub(super) fn judge(
         }
         free = observable(&rows, moving);
         let full = climb(&model, &rows, free)?;
-        rows = make(&|row: &Row| model.belief(&full.at, row));
+        rows = make(&model.belief(&full.at));
         model = Model::new(&rows, declared);
     }
     let stars = rows.iter().map(|r| r.star + 1).max()?;
@@ -220,11 +220,13 @@ impl Bench<'_> {
         }
         let without = self.without(full, k);
         let value = full.at[k];
-        let blocks = self.model.covariance(full, &self.rows, |r| r.block);
-        let stars = self.model.covariance(full, &self.rows, |r| r.star);
-        let cells = self
-            .model
-            .covariance(full, &self.rows, |r| r.block * self.stars + r.star);
+        let [blocks, stars, cells] = self.model.covariance(
+            full,
+            &self.rows,
+            [&|r| r.block, &|r| r.star, &|r| {
+                r.block * self.stars + r.star
+            }],
+        );
         let variance = |c: &Option<(super::variance::Matrix, usize)>| {
             c.as_ref().map_or(0.0, |(m, _)| m[(k, k)])
         };
@@ -241,11 +243,10 @@ impl Bench<'_> {
         p = p.max(wald(
             beyond,
             variance(&blocks),
-            blocks.map_or(0, |c| c.1),
+            blocks.as_ref().map_or(0, |c| c.1),
             1,
         ));
-        let mut sigma2 =
-            variance(&self.model.covariance(full, &self.rows, |r| r.block)).max(variance(&cells));
+        let mut sigma2 = variance(&blocks).max(variance(&cells));
         if k == MAGNITUDE {
             p = p.max(wald(
                 beyond,
@@ -285,8 +286,9 @@ impl Bench<'_> {
     /// Spikes, every star at its own level.
     fn spikes(&self, full: &Fit) -> Judged {
         let mut squares = vec![Vec::new(); self.stars];
+        let belief = self.model.belief(&full.at);
         for row in self.rows.iter().filter(|r| !r.marked) {
-            let [v, _] = self.model.belief(&full.at, row);
+            let [v, _] = belief(row);
             squares[row.star].push(row.square / v);
         }
         let level: Vec<f64> = squares
@@ -323,14 +325,14 @@ impl Bench<'_> {
         let gain = self.gain(&rows, &with, &without);
         let share = sigmoid(with.at[SHARE]);
         let size = (0.5 * with.at[SIZE]).exp();
+        let covariances = self.model.covariance(
+            &with,
+            &rows,
+            [&|r| r.block, &|r| r.block * self.stars + r.star],
+        );
         let sigma = |k: usize| -> f64 {
-            let of =
-                |c: Option<(super::variance::Matrix, usize)>| c.map_or(0.0, |(m, _)| m[(k, k)]);
-            of(self.model.covariance(&with, &rows, |r| r.block))
-                .max(of(self
-                    .model
-                    .covariance(&with, &rows, |r| r.block * self.stars + r.star)))
-                .sqrt()
+            let of = covariances.iter().flatten().map(|(m, _)| m[(k, k)]);
+            of.fold(0.0, f64::max).sqrt()
         };
         let enough = share * rows.len() as f64 >= MIN_SPIKES
             && with.loglik > self.model.loglik_of_tails(&with.at, &rows) + BEYOND_TAILS;

@@ -23,6 +23,7 @@ use nalgebra::{Cholesky, SMatrix, SVector};
 use rayon::prelude::*;
 
 use super::rows::Row;
+use crate::coloured::LogProduct;
 
 /// Parameters: level a, magnitude b, rate w, share rho (logit), size S^2 (log).
 pub(super) const PARAMETERS: usize = 5;
@@ -87,92 +88,69 @@ impl Model {
         at
     }
 
-    /// Variance of a row, and of it what grows with the level.
-    fn variance(at: &Vector, row: &Row) -> [f64; 2] {
-        let own = row.declared * (at[LEVEL] + PER_MAG * at[MAGNITUDE] * row.mag).exp();
-        [own + at[RATE] * row.rate, own]
+    /// The model at a point.
+    fn there(&self, at: &Vector) -> There {
+        let share = sigmoid(at[SHARE]);
+        let [declared, s0] = self.declared.unwrap_or([0.0, 0.0]);
+        There {
+            at: *at,
+            share: [1.0 - share - declared, share, declared],
+            more: [0.0, at[SIZE].exp(), s0],
+        }
     }
 
     /// Variance of a row, and the probability that it holds no spike.
-    pub(super) fn belief(&self, at: &Vector, row: &Row) -> [f64; 2] {
-        let [v, _] = Self::variance(at, row);
-        let (_, posterior) = self.components(at, row, v);
-        [v, posterior[0]]
-    }
-
-    /// ln of the density, and the weight of each component.
-    fn components(&self, at: &Vector, row: &Row, v: f64) -> (f64, [f64; 3]) {
-        let rho = sigmoid(at[SHARE]);
-        let [rho0, s0] = self.declared.unwrap_or([0.0, 0.0]);
-        let part = |share: f64, v: f64| {
-            if share > 0.0 {
-                share.ln() - 0.5 * row.square / v - v.ln()
-            } else {
-                f64::NEG_INFINITY
-            }
-        };
-        let parts = [
-            part(1.0 - rho - rho0, v),
-            part(rho, v + at[SIZE].exp()),
-            part(rho0, v + s0),
-        ];
-        let most = parts.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        let weights = parts.map(|p| (p - most).exp());
-        let sum: f64 = weights.iter().sum();
-        (most + sum.ln(), weights.map(|w| w / sum))
-    }
-
-    /// ln of the density of a row, and its slope.
-    fn row(&self, at: &Vector, row: &Row) -> (f64, Vector) {
-        let [v, own] = Self::variance(at, row);
-        let (value, posterior) = self.components(at, row, v);
-        let size = at[SIZE].exp();
-        let s0 = self.declared.map_or(0.0, |d| d[1]);
-        let slope = |k: usize, v: f64| posterior[k] * (0.5 * row.square / v - 1.0) / v;
-        let spike = slope(1, v + size);
-        let all = slope(0, v) + spike + slope(2, v + s0);
-        let rho = sigmoid(at[SHARE]);
-        let rest = (1.0 - rho - self.declared.map_or(0.0, |d| d[0])).max(NO_SHARE);
-        let share = posterior[1] * (1.0 - rho) - posterior[0] * rho * (1.0 - rho) / rest;
-        let gradient = Vector::from([
-            all * own,
-            all * own * PER_MAG * row.mag,
-            all * row.rate,
-            share,
-            spike * size,
-        ]);
-        (value, gradient)
+    pub(super) fn belief(&self, at: &Vector) -> impl Fn(&Row) -> [f64; 2] + use<> {
+        let there = self.there(at);
+        move |row| {
+            let v = there.own(row) + there.at[RATE] * row.rate;
+            [v, there.density(row.square, v).posterior[0]]
+        }
     }
 
     /// Log-likelihood of the rows that `of` keeps.
     pub(super) fn loglik(&self, at: &Vector, rows: &[Row], of: impl Fn(&Row) -> bool) -> f64 {
-        rows.iter()
-            .filter(|r| of(r))
-            .map(|r| {
-                let [v, _] = Self::variance(at, r);
-                self.components(at, r, v).0
-            })
-            .sum()
+        let there = self.there(at);
+        let mut levels = Levels::default();
+        let (mut sum, mut product) = (0.0, LogProduct::default());
+        for row in rows.iter().filter(|r| of(r)) {
+            let v = levels.own(&there, row) + at[RATE] * row.rate;
+            let density = there.density(row.square, v);
+            sum += density.exponent;
+            product.times(density.factor);
+        }
+        sum + product.ln()
     }
 
     /// Log-likelihood of noise with tails instead of spikes: Student's t in two dimensions,
     /// `-(nu/2 + 1) ln(1 + q/(nu v)) - ln v`, at the best of a grid of freedoms and levels.
     pub(super) fn loglik_of_tails(&self, at: &Vector, rows: &[Row]) -> f64 {
-        let mut best = f64::NEG_INFINITY;
-        for freedom in [2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 14.0, 20.0, 40.0] {
-            for level in 0..16 {
-                let level = 0.5 + 0.04 * f64::from(level);
-                let total: f64 = rows
-                    .iter()
-                    .map(|row| {
-                        let v = level * Self::variance(at, row)[0];
-                        -(0.5 * freedom + 1.0) * (row.square / (freedom * v)).ln_1p() - v.ln()
-                    })
-                    .sum();
-                best = best.max(total);
-            }
-        }
-        best
+        let there = self.there(at);
+        let mut levels = Levels::default();
+        let mut variances = LogProduct::default();
+        let ratio: Vec<f64> = rows
+            .iter()
+            .map(|row| {
+                let v = levels.own(&there, row) + at[RATE] * row.rate;
+                variances.times(v);
+                row.square / v
+            })
+            .collect();
+        let grid: Vec<[f64; 2]> = [2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 14.0, 20.0, 40.0]
+            .into_iter()
+            .flat_map(|freedom| (0..16).map(move |k| [freedom, 0.5 + 0.04 * f64::from(k)]))
+            .collect();
+        let of = |&[freedom, level]: &[f64; 2]| {
+            let scale = 1.0 / (freedom * level);
+            let mut product = LogProduct::default();
+            ratio.iter().for_each(|q| product.times(1.0 + q * scale));
+            -(0.5 * freedom + 1.0) * product.ln() - rows.len() as f64 * level.ln()
+        };
+        let best = grid
+            .par_iter()
+            .map(of)
+            .reduce(|| f64::NEG_INFINITY, f64::max);
+        best - variances.ln()
     }
 
     /// Climbs from `start` along the `free` parameters, over the rows that `of` keeps.
@@ -234,18 +212,22 @@ impl Model {
         rows: &[Row],
         of: &(dyn Fn(&Row) -> bool + Sync),
     ) -> (f64, Vector, Matrix) {
+        let there = self.there(at);
         // pieces of fixed length, added in order: the same for any number of threads
         let pieces: Vec<_> = rows
             .par_chunks(4096)
             .map(|chunk| {
-                let (mut value, mut gradient, mut outer) = (0.0, Vector::zeros(), Matrix::zeros());
+                let mut levels = Levels::default();
+                let (mut value, mut product) = (0.0, LogProduct::default());
+                let (mut gradient, mut outer) = (Vector::zeros(), Matrix::zeros());
                 for row in chunk.iter().filter(|r| of(r)) {
-                    let (l, g) = self.row(at, row);
-                    value += l;
+                    let (density, g) = there.row(row, levels.own(&there, row));
+                    value += density.exponent;
+                    product.times(density.factor);
                     gradient += g;
                     outer += g * g.transpose();
                 }
-                (value, gradient, outer)
+                (value + product.ln(), gradient, outer)
             })
             .collect();
         pieces.into_iter().fold(
@@ -276,28 +258,62 @@ impl Model {
         Vector::from_fn(|k, _| at[k].clamp(bounds[k][0], bounds[k][1]))
     }
 
-    /// Covariance of the free parameters, clusters numbered by `cluster`. Parameters
-    /// that are not free, or stand at a bound, have none.
-    pub(super) fn covariance(
+    /// Covariance of the free parameters and the number of clusters, for clusters numbered by each of
+    /// `clusters`. Parameters that are not free, or stand at a bound, have none.
+    pub(super) fn covariance<const N: usize>(
         &self,
         fit: &Fit,
         rows: &[Row],
-        cluster: impl Fn(&Row) -> usize,
-    ) -> Option<(Matrix, usize)> {
+        clusters: [&dyn Fn(&Row) -> usize; N],
+    ) -> [Option<(Matrix, usize)>; N] {
         let bounds = self.bounds();
         let inside: Vec<usize> = (0..PARAMETERS)
             .filter(|&k| fit.free[k] && fit.at[k] > bounds[k][0] && fit.at[k] < bounds[k][1])
             .collect();
-        let p = inside.len();
-        let count = rows.iter().map(|r| cluster(r) + 1).max().unwrap_or(0);
-        let mut score = vec![Vector::zeros(); count];
-        let mut seen = vec![false; count];
-        for row in rows {
-            score[cluster(row)] += self.row(&fit.at, row).1;
-            seen[cluster(row)] = true;
-        }
+        let Some(inverse) = self.inverse_hessian(fit, rows, &inside) else {
+            return [const { None }; N];
+        };
+        let there = self.there(&fit.at);
+        let mut levels = Levels::default();
+        let scores: Vec<Vector> = rows
+            .iter()
+            .map(|row| there.row(row, levels.own(&there, row)).1)
+            .collect();
+        clusters.map(|cluster| {
+            let p = inside.len();
+            let count = rows.iter().map(|r| cluster(r) + 1).max().unwrap_or(0);
+            let mut score = vec![Vector::zeros(); count];
+            let mut seen = vec![false; count];
+            for (row, own) in rows.iter().zip(&scores) {
+                score[cluster(row)] += own;
+                seen[cluster(row)] = true;
+            }
+            let clusters = seen.iter().filter(|s| **s).count();
+            let mut middle = nalgebra::DMatrix::zeros(p, p);
+            for s in &score {
+                let s = nalgebra::DVector::from_fn(p, |i, _| s[inside[i]]);
+                middle += &s * s.transpose();
+            }
+            let widened = clusters as f64 / (clusters.max(2) - 1) as f64;
+            let small = &inverse * middle * &inverse * widened;
+            let mut out = Matrix::zeros();
+            for i in 0..p {
+                for j in 0..p {
+                    out[(inside[i], inside[j])] = small[(i, j)];
+                }
+            }
+            Some((out, clusters))
+        })
+    }
+
+    fn inverse_hessian(
+        &self,
+        fit: &Fit,
+        rows: &[Row],
+        inside: &[usize],
+    ) -> Option<nalgebra::DMatrix<f64>> {
         let everywhere: &(dyn Fn(&Row) -> bool + Sync) = &|_| true;
-        let mut hessian = nalgebra::DMatrix::zeros(p, p);
+        let mut hessian = nalgebra::DMatrix::zeros(inside.len(), inside.len());
         for (j, &k) in inside.iter().enumerate() {
             let h = 1e-4 * fit.at[k].abs().max(if k == RATE { 0.0 } else { 1.0 });
             let along = |side: f64| {
@@ -311,30 +327,16 @@ impl Model {
             }
         }
         let hessian = 0.5 * (&hessian + hessian.transpose());
-        let inverse = Cholesky::new(hessian)?.inverse();
-        let clusters = seen.iter().filter(|s| **s).count();
-        let mut middle = nalgebra::DMatrix::zeros(p, p);
-        for s in &score {
-            let s = nalgebra::DVector::from_fn(p, |i, _| s[inside[i]]);
-            middle += &s * s.transpose();
-        }
-        let widened = clusters as f64 / (clusters.max(2) - 1) as f64;
-        let small = &inverse * middle * &inverse * widened;
-        let mut out = Matrix::zeros();
-        for i in 0..p {
-            for j in 0..p {
-                out[(inside[i], inside[j])] = small[(i, j)];
-            }
-        }
-        Some((out, clusters))
+        Some(Cholesky::new(hessian)?.inverse())
     }
 
     /// How much wider than chi-squared twice the log-likelihood runs: the variance
     /// of `q/2v`, 1 for Gaussian noise, over the rows that hold no spike.
     pub(super) fn widening(&self, at: &Vector, rows: &[Row]) -> f64 {
         let (mut sum, mut weight) = (0.0, 0.0);
+        let belief = self.belief(at);
         for row in rows {
-            let [v, sound] = self.belief(at, row);
+            let [v, sound] = belief(row);
             if sound > 0.5 {
                 sum += (0.5 * row.square / v - 1.0).powi(2);
                 weight += 1.0;
@@ -345,6 +347,103 @@ impl Model {
         } else {
             1.0
         }
+    }
+}
+
+/// The model at a point: what all rows share.
+struct There {
+    at: Vector,
+    /// Shares of rows without a spike, with one, and with a declared one.
+    share: [f64; 3],
+    /// What a spike adds to the variance.
+    more: [f64; 3],
+}
+
+/// The density of a row, `e^exponent factor`, and the probability of each component.
+struct Density {
+    exponent: f64,
+    factor: f64,
+    posterior: [f64; 3],
+}
+
+impl There {
+    /// What grows with the level of a row's variance.
+    fn own(&self, row: &Row) -> f64 {
+        row.declared * self.growth(row.mag)
+    }
+
+    fn growth(&self, mag: f64) -> f64 {
+        (self.at[LEVEL] + PER_MAG * self.at[MAGNITUDE] * mag).exp()
+    }
+
+    /// The density where `v` is the variance without a spike.
+    fn density(&self, square: f64, v: f64) -> Density {
+        let half = 0.5 * square;
+        let most = (1..3)
+            .filter(|&k| self.share[k] > 0.0)
+            .fold(0.0_f64, |most, k| most.max(self.more[k]));
+        // relative to the widest component, which no square makes impossible
+        let exponent = -half / (v + most);
+        let parts: [f64; 3] = std::array::from_fn(|k| {
+            if self.share[k] <= 0.0 {
+                return 0.0;
+            }
+            let inverse = 1.0 / (v + self.more[k]);
+            let relative = if self.more[k] < most {
+                (-half * inverse - exponent).exp()
+            } else {
+                1.0
+            };
+            self.share[k] * inverse * relative
+        });
+        let factor: f64 = parts.iter().sum();
+        Density {
+            exponent,
+            factor,
+            posterior: parts.map(|p| p / factor),
+        }
+    }
+
+    /// The density of a row, and the slope of its logarithm; `own` is what grows with the level of its
+    /// variance.
+    fn row(&self, row: &Row, own: f64) -> (Density, Vector) {
+        let v = own + self.at[RATE] * row.rate;
+        let density = self.density(row.square, v);
+        let posterior = &density.posterior;
+        let slope = |k: usize| {
+            let v = v + self.more[k];
+            posterior[k] * (0.5 * row.square / v - 1.0) / v
+        };
+        let spike = slope(1);
+        let all = slope(0) + spike + slope(2);
+        let rho = self.share[1];
+        let rest = self.share[0].max(NO_SHARE);
+        let share = posterior[1] * (1.0 - rho) - posterior[0] * rho * (1.0 - rho) / rest;
+        let gradient = Vector::from([
+            all * own,
+            all * own * PER_MAG * row.mag,
+            all * row.rate,
+            share,
+            spike * self.more[1],
+        ]);
+        (density, gradient)
+    }
+}
+
+/// Levels of the stars: each has one magnitude, and one exponential serves its rows.
+#[derive(Default)]
+struct Levels(Vec<[f64; 2]>);
+
+impl Levels {
+    fn own(&mut self, there: &There, row: &Row) -> f64 {
+        if self.0.len() <= row.star {
+            self.0.resize(row.star + 1, [f64::NAN; 2]);
+        }
+        let known = &mut self.0[row.star];
+        if known[0].to_bits() != row.mag.to_bits() {
+            *known = [row.mag, there.growth(row.mag)];
+        }
+        row.declared * known[1]
     }
 }
 

@@ -8,7 +8,9 @@ use telemetry::Model;
 use super::*;
 use crate::coloured::Coloured;
 use crate::empirical::{Empirical, Variable};
+use crate::frame_rotation::rotation_row;
 use crate::nuisance::StarNuisance;
+use crate::star_columns::Filled;
 use crate::star_data::{Inputs, StarData};
 
 /// The camera turns about an axis by a function of time.
@@ -75,10 +77,10 @@ impl Candidate for Turn {
 }
 
 /// Stars that drift, their number changing, one row an outlier; `single`: frames of one star.
-fn data(single: bool) -> StarData {
+fn data(single: bool, number: usize) -> StarData {
     let camera = Camera::from_fov_deg([1024, 1024], [20.0, 20.0]).unwrap();
     let mut frames = StarFrames::new();
-    for k in 0..40_usize {
+    for k in 0..number {
         let t = 0.5 * k as f64 + if k > 25 { 3.0 } else { 0.0 };
         frames.begin(t);
         let stars = if k % 7 == 3 { 4 } else { 5 };
@@ -134,7 +136,7 @@ fn dense(columns: &StarColumns<'_>) -> (DMatrix<f64>, Vec<(usize, Vector3<f64>)>
             for axis in 0..2 {
                 let mut line = vec![0.0; layout.width()];
                 for k in 0..layout.shared {
-                    line[layout.shared_at(k, axis)] = filled.shared[(row, k)];
+                    line[layout.shared_at(k, axis)] = filled.shared[(k, row)];
                 }
                 for (k, &place) in layout.own.iter().enumerate() {
                     line[place] = filled.own[axis][(row, k)];
@@ -155,7 +157,17 @@ fn with_both(
     single: bool,
     check: impl Fn(&StarMoments, &DMatrix<f64>, &[(usize, Vector3<f64>)], &StarData),
 ) {
-    let data = data(single);
+    with_blocks(single, 40, Folds::cut, check);
+}
+
+/// As [`with_both`], of so many frames in the blocks of these folds.
+fn with_blocks(
+    single: bool,
+    frames: usize,
+    folds: impl Fn(usize) -> Folds,
+    check: impl Fn(&StarMoments, &DMatrix<f64>, &[(usize, Vector3<f64>)], &StarData),
+) {
+    let data = data(single, frames);
     let model = Model::parse(
         "format = \"boresight-model/1\"\n[tracker]\npixels = [1024, 1024]\nfov_deg = [20.0, 20.0]\n\
          [noise]\ntemporal_arcsec = 7.0\ndistortion_arcsec = 3.0\ndistortion_order = 2\n",
@@ -190,7 +202,7 @@ fn with_both(
         motion: None,
         weight: &weight,
     };
-    let folds = Folds::cut(data.frames.frames());
+    let folds = folds(data.frames.frames());
     let bins = Bins::cut(&data.frames.t_s, &folds, MOST_BINS);
     let moments = StarMoments::accumulate(&columns(&one), &folds, Keep::Bins(&bins));
     let (c, turns) = dense(&columns(&two));
@@ -208,15 +220,44 @@ fn products_are_those_of_every_row() {
     for single in [false, true] {
         with_both(single, |moments, c, _, _| {
             let all: Vec<usize> = (0..moments.width()).collect();
-            let (sum, scalars) = moments.white_of(&all).sum(|_| true);
+            let (sum, scalars) = moments.white_of(&all).total();
             close(&sum, &(c.transpose() * c));
             assert!((scalars - c.nrows() as f64).abs() < 0.5);
             let some = [1, 4, 0, all.len() - 1];
-            let (sum, _) = moments.white_of(&some).sum(|_| true);
+            let (sum, _) = moments.white_of(&some).total();
             close(
                 &sum,
                 &(c.transpose() * c).select_rows(&some).select_columns(&some),
             );
+        });
+    }
+}
+
+/// A block of many chunks, of which the last is cut short, and more turns than are held at once.
+#[test]
+fn long_blocks_are_no_different() {
+    let noise = CommonNoise {
+        centroid: 4.0,
+        reference: [Coloured {
+            white: 0.5,
+            slow: 1.5,
+            tau_s: 8.0,
+        }; 3],
+    };
+    for folds in [Folds::whole, Folds::cut] {
+        with_blocks(true, 171, folds, |moments, c, _, _| {
+            let all: Vec<usize> = (0..moments.width()).collect();
+            let dense = c.transpose() * c;
+            close(&moments.white_of(&all).total().0, &dense);
+            close(&moments.white_in_all(&all).total().0, &dense);
+            let some = [1, 4, 0, all.len() - 1];
+            for columns in [&all[..], &some] {
+                let blocks = moments.under(columns, &noise);
+                let sum = moments.under_in_all(columns, &noise);
+                close(&sum.total().0, &blocks.total().0);
+                assert!((sum.total().1 - blocks.total().1).abs() < 1e-9);
+                assert!((sum.log_scale - blocks.log_scale).abs() < 1e-9);
+            }
         });
     }
 }
@@ -245,7 +286,7 @@ fn noise_that_frames_share_is_weighed_as_its_covariance_says() {
         let factor = covariance.cholesky().unwrap();
         let all: Vec<usize> = (0..moments.width()).collect();
         let grams = moments.under(&all, &noise);
-        let (sum, scalars) = grams.sum(|_| true);
+        let (sum, scalars) = grams.total();
         close(&sum, &(c.transpose() * factor.solve(c)));
         assert!((scalars - c.nrows() as f64).abs() < 0.5);
         let half = 0.5 * factor.ln_determinant();
@@ -262,7 +303,7 @@ fn noise_that_frames_share_is_weighed_as_its_covariance_says() {
 #[test]
 fn a_free_attitude_leaves_what_no_rotation_explains() {
     for single in [false, true] {
-        let data = data(single);
+        let data = data(single, 40);
         let nuisance = StarNuisance::declared(&Model::default(), &data);
         let residual: [Vec<f64>; 2] =
             std::array::from_fn(|a| data.modelled[a].iter().map(|v| (0.3 * v).sin()).collect());
@@ -277,7 +318,7 @@ fn a_free_attitude_leaves_what_no_rotation_explains() {
         let folds = Folds::cut(data.frames.frames());
         let (sum, scalars) = StarMoments::accumulate(&columns, &folds, Keep::Free)
             .white()
-            .sum(|_| true);
+            .total();
         let (c, turns) = dense(&columns);
         let (mut dense, mut count) = (DMatrix::zeros(c.ncols(), c.ncols()), 0);
         for frame in 0..data.frames.frames() {

@@ -9,8 +9,6 @@ use telemetry::{Bundle, Model};
 /// How the tracker moves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Path {
-    /// At rest.
-    Still,
     /// A slow drift, tens of pixels within the run.
     Drift,
     /// Hardly a pixel within the run.
@@ -37,7 +35,6 @@ impl Path {
             )
         };
         match self {
-            Self::Still => format!("[motion]\nkind = \"hold\"\n{start}\n"),
             Self::Drift => {
                 format!("[motion]\nkind = \"hold\"\n{start}\ndrift_arcsec_s = [6.0, -9.0, 1.0]\n")
             }

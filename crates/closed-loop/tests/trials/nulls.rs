@@ -55,7 +55,7 @@ fn a_wandering_reference_is_an_error_of_its_own() {
 }
 
 /// Attitudes alone: a tracker that drifts changes its stars, and jumps. Without counting them, 14 of
-/// 100 such runs named a step. At rest no star changes, and a step of ten standard errors of the
+/// 100 such runs named a step. Nearly at rest no star changes, and a step of ten standard errors of the
 /// attitude's mean (about 1.2 arcsec a frame, 200 frames a side) is one.
 #[test]
 fn a_change_of_stars_is_no_step() {

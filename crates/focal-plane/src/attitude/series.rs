@@ -300,6 +300,11 @@ impl AttitudeSource for AttitudeSeries {
         [self.t_s[0], self.t_s[self.len() - 1]]
     }
 
+    fn attitude_near(&self, t_s: f64, hint: &mut usize) -> Option<UnitQuaternion<f64>> {
+        *hint = self.find(t_s, *hint)?;
+        self.attitude_after(*hint, t_s)
+    }
+
     fn attitude_into(&self, t_s: &[f64], out: QuaternionsMut<'_>) {
         let mut cursor = self.cursor();
         fill_attitudes(t_s, out, |t| cursor.attitude(t));
@@ -362,15 +367,24 @@ impl Segment {
     }
 }
 
-/// Last entry of ascending `t_s` at or before `t`, given `t_s[0] <= t`: a few steps on from `hint`,
-/// and a search if it is not there.
+/// Last entry of ascending `t_s` at or before `t`, given `t_s[0] <= t`: a few steps on from `hint` or
+/// back, and a search if it is not there.
 pub(crate) fn locate(t_s: &[f64], t: f64, hint: usize) -> usize {
     const STEPS: usize = 8;
-    if t_s.get(hint).is_some_and(|&at| at <= t) {
-        let ahead = &t_s[hint + 1..t_s.len().min(hint + 1 + STEPS)];
-        if let Some(steps) = ahead.iter().position(|&next| t < next) {
-            return hint + steps;
+    match t_s.get(hint) {
+        Some(&at) if at <= t => {
+            let ahead = &t_s[hint + 1..t_s.len().min(hint + 1 + STEPS)];
+            if let Some(steps) = ahead.iter().position(|&next| t < next) {
+                return hint + steps;
+            }
         }
+        Some(_) => {
+            let behind = hint.saturating_sub(STEPS);
+            if let Some(steps) = t_s[behind..hint].iter().rposition(|&at| at <= t) {
+                return behind + steps;
+            }
+        }
+        None => {}
     }
     t_s.partition_point(|&sample| sample <= t) - 1
 }
