@@ -263,6 +263,11 @@ impl Estimate {
         hotelling.max(ChiSquared::new(p).map_or(1.0, |law| law.sf(white)))
     }
 
+    /// Squares that amplitudes `which` take away, over the variance of white noise.
+    pub(crate) fn square(&self, which: &[usize]) -> f64 {
+        self.distance(&self.white, which).unwrap_or(0.0)
+    }
+
     /// Squared distance of amplitudes `which` from zero in the metric of `covariance`.
     fn distance(&self, covariance: &DMatrix<f64>, which: &[usize]) -> Option<f64> {
         let value = DVector::from_fn(which.len(), |i, _| self.value[which[i]]);

@@ -30,7 +30,6 @@ use crate::search::{Fitted, Found, borrowed, fit_grams, polish, search};
 use crate::selection::{
     FAMILY_ALPHA, Group, Judgement, Selection, columns_of, judged, price, ranked,
 };
-use crate::stand_ins::stand_ins;
 use crate::star_evidence::StarEvidence;
 use crate::star_moments::StarMoments;
 
@@ -51,8 +50,6 @@ const SUSPICION: f64 = 0.3;
 const SUSPECT_ALPHA: f64 = 1e-4;
 /// Most effects that are added.
 const MOST: usize = 8;
-/// Searches whose outcome is refused before one is taken as it is.
-const MOST_REFUSALS: usize = 8;
 
 /// The slow error of the reference as it was found.
 #[derive(Clone, Debug)]
@@ -71,50 +68,16 @@ pub(crate) struct Searched<'a> {
     pub(crate) wander: Option<Wander>,
 }
 
-/// Runs the search on `white` evidence. Candidates for which `eligible` is false
-/// are judged but never chosen.
-pub(crate) fn run<'a>(
+/// One search on `white` evidence, and what of its outcome a slow error of the reference may
+/// explain as well. Candidates that may not be chosen are judged.
+pub(crate) fn attempt<'a>(
     white: &StarEvidence<'a>,
     folds: &Folds,
     candidates: &dyn Fn() -> Vec<Box<dyn Candidate>>,
-    eligible: &dyn Fn(&dyn Candidate) -> bool,
-) -> Result<Searched<'a>, CloseError> {
-    let alone = white.data.free_attitude || white.residuals.len() != 1;
-    let start = if alone {
-        None
-    } else {
-        declared_noise(white, folds)?
-    };
-    let mut may: Vec<bool> = candidates().iter().map(|c| eligible(c.as_ref())).collect();
-    for _ in 0..MOST_REFUSALS {
-        let (searched, suspected) = attempt(white, folds, candidates(), &may, start)?;
-        let found = &searched.found;
-        let mut refused: Vec<usize> = found.selection.chosen.clone();
-        refused.retain(|&g| {
-            suspected
-                && found.candidates[g].acts_on_attitude()
-                && found.selection.judged[g].p_value > SUSPECT_ALPHA
-        });
-        refused.extend(stand_ins(found));
-        if refused.is_empty() {
-            return Ok(searched);
-        }
-        for g in refused {
-            may[g] = false;
-        }
-    }
-    Ok(attempt(white, folds, candidates(), &may, start)?.0)
-}
-
-/// One search, and whether a slow error of the reference is suspected that is not
-/// part of what was found.
-fn attempt<'a>(
-    white: &StarEvidence<'a>,
-    folds: &Folds,
-    mut candidates: Vec<Box<dyn Candidate>>,
     may: &[bool],
     start: Option<CommonNoise>,
-) -> Result<(Searched<'a>, bool), CloseError> {
+) -> Result<(Searched<'a>, Vec<usize>), CloseError> {
+    let mut candidates = candidates();
     let (mut suspected, mut begun) = (false, None);
     if let Some(start) = start {
         let Coloured {
@@ -128,7 +91,7 @@ fn attempt<'a>(
                 wander: Some(wander),
                 ..searched
             };
-            return Ok((searched, false));
+            return Ok((searched, Vec::new()));
         }
         suspected = chances(&wander.ratio).iter().any(|p| *p < SUSPICION);
         candidates = searched.found.candidates;
@@ -139,13 +102,20 @@ fn attempt<'a>(
         evidence: None,
         wander: None,
     };
-    Ok((searched, suspected))
+    let found = &searched.found;
+    let mut refused: Vec<usize> = found.selection.chosen.clone();
+    refused.retain(|&g| {
+        suspected
+            && found.candidates[g].acts_on_attitude()
+            && found.selection.judged[g].p_value > SUSPECT_ALPHA
+    });
+    Ok((searched, refused))
 }
 
 /// Noise of the declared model's residual, where it may hold a slow error. How much
 /// of one shows only later: what is fitted here (a distortion under drifting stars)
 /// takes some of it along.
-fn declared_noise(
+pub(crate) fn declared_noise(
     white: &StarEvidence<'_>,
     folds: &Folds,
 ) -> Result<Option<CommonNoise>, CloseError> {

@@ -107,6 +107,7 @@ impl<'a> Sky<'a> {
             motion: Some(flown),
             sigma_guess_arcsec: 1.0,
             noise: None,
+            kept: Vec::new(),
         };
         let folds = Folds::cut(data.frames.frames());
         match &self.noise {
