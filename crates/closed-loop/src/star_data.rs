@@ -222,7 +222,7 @@ impl StarData {
             .iter_mut()
             .map(|own| {
                 own.retain(|f| f.is_finite());
-                spectra::robust::median(own).unwrap_or(f64::NAN)
+                robust::median(own).unwrap_or(f64::NAN)
             })
             .collect();
         self.star.iter().map(|&star| usual[star]).collect()
