@@ -401,7 +401,7 @@ fn finish(
         last = now;
     }
     // what is left is judged before a term without a cause is added
-    let mut unattributed = figures::unattributed(found, &[], last / whole);
+    let mut unattributed = figures::unattributed(found, last / whole);
     let (surroundings, questions) = (situation.surroundings(), situation.questions);
     let mut added = chosen.clone();
     let plain = after;

@@ -8,8 +8,15 @@
 //! ```
 //!
 //! a shift along each axis, a roll and a scale; on an attitude it drives each
-//! axis. Motion drives the field it points along, and a pixel phase its own axis
-//! by its first two harmonics. Such a term predicts; it never explains.
+//! axis. Motion drives the field it points along (and its square both axes), a pixel
+//! phase its own axis by its first six harmonics, the place within the window its own
+//! axis. Two variables together are what neither does alone,
+//!
+//! ```text
+//! P_1(a) times the first columns of b
+//! ```
+//!
+//! Such a term predicts; it never explains.
 //!
 //! Source: ordinary least squares on Legendre polynomials; the fields are the
 //! first-order terms of a similarity transformation of the image.
@@ -19,11 +26,17 @@ use std::collections::BTreeMap;
 use effects::{AttitudeRows, Candidate, Coefficient, Effect, EffectError, StarRows, Surroundings};
 use focal_plane::{Camera, PointsMut, Series, VectorsMut};
 
+use crate::search::LEADING;
+
 /// Id under which empirical terms are listed.
 pub(crate) const EMPIRICAL: &str = "empirical";
 
 /// Orders of the polynomial in a smooth variable.
 const ORDERS: usize = 3;
+/// Harmonics of a pixel phase.
+pub(crate) const HARMONICS: usize = 6;
+/// Columns of a variable that another one may multiply.
+const OF_A_PAIR: usize = 2;
 
 /// A variable that a leftover may follow.
 #[derive(Clone, Debug)]
@@ -39,8 +52,14 @@ pub(crate) enum Variable {
     Acceleration,
     Magnitude,
     Colour,
+    /// Measured flux.
+    Flux,
     /// One constant shift a star.
     Star(Vec<i64>),
+    /// One constant shift a slot.
+    Slot(Vec<i32>),
+    /// Place within the star's window.
+    Window,
     /// A housekeeping channel.
     Housekeeping(String, Series),
 }
@@ -58,59 +77,186 @@ impl Variable {
             Self::Acceleration => "acceleration".into(),
             Self::Magnitude => "mag".into(),
             Self::Colour => "colour".into(),
+            Self::Flux => "flux".into(),
             Self::Star(_) => "star".into(),
+            Self::Slot(_) => "slot".into(),
+            Self::Window => "window".into(),
             Self::Housekeeping(channel, _) => format!("housekeeping:{channel}"),
         }
     }
 }
 
-/// One variable as columns.
+/// Middle and half range of a variable: scale it to -1..1.
+#[derive(Clone, Copy, Debug)]
+struct Scale {
+    middle: f64,
+    half: f64,
+}
+
+impl Scale {
+    fn new(range: [f64; 2]) -> Self {
+        Self {
+            middle: 0.5 * (range[0] + range[1]),
+            half: 0.5 * (range[1] - range[0]),
+        }
+    }
+
+    /// Whether there is anything to scale.
+    fn varies(self) -> bool {
+        self.half > 0.0
+    }
+
+    /// 0 where the value is not known.
+    fn of(self, value: f64) -> f64 {
+        let z = (value - self.middle) / self.half;
+        if z.is_finite() { z } else { 0.0 }
+    }
+}
+
+impl Variable {
+    /// Place among the names, for pairs.
+    fn rank(&self) -> usize {
+        match self {
+            Self::Position(axis) => *axis,
+            Self::Phase(axis) => 2 + axis,
+            Self::Time => 4,
+            Self::Rate => 5,
+            Self::Acceleration => 6,
+            Self::Magnitude => 7,
+            Self::Colour => 8,
+            Self::Flux => 9,
+            Self::Star(_) => 10,
+            Self::Slot(_) => 11,
+            Self::Window => 12,
+            Self::Housekeeping(..) => 13,
+        }
+    }
+
+    /// Its value in a row, where that is one number; NaN where it is unknown.
+    pub(crate) fn value(&self, rows: &StarRows<'_>, i: usize) -> f64 {
+        match self {
+            Self::Position(0) => rows.x_px[i],
+            Self::Position(_) => rows.y_px[i],
+            Self::Time => rows.t_s[i],
+            Self::Magnitude => rows.mag[i],
+            Self::Colour => rows.bv[i],
+            Self::Flux => rows.log_flux[i],
+            Self::Rate => rows.vx_px_s[i].hypot(rows.vy_px_s[i]),
+            Self::Acceleration => rows.ax_px_s2[i].hypot(rows.ay_px_s2[i]),
+            Self::Housekeeping(_, series) => series.at(rows.t_s[i]).unwrap_or(f64::NAN),
+            Self::Phase(_) | Self::Star(_) | Self::Slot(_) | Self::Window => f64::NAN,
+        }
+    }
+}
+
+/// One variable, or two, as columns.
 #[derive(Clone, Debug)]
 pub(crate) struct Empirical {
     variable: Variable,
-    /// Middle and half range of the variable: scales it to -1..1.
-    middle: f64,
-    half: f64,
+    scale: Scale,
+    /// The variable whose first polynomial multiplies all columns.
+    by: Option<(Variable, Scale)>,
     /// Whether it moves stars, or attitudes.
     stars: bool,
     coefficients: Vec<Coefficient>,
 }
 
 impl Empirical {
+    /// Whether a model can declare it: of motion, stars, slots and windows it predicts only
+    /// where it was fitted.
+    pub(crate) fn is_declarable(&self, surroundings: &Surroundings<'_>) -> bool {
+        let one = vec![1.0; self.coefficients.len()];
+        self.realise(&one, surroundings).is_ok()
+    }
+
     /// Columns in `variable`, which runs over `range` in the data.
     pub(crate) fn new(variable: Variable, range: [f64; 2], stars: bool) -> Option<Self> {
-        let half = 0.5 * (range[1] - range[0]);
-        let smooth = !matches!(variable, Variable::Star(_) | Variable::Phase(_));
-        if smooth && (half.is_nan() || half <= 0.0) {
+        let scale = Scale::new(range);
+        let smooth = !matches!(
+            variable,
+            Variable::Star(_) | Variable::Slot(_) | Variable::Phase(_)
+        );
+        if smooth && !scale.varies() {
             return None;
         }
         let count = match &variable {
             Variable::Star(ids) => 2 * ids.len(),
-            Variable::Phase(_) => 4,
-            Variable::Position(_) => 2 * ORDERS,
+            Variable::Slot(slots) => 2 * slots.len(),
+            Variable::Phase(_) => 2 * HARMONICS,
+            Variable::Position(_) | Variable::Window => 2 * ORDERS,
             // A polynomial in time is only good outside its fold if it is straight.
             Variable::Time if stars => 4,
             Variable::Time => 3,
-            Variable::Rate | Variable::Acceleration => 4,
+            Variable::Rate => 8,
+            Variable::Acceleration => 4,
             _ if stars => 4 * orders(&variable),
             _ => 3 * orders(&variable),
         };
-        let coefficients = (0..count)
-            .map(|k| Coefficient::new(format!("c{k}"), "arcsec", f64::INFINITY))
-            .collect();
         Some(Self {
             variable,
+            scale,
+            by: None,
             stars,
-            middle: 0.5 * (range[0] + range[1]),
-            half,
-            coefficients,
+            coefficients: coefficients(count),
         })
     }
 
-    fn scaled(&self, value: f64) -> f64 {
-        let z = (value - self.middle) / self.half;
-        if z.is_finite() { z } else { 0.0 }
+    /// What `of` and `by` do to stars together and neither does alone.
+    pub(crate) fn pair(
+        of: Variable,
+        of_range: [f64; 2],
+        by: Variable,
+        by_range: [f64; 2],
+    ) -> Option<Self> {
+        let mut term = Self::new(of, of_range, true)?;
+        let scale = Scale::new(by_range);
+        if !scale.varies() {
+            return None;
+        }
+        if !term.is_of_many() {
+            term.coefficients.truncate(OF_A_PAIR);
+        }
+        term.by = Some((by, scale));
+        Some(term)
     }
+
+    /// Whether it has a shift for each of many (stars, slots).
+    pub(crate) fn is_of_many(&self) -> bool {
+        matches!(self.variable, Variable::Star(_) | Variable::Slot(_))
+    }
+
+    /// The name in `unattributed.depends_on`.
+    pub(crate) fn name(&self) -> String {
+        let mut both = vec![&self.variable];
+        both.extend(self.by.as_ref().map(|(by, _)| by));
+        both.sort_by_key(|v| v.rank());
+        let names: Vec<String> = both.into_iter().map(Variable::name).collect();
+        names.join("*")
+    }
+
+    /// Parts by which it is judged, beside all of it: a straight line before what bends,
+    /// a single star or slot. Positions among the coefficients.
+    pub(crate) fn parts(&self) -> Vec<Vec<usize>> {
+        let n = self.coefficients.len();
+        let mut parts: Vec<Vec<usize>> = if self.is_of_many() {
+            (0..n).step_by(2).map(|k| vec![k, k + 1]).collect()
+        } else {
+            let leading = LEADING.iter().filter(|l| **l < n);
+            leading.map(|l| (0..*l).collect()).collect()
+        };
+        if matches!(self.variable, Variable::Rate) && self.by.is_none() {
+            // along the motion, bent; its square
+            parts.extend([vec![0, 6], vec![4, 5]]);
+        }
+        parts.push((0..n).collect());
+        parts
+    }
+}
+
+fn coefficients(count: usize) -> Vec<Coefficient> {
+    (0..count)
+        .map(|k| Coefficient::new(format!("c{k}"), "arcsec", f64::INFINITY))
+        .collect()
 }
 
 /// Orders that a variable can tell apart: a switch has two values, and all its polynomials are one.
@@ -141,7 +287,7 @@ impl Candidate for Empirical {
     }
 
     fn selectors(&self) -> BTreeMap<String, String> {
-        BTreeMap::from([("variable".to_owned(), self.variable.name())])
+        BTreeMap::from([("variable".to_owned(), self.name())])
     }
 
     fn coefficients(&self) -> &[Coefficient] {
@@ -153,77 +299,52 @@ impl Candidate for Empirical {
     }
 
     fn acts_on_attitude(&self) -> bool {
-        matches!(self.variable, Variable::Time | Variable::Housekeeping(..))
+        self.by.is_none() && matches!(self.variable, Variable::Time | Variable::Housekeeping(..))
     }
 
     fn star_columns(&self, camera: &Camera, rows: &StarRows<'_>, out: PointsMut<'_>) -> bool {
         let n = rows.len();
-        assert_eq!(
-            out.x.len(),
-            self.coefficients.len() * n,
-            "one block a coefficient"
-        );
+        let count = self.coefficients.len();
+        assert_eq!(out.x.len(), count * n, "one block a coefficient");
         out.x.fill(0.0);
         out.y.fill(0.0);
         let per_arcsec = camera.arcsec_per_px().map(|s| 1.0 / s);
         let half = camera.half_size_px();
-        // of a time, which the rows of a frame share
-        let mut of_frame = [0.0; ORDERS];
         for i in 0..n {
-            if i == 0 || rows.t_s[i].to_bits() != rows.t_s[i - 1].to_bits() {
-                let t_s = rows.t_s[i];
-                of_frame = match &self.variable {
-                    Variable::Time => legendre(self.scaled(t_s)),
-                    Variable::Housekeeping(_, series) => {
-                        legendre(series.at(t_s).map_or(0.0, |v| self.scaled(v)))
-                    }
-                    _ => of_frame,
-                };
-            }
+            let times = self
+                .by
+                .as_ref()
+                .map_or(1.0, |(by, scale)| scale.of(by.value(rows, i)));
             let mut put = |k: usize, dx: f64, dy: f64| {
-                out.x[k * n + i] = dx * per_arcsec[0];
-                out.y[k * n + i] = dy * per_arcsec[1];
-            };
-            let (x, y) = (rows.x_px[i] / half[0], rows.y_px[i] / half[1]);
-            let orders = self.coefficients.len() / 4;
-            let mut fields = |g: [f64; ORDERS]| {
-                for (k, g) in g.into_iter().enumerate().take(orders) {
-                    put(4 * k, g, 0.0);
-                    put(4 * k + 1, 0.0, g);
-                    put(4 * k + 2, -y * g, x * g);
-                    put(4 * k + 3, x * g, y * g);
+                if k < count {
+                    out.x[k * n + i] = times * dx * per_arcsec[0];
+                    out.y[k * n + i] = times * dy * per_arcsec[1];
                 }
             };
+            let (x, y) = (rows.x_px[i] / half[0], rows.y_px[i] / half[1]);
+            let at = [rows.x_px[i], rows.y_px[i]];
             match &self.variable {
-                Variable::Time | Variable::Housekeeping(..) => fields(of_frame),
-                Variable::Magnitude => fields(legendre(self.scaled(rows.mag[i]))),
-                Variable::Colour => fields(legendre(self.scaled(rows.bv[i]))),
                 Variable::Position(axis) => {
-                    let p = if *axis == 0 {
-                        rows.x_px[i]
-                    } else {
-                        rows.y_px[i]
-                    };
-                    for (k, g) in legendre(self.scaled(p)).into_iter().enumerate() {
+                    for (k, g) in legendre(self.scale.of(at[*axis])).into_iter().enumerate() {
                         put(2 * k, g, 0.0);
                         put(2 * k + 1, 0.0, g);
                     }
                 }
                 Variable::Phase(axis) => {
-                    let p = if *axis == 0 {
-                        rows.x_px[i]
-                    } else {
-                        rows.y_px[i]
-                    };
-                    let (sin, cos) = camera.phase_rad(p).sin_cos();
-                    for (k, g) in [sin, cos, 2.0 * sin * cos, 1.0 - 2.0 * sin * sin]
-                        .into_iter()
-                        .enumerate()
-                    {
-                        if *axis == 0 {
-                            put(k, g, 0.0);
-                        } else {
-                            put(k, 0.0, g);
+                    let (sin, cos) = camera.phase_rad(at[*axis]).sin_cos();
+                    let along = [1.0 - *axis as f64, *axis as f64];
+                    let (mut s, mut c) = (sin, cos);
+                    for k in 0..HARMONICS {
+                        put(2 * k, s * along[0], s * along[1]);
+                        put(2 * k + 1, c * along[0], c * along[1]);
+                        (s, c) = (s * cos + c * sin, c * cos - s * sin);
+                    }
+                }
+                Variable::Window => {
+                    for axis in 0..2 {
+                        let off = self.scale.of(at[axis] - rows.window_px[axis][i]);
+                        for (k, g) in legendre(off).into_iter().enumerate() {
+                            put(2 * k + axis, g * (1.0 - axis as f64), g * axis as f64);
                         }
                     }
                 }
@@ -233,16 +354,36 @@ impl Candidate for Empirical {
                     } else {
                         (rows.ax_px_s2[i], rows.ay_px_s2[i])
                     };
-                    let (a, b) = (a / self.half, b / self.half);
+                    let (a, b) = (a / self.scale.half, b / self.scale.half);
+                    let square = a * a + b * b;
                     put(0, a, b);
                     put(1, -b, a);
                     put(2, y * a, y * b);
                     put(3, x * a, x * b);
+                    put(4, square, 0.0);
+                    put(5, 0.0, square);
+                    put(6, square.sqrt() * a, square.sqrt() * b);
+                    put(7, -square.sqrt() * b, square.sqrt() * a);
                 }
                 Variable::Star(ids) => {
                     if let Some(k) = ids.iter().position(|&id| id == rows.star_id[i]) {
                         put(2 * k, 1.0, 0.0);
                         put(2 * k + 1, 0.0, 1.0);
+                    }
+                }
+                Variable::Slot(slots) => {
+                    if let Some(k) = slots.iter().position(|&slot| slot == rows.slot[i]) {
+                        put(2 * k, 1.0, 0.0);
+                        put(2 * k + 1, 0.0, 1.0);
+                    }
+                }
+                smooth => {
+                    let g = legendre(self.scale.of(smooth.value(rows, i)));
+                    for (k, g) in g.into_iter().enumerate().take(count.div_ceil(4)) {
+                        put(4 * k, g, 0.0);
+                        put(4 * k + 1, 0.0, g);
+                        put(4 * k + 2, -y * g, x * g);
+                        put(4 * k + 3, x * g, y * g);
                     }
                 }
             }
@@ -266,9 +407,9 @@ impl Candidate for Empirical {
             axis.fill(0.0);
             for i in 0..n {
                 let z = match &self.variable {
-                    Variable::Time => self.scaled(rows.t_s[i]),
+                    Variable::Time => self.scale.of(rows.t_s[i]),
                     Variable::Housekeeping(_, series) => {
-                        series.at(rows.t_s[i]).map_or(0.0, |v| self.scaled(v))
+                        series.at(rows.t_s[i]).map_or(0.0, |v| self.scale.of(v))
                     }
                     _ => return false,
                 };
@@ -291,11 +432,118 @@ impl Candidate for Empirical {
         surroundings: &Surroundings<'_>,
     ) -> Result<Box<dyn Effect>, EffectError> {
         let parameters = effects::empirical_parameters(
-            &self.variable.name(),
+            &self.name(),
             !self.stars,
-            [self.middle, if self.half > 0.0 { self.half } else { 1.0 }],
+            [
+                self.scale.middle,
+                if self.scale.varies() {
+                    self.scale.half
+                } else {
+                    1.0
+                },
+            ],
+            self.by.as_ref().map(|(_, by)| [by.middle, by.half]),
             values,
         );
         effects::build(EMPIRICAL, &parameters, surroundings)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn camera() -> Camera {
+        let model = telemetry::Model::parse(
+            "format = \"boresight-model/1\"\n[tracker]\npixels = [1024, 1024]\nfov_deg = [20.0, 20.0]\n",
+            "model.toml",
+            &[],
+        )
+        .unwrap();
+        model.camera().unwrap().unwrap()
+    }
+
+    /// Columns of `term` in two rows, x then y.
+    fn columns(term: &Empirical) -> [Vec<f64>; 2] {
+        let nan = [f64::NAN; 2];
+        let rows = StarRows {
+            t_s: &[1.0, 4.0],
+            x_px: &[-100.3, 200.2],
+            y_px: &[50.7, -300.1],
+            vx_px_s: &[1.0, 0.0],
+            vy_px_s: &[2.0, -1.0],
+            ax_px_s2: &[0.0; 2],
+            ay_px_s2: &[0.0; 2],
+            mag: &[3.0, f64::NAN],
+            bv: &nan,
+            log_flux: &nan,
+            window_px: [&[-100.0, 200.0], &[51.0, -300.0]],
+            slot: &[0, 1],
+            star_id: &[7, 9],
+            attitude: None,
+        };
+        let all = 2 * term.coefficients().len();
+        let (mut x, mut y) = (vec![0.0; all], vec![0.0; all]);
+        let out = PointsMut {
+            x: &mut x,
+            y: &mut y,
+        };
+        assert!(term.star_columns(&camera(), &rows, out));
+        [x, y]
+    }
+
+    #[test]
+    fn a_pair_is_the_first_columns_of_one_times_the_other() {
+        let (whole, range) = ([-2.0, 2.0], [0.0, 4.0]);
+        let one = Empirical::new(Variable::Rate, whole, true).unwrap();
+        let two = Empirical::pair(Variable::Rate, whole, Variable::Time, range).unwrap();
+        // the order of formats.md, whichever multiplies
+        assert_eq!(two.name(), "time*rate");
+        assert_eq!(two.coefficients().len(), 2);
+        let z = [-0.5, 1.0];
+        for (one, two) in columns(&one).iter().zip(columns(&two)) {
+            for (k, value) in two.iter().enumerate() {
+                assert!((value - z[k % 2] * one[k]).abs() < 1e-15);
+            }
+        }
+        // what is not known shifts nothing
+        let by = Empirical::pair(Variable::Rate, whole, Variable::Magnitude, range).unwrap();
+        let [x, y] = columns(&by);
+        assert!(x[0] != 0.0 && x[1] == 0.0 && y[1] == 0.0);
+        let still = Empirical::pair(Variable::Rate, whole, Variable::Time, [3.0, 3.0]);
+        assert!(still.is_none());
+    }
+
+    #[test]
+    fn harmonics_are_those_of_the_phase() {
+        let term = Empirical::new(Variable::Phase(0), [0.0, 1.0], true).unwrap();
+        let [x, y] = columns(&term);
+        let camera = camera();
+        for (row, at) in [-100.3, 200.2].into_iter().enumerate() {
+            let phase = camera.phase_rad(at);
+            for k in 0..HARMONICS {
+                let (sin, cos) = ((k + 1) as f64 * phase).sin_cos();
+                let unit = camera.arcsec_per_px()[0].recip();
+                // six products of numbers near 1
+                assert!((x[4 * k + row] - unit * sin).abs() < 1e-14);
+                assert!((x[4 * k + 2 + row] - unit * cos).abs() < 1e-14);
+            }
+        }
+        assert!(y.iter().all(|v| *v == 0.0));
+    }
+
+    #[test]
+    fn single_stars_are_tried_and_all() {
+        let term = Empirical::new(Variable::Star(vec![7, 9]), [0.0, 1.0], true).unwrap();
+        assert_eq!(term.parts(), [vec![0, 1], vec![2, 3], vec![0, 1, 2, 3]]);
+        let line = Empirical::new(Variable::Magnitude, [3.0, 5.0], true).unwrap();
+        let counts: Vec<usize> = line.parts().iter().map(Vec::len).collect();
+        assert_eq!(counts, [2, 4, 12]);
+        let window = Empirical::new(Variable::Window, [-0.5, 0.5], true).unwrap();
+        let [x, y] = columns(&window);
+        let unit = camera().arcsec_per_px()[0].recip();
+        // 0.3 px left of the middle along x, and along y
+        assert!((x[0] + 0.6 * unit).abs() < 1e-12 && x[2] == 0.0);
+        assert!((y[2] + 0.6 * unit).abs() < 1e-12 && y[0] == 0.0);
     }
 }

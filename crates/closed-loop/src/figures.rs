@@ -22,6 +22,7 @@ use telemetry::{EffectEntry, EffectValue};
 use crate::empirical::EMPIRICAL;
 use crate::error::CloseError;
 use crate::evidence::Residuals;
+use crate::fit::Fits;
 use crate::hypothesis::Questions;
 use crate::search::Found;
 use crate::selection::{FAMILY_ALPHA, columns_of};
@@ -217,41 +218,66 @@ fn consider(found: &Found, id: &str, excess: f64) -> ConsideredEffect {
     entry
 }
 
-/// What the leftover follows, among the empirical terms beside the chosen effects, each by
-/// the most certain of its `leading` parts. `left` is the share of the before variance
-/// that is left.
-pub(crate) fn unattributed(found: &Found, leading: &[usize], left: f64) -> Unattributed {
-    let fits = &found.fitted.fits;
+/// What the leftover follows, among the empirical terms of `found` beside the chosen
+/// effects. `left` is the share of the before variance that is left.
+pub(crate) fn unattributed(found: &Found, left: f64) -> Unattributed {
     let set = columns_of(&found.fitted.groups, &found.selection.chosen);
-    let base = fits.out_of_fold(&set).map_or(0.0, |o| o.total_sse());
+    let terms: Vec<(String, Vec<Vec<usize>>)> = (0..found.candidates.len())
+        .filter(|&g| found.candidates[g].id() == EMPIRICAL && found.selection.judged[g].observable)
+        .filter_map(|g| {
+            let name = found.candidates[g].selectors().get("variable")?.clone();
+            Some((name, vec![found.fitted.groups[g].columns.clone()]))
+        })
+        .collect();
+    follows(
+        &found.fitted.fits,
+        &set,
+        &terms,
+        found.candidates.len(),
+        left,
+    )
+}
+
+/// What the leftover beside columns `set` follows: of `terms`, each by the most certain of
+/// its parts. `tried` terms are paid for.
+pub(crate) fn follows(
+    fits: &Fits,
+    set: &[usize],
+    terms: &[(String, Vec<Vec<usize>>)],
+    tried: usize,
+    left: f64,
+) -> Unattributed {
+    let base = fits.out_of_fold(set).map_or(0.0, |o| o.total_sse());
     let judge = |part: &[usize], parts: usize| -> Option<(f64, f64)> {
-        let mut with = set.clone();
+        let mut with = set.to_vec();
         with.extend(part);
         let which: Vec<usize> = (set.len()..with.len()).collect();
         let sse = fits.out_of_fold(&with)?.total_sse();
         let p = fits.estimate(&with)?.p_value(&which);
-        let tried = parts * found.candidates.len();
+        let tried = parts * tried;
         let share = if base > 0.0 { 1.0 - sse / base } else { 0.0 };
         Some(((p * tried as f64).min(1.0), share))
     };
-    let mut depends_on: Vec<Dependence> = (0..found.candidates.len())
-        .filter(|&g| found.candidates[g].id() == EMPIRICAL && found.selection.judged[g].observable)
-        .filter_map(|g| {
-            let parts = found.parts(g, leading);
-            let count = parts.len();
-            let judged = parts.into_iter().filter_map(|part| judge(part, count));
+    let mut depends_on: Vec<Dependence> = terms
+        .iter()
+        .filter_map(|(variable, parts)| {
+            let judged = parts.iter().filter_map(|part| judge(part, parts.len()));
             let (p_value, variance_explained) = judged.min_by(|a, b| a.0.total_cmp(&b.0))?;
             Some(Dependence {
-                variable: found.candidates[g].selectors().get("variable")?.clone(),
+                variable: variable.clone(),
                 variance_explained,
                 p_value,
             })
         })
         .collect();
     depends_on.sort_by(|a, b| b.variance_explained.total_cmp(&a.variance_explained));
+    if depends_on.iter().any(certain) {
+        // what chance does as well is not named beside what it does not
+        depends_on.retain(certain);
+    }
     let share = depends_on
         .iter()
-        .filter(|d| d.p_value < FAMILY_ALPHA && d.variance_explained > 0.0)
+        .filter(|d| certain(d))
         .map(|d| d.variance_explained)
         .fold(0.0, f64::max);
     Unattributed {
@@ -263,17 +289,21 @@ pub(crate) fn unattributed(found: &Found, leading: &[usize], left: f64) -> Unatt
     }
 }
 
+/// Whether that is beyond chance.
+pub(crate) fn certain(d: &Dependence) -> bool {
+    d.p_value < FAMILY_ALPHA && d.variance_explained > 0.0
+}
+
 /// The empirical term that explains most of what is left, if one that a model can declare does.
 pub(crate) fn best_empirical(
     found: &Found,
     unattributed: &Unattributed,
     surroundings: &Surroundings<'_>,
 ) -> Option<usize> {
-    let beyond_chance = |d: &&Dependence| d.p_value < FAMILY_ALPHA && d.variance_explained > 0.0;
     unattributed
         .depends_on
         .iter()
-        .filter(beyond_chance)
+        .filter(|d| certain(d))
         .find_map(|d| {
             let g = (0..found.candidates.len()).find(|&g| {
                 let candidate = found.candidates[g].as_ref();

@@ -56,7 +56,7 @@ const USUAL_ORDER: u32 = 7;
 /// Cycles over the extent within which a wave is one of pixel phase.
 const PHASE_GUARD: f64 = 3.0;
 /// Harmonics of pixel phase taken out.
-const HARMONICS: usize = 2;
+const HARMONICS: usize = crate::empirical::HARMONICS;
 /// Share of a wave's power that must change along the stars' paths.
 const LEAST_MOTION: f64 = 0.1;
 /// Fewest clusters of a covariance.

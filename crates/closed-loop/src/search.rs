@@ -27,8 +27,6 @@ const CREDIBLE: f64 = 20.0;
 /// Values of a non-linear parameter tried at once, and how often the scan shrinks.
 const SCAN: usize = 9;
 const SCAN_ROUNDS: usize = 3;
-/// Columns of the longest term whose columns have an order.
-const MOST_ORDERED: usize = 12;
 /// Rounds of selection and polish; the choice settles in two or three.
 const ROUNDS: usize = 4;
 
@@ -128,7 +126,7 @@ fn credible(coefficient: &Coefficient) -> [f64; 2] {
 }
 
 /// Forms of one cause: one id with one selector of what it acts on.
-fn family(candidate: &dyn Candidate) -> String {
+pub(crate) fn family(candidate: &dyn Candidate) -> String {
     let selectors = candidate.selectors();
     let on = ["channel", "star_id", "variable"]
         .iter()
@@ -175,22 +173,6 @@ impl Found {
 /// Leading columns by which a term of one variable is judged, beside all of them: a
 /// straight line, before what bends.
 pub(crate) const LEADING: [usize; 2] = [2, 4];
-
-impl Found {
-    /// Leading parts of the columns of `term`, shortest first; all of them last. What has
-    /// no order (one shift a star) is one whole.
-    pub(crate) fn parts(&self, term: usize, leading: &[usize]) -> Vec<&[usize]> {
-        let columns = &self.fitted.groups[term].columns[..];
-        let whole = self.candidates[term].coefficients().len() == columns.len();
-        let ordered = whole && columns.len() <= MOST_ORDERED;
-        leading
-            .iter()
-            .filter(|&&n| ordered && n < columns.len())
-            .map(|&n| &columns[..n])
-            .chain(std::iter::once(columns))
-            .collect()
-    }
-}
 
 /// See [`Found::only`].
 pub(crate) struct Only<'a> {

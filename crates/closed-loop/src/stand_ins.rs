@@ -1,85 +1,118 @@
 //! Effects that stand in for a cause outside the catalogue.
 //!
-//! A residual that follows one variable for a reason that nobody listed is fitted best by
-//! that variable. Effects of the catalogue take some of it: a pile of shifted stars in
-//! place of a slope in magnitude, a distortion in place of charge left behind. So once
-//! effects are chosen, each of them, each pile of one kind, and all together are held
-//! against the terms of one variable ([`crate::empirical`]),
+//! A residual that follows variables for a reason that nobody listed is fitted best by
+//! these. Effects of the catalogue take some of it: a pile of shifted stars in place of a
+//! slope in magnitude, a distortion in place of charge left behind. So once effects are
+//! chosen, each of them, each pile of one kind, and all together are held against the best
+//! description by up to three terms ([`crate::empirical`]), term after term,
 //!
 //! ```text
 //! worth(set) = L(rest + set) - L(rest) - price(set)     L: log-likelihood out of fold
 //! ```
 //!
-//! and a set that a term beats by far is not named: it is said what the leftover follows.
-//! A term holds the effects that act through its variable as special cases with more
-//! parameters, so that it does not beat an effect that does act.
+//! and a set that a description beats by far is not named: it is said what the leftover
+//! follows. A term holds the effects that act through its variable as special cases with
+//! more parameters, so that it does not beat an effect that does act.
 //!
 //! Source: Schwarz 1978 for the price of a parameter.
 
-use crate::empirical::EMPIRICAL;
-use crate::search::{Found, LEADING};
-use crate::selection::{FAMILY_ALPHA, columns_of, price};
+use crate::description::Described;
+use crate::selection::{FAMILY_ALPHA, columns_of};
 
-/// Nats by which a term must be worth more.
-const BY_FAR: f64 = 8.0;
+/// Nats by which a description must be worth more.
+pub(crate) const BY_FAR: f64 = 8.0;
+/// Terms of a description.
+const MOST_TERMS: usize = 3;
+/// Nats that a further term must be worth.
+const WORTH: f64 = 3.0;
 
-/// The chosen set that a term of one variable beats by most, if any does.
-pub(crate) fn stand_ins(found: &Found) -> Vec<usize> {
-    let (groups, fits) = (&found.fitted.groups, &found.fitted.fits);
-    let chosen = &found.selection.chosen;
-    let each = 0.5 * found.fitted.scalars.max(2.0).ln();
-    let terms: Vec<usize> = (0..groups.len())
-        .filter(|&g| found.candidates[g].id() == EMPIRICAL && !groups[g].columns.is_empty())
-        .collect();
-    let Some(all) = fits.out_of_fold(&columns_of(groups, chosen)) else {
-        return Vec::new();
-    };
+/// A term and the columns of it, counted from its own first.
+pub(crate) type Part = (usize, Vec<usize>);
+
+/// The chosen set (positions among the chosen) that a description beats by most, if one
+/// does, and that description.
+pub(crate) fn stand_ins(described: &Described) -> Option<(Vec<usize>, Vec<Part>)> {
+    let groups = &described.fitted.groups;
+    let chosen = &described.chosen;
+    let all = described
+        .fitted
+        .fits
+        .out_of_fold(&columns_of(groups, chosen))?;
     let all = all.total_loglik();
-    let mut most = (BY_FAR, Vec::new());
-    for set in sets(found) {
+    let mut most = None;
+    let mut by = BY_FAR;
+    for set in sets(described) {
         let rest: Vec<usize> = chosen
             .iter()
             .copied()
             .filter(|g| !set.contains(g))
             .collect();
-        let paid: f64 = set
-            .iter()
-            .map(|&g| price(&groups[g], found.fitted.scalars))
-            .sum();
-        for &term in &terms {
-            for part in found.parts(term, &LEADING) {
-                let mut with = columns_of(groups, &rest);
-                let own = with.len();
-                with.extend(part);
-                let Some(instead) = fits.out_of_fold(&with) else {
+        let paid: f64 = set.iter().map(|&k| described.paid[k]).sum();
+        let Some((worth, parts)) = describe(described, &columns_of(groups, &rest)) else {
+            continue;
+        };
+        if worth - (all - paid) > by {
+            by = worth - (all - paid);
+            most = Some((set, parts));
+        }
+    }
+    most
+}
+
+/// The best description of what `rest` leaves: its likelihood after all prices.
+pub(crate) fn describe(described: &Described, rest: &[usize]) -> Option<(f64, Vec<Part>)> {
+    let fits = &described.fitted.fits;
+    let each = 0.5 * described.fitted.scalars.max(2.0).ln();
+    let tried: usize = described.terms.iter().map(|t| t.parts.len()).sum();
+    let mut with = rest.to_vec();
+    let mut worth = fits.out_of_fold(&with)?.total_loglik();
+    let mut parts = Vec::new();
+    while parts.len() < MOST_TERMS {
+        let mut best: Option<(f64, usize, &Vec<usize>)> = None;
+        for (k, term) in described.terms.iter().enumerate() {
+            for part in &term.parts {
+                if part.iter().any(|c| with.contains(c)) {
+                    continue;
+                }
+                let mut trial = with.clone();
+                trial.extend(part);
+                let Some(fit) = fits.out_of_fold(&trial) else {
                     continue;
                 };
-                let more = instead.total_loglik() - each * part.len() as f64 - (all - paid);
+                // what is in the description already has been paid for
+                let bought = with.len() - rest.len() + part.len();
+                let gain = fit.total_loglik() - each * bought as f64;
                 let certain = || {
-                    let which: Vec<usize> = (own..with.len()).collect();
-                    let tried = (terms.len() * (LEADING.len() + 1)) as f64;
-                    fits.estimate(&with)
-                        .is_some_and(|e| e.p_value(&which) * tried < FAMILY_ALPHA)
+                    let which: Vec<usize> = (with.len()..trial.len()).collect();
+                    fits.estimate(&trial)
+                        .is_some_and(|e| e.p_value(&which) * (tried as f64) < FAMILY_ALPHA)
                 };
-                if more > most.0 && certain() {
-                    most = (more, set.clone());
+                if gain > worth + WORTH
+                    && best.as_ref().is_none_or(|(most, ..)| gain > *most)
+                    && certain()
+                {
+                    best = Some((gain, k, part));
                 }
             }
         }
+        let Some((gain, k, part)) = best else { break };
+        worth = gain;
+        with.extend(part);
+        let first = described.terms[k].first;
+        parts.push((k, part.iter().map(|c| c - first).collect()));
     }
-    most.1
+    (!parts.is_empty()).then_some((worth, parts))
 }
 
 /// Each effect, each pile of one kind, and all.
-fn sets(found: &Found) -> Vec<Vec<usize>> {
-    let chosen = &found.selection.chosen;
+fn sets(described: &Described) -> Vec<Vec<usize>> {
+    let chosen = &described.chosen;
     let mut sets: Vec<Vec<usize>> = chosen.iter().map(|&g| vec![g]).collect();
     for &g in chosen {
-        let id = found.candidates[g].id();
         let pile: Vec<usize> = chosen
             .iter()
             .copied()
-            .filter(|&c| found.candidates[c].id() == id)
+            .filter(|&c| described.names[c] == described.names[g])
             .collect();
         if pile.len() > 1 && !sets.contains(&pile) {
             sets.push(pile);

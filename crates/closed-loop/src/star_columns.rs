@@ -146,6 +146,8 @@ impl StarColumns<'_> {
             ay_px_s2: &d.acceleration[1][rows.clone()],
             mag: &d.mag[rows.clone()],
             bv: &d.bv[rows.clone()],
+            log_flux: &d.log_flux[rows.clone()],
+            window_px: d.window_px.each_ref().map(|w| &w[rows.clone()]),
             slot: &d.frames.slot[rows.clone()],
             star_id: &d.frames.star_id[rows],
             attitude: self.motion,

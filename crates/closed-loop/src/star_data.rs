@@ -17,6 +17,7 @@
 //!
 //! Source: [M23] Fig. 4 for the order of the terms.
 
+use std::collections::HashMap;
 use std::sync::Arc;
 
 use centroid::CentroidError;
@@ -27,6 +28,7 @@ use focal_plane::{
 };
 use nalgebra::{UnitQuaternion, Vector3};
 use star_tracker::{Disturbance, Pbm, Rows, Scratch};
+use telemetry::WindowTable;
 
 use spectra::robust;
 
@@ -68,6 +70,11 @@ pub(crate) struct StarData {
     /// Magnitude and colour, a row.
     pub(crate) mag: Vec<f64>,
     pub(crate) bv: Vec<f64>,
+    /// Usual flux of the star, a row, as a logarithm to base 10; NaN where unknown. That of
+    /// the row shares its noise with the centroid.
+    pub(crate) log_flux: Vec<f64>,
+    /// Middle of the window, a row, px; NaN where unknown.
+    pub(crate) window_px: [Vec<f64>; 2],
     /// Attitude of each frame.
     pub(crate) attitude: Vec<UnitQuaternion<f64>>,
     /// Projected position, px.
@@ -132,6 +139,7 @@ impl StarData {
         data.disturb(inputs.reference, inputs.effects);
         data.modelled = data.projected.clone();
         data.update_phase(inputs.phase);
+        data.log_flux = data.fluxes();
         data
     }
 
@@ -199,6 +207,40 @@ impl StarData {
             }
         }
         self.free_attitude && (same as f64) < SAME_SHARE * all as f64
+    }
+
+    /// Measured fluxes, see [`log_flux`](Self::log_flux).
+    fn fluxes(&self) -> Vec<f64> {
+        let Some(flux) = &self.frames.flux else {
+            return vec![f64::NAN; self.t_s.len()];
+        };
+        let mut of_star = vec![Vec::new(); self.stars.len()];
+        for (&star, flux) in self.star.iter().zip(flux) {
+            of_star[star].push(flux.log10());
+        }
+        let usual: Vec<f64> = of_star
+            .iter_mut()
+            .map(|own| {
+                own.retain(|f| f.is_finite());
+                robust::median(own).unwrap_or(f64::NAN)
+            })
+            .collect();
+        self.star.iter().map(|&star| usual[star]).collect()
+    }
+
+    /// Takes the middles of the windows from their table.
+    pub(crate) fn see_windows(&mut self, table: &WindowTable) {
+        let half = table.size.map(|n| 0.5 * (n as f64 - 1.0));
+        let at: HashMap<(u64, i32), usize> = (0..table.len())
+            .map(|k| ((table.t_s[k].to_bits(), table.slot[k]), k))
+            .collect();
+        for row in 0..self.t_s.len() {
+            let key = (self.t_s[row].to_bits(), self.frames.slot[row]);
+            if let Some(&k) = at.get(&key) {
+                self.window_px[0][row] = table.x0_px[k] + half[0];
+                self.window_px[1][row] = table.y0_px[k] + half[1];
+            }
+        }
     }
 
     /// Attitude of each frame, and directions where they are unknown.
@@ -277,6 +319,8 @@ impl StarData {
             camera: inputs.camera.clone(),
             mag: star.iter().map(|&s| stars[s].mag).collect(),
             bv: star.iter().map(|&s| stars[s].bv).collect(),
+            log_flux: vec![f64::NAN; n],
+            window_px: [vec![f64::NAN; n], vec![f64::NAN; n]],
             outside_reference: from.rows() - n,
             frames,
             stars,

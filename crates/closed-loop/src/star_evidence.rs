@@ -41,6 +41,8 @@ pub(crate) struct StarEvidence<'a> {
     pub(crate) noise: Option<CommonNoise>,
     /// Weight of each row.
     pub(crate) weight: Arc<Vec<f64>>,
+    /// What is in every fit, described but not named: nuisance without a prior.
+    pub(crate) kept: Vec<Arc<dyn Candidate>>,
 }
 
 impl<'a> StarEvidence<'a> {
@@ -53,10 +55,25 @@ impl<'a> StarEvidence<'a> {
         }
     }
 
+    /// The same evidence with `kept` in every fit.
+    pub(crate) fn keeping(&self, kept: &[Arc<dyn Candidate>]) -> Self {
+        Self {
+            kept: kept.to_vec(),
+            ..self.clone()
+        }
+    }
+
+    /// What is kept, then `candidates`.
+    fn all<'b>(&'b self, candidates: &[&'b dyn Candidate]) -> Vec<&'b dyn Candidate> {
+        let kept = self.kept.iter().map(AsRef::as_ref);
+        kept.chain(candidates.iter().copied()).collect()
+    }
+
     /// One pass over the data that serves every noise.
     pub(crate) fn moments(&self, folds: &Folds, candidates: &[&dyn Candidate]) -> StarMoments {
         let bins = Bins::cut(&self.data.frames.t_s, folds, MOST_BINS);
-        StarMoments::accumulate(&self.columns(candidates), folds, Keep::Bins(&bins))
+        let all = self.all(candidates);
+        StarMoments::accumulate(&self.columns(&all), folds, Keep::Bins(&bins))
     }
 
     fn columns<'b>(&'b self, candidates: &'b [&'b dyn Candidate]) -> StarColumns<'b> {
@@ -78,7 +95,10 @@ impl<'a> StarEvidence<'a> {
 
 impl Evidence for StarEvidence<'_> {
     fn precision(&self) -> Vec<f64> {
-        self.nuisance.precision()
+        let mut all = self.nuisance.precision();
+        let kept: usize = self.kept.iter().map(|c| c.coefficients().len()).sum();
+        all.extend(std::iter::repeat_n(0.0, kept));
+        all
     }
 
     fn residual_columns(&self) -> usize {
@@ -100,7 +120,8 @@ impl Evidence for StarEvidence<'_> {
         } else {
             Keep::None
         };
-        StarMoments::accumulate(&self.columns(candidates), folds, keep).white()
+        let all = self.all(candidates);
+        StarMoments::accumulate(&self.columns(&all), folds, keep).white()
     }
 
     fn residuals(
@@ -110,9 +131,10 @@ impl Evidence for StarEvidence<'_> {
         amplitudes: &Amplitudes,
     ) -> Residuals {
         let data = self.data;
+        let all = self.all(candidates);
         let columns = StarColumns {
             residuals: &[],
-            ..self.columns(candidates)
+            ..self.columns(&all)
         };
         let layout = columns.layout();
         let rows = data.t_s.len();

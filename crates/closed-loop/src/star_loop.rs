@@ -10,16 +10,18 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use effects::{Candidate, Scene, StarFacts, StarRows};
+use effects::{Scene, StarFacts, StarRows};
 use focal_plane::{AttitudeSource, Points, rotation_vector};
 use telemetry::report::{Errors, FoundEffect, Report, Rows};
 use telemetry::{AttitudeResiduals, DarkMap, Model, StarResiduals};
 
-use crate::attitude_loop::{channels_of_interest, resolved_motion};
+use crate::attitude_loop::resolved_motion;
+use crate::causes::{self, Named, Quest};
 use crate::close::{Closed, catalogue_candidates};
+use crate::commonness::Slow;
 use crate::confusion;
 use crate::declared;
-use crate::empirical::{EMPIRICAL, Empirical, Variable};
+use crate::description::{self, Described};
 use crate::error::CloseError;
 use crate::evidence::{Evidence, Residuals};
 use crate::figures;
@@ -36,12 +38,12 @@ use crate::noise_effects;
 use crate::nuisance::StarNuisance;
 use crate::pattern;
 use crate::reference_wander::{self, REFERENCE_ERROR};
-use crate::search::{Found, LEADING, amplitudes, amplitudes_as, fit};
+use crate::search::{Found, amplitudes, amplitudes_as, fit};
 use crate::selection::columns_of;
 use crate::situation::Situation;
 use crate::star_data::{Inputs, Star, StarData, median_step};
 use crate::star_evidence::StarEvidence;
-use crate::star_search::{self, Wander};
+use crate::star_search::Wander;
 use crate::star_weights;
 use spectra::robust;
 
@@ -82,6 +84,9 @@ pub(crate) fn run(
             need: MIN_FRAMES,
             why: "the others lie outside the reference, or have no two stars to solve an attitude from",
         });
+    }
+    if let Some(windows) = &situation.bundle.images {
+        data.see_windows(windows);
     }
     let unrelated = data.frames_are_unrelated();
     let folds = if unrelated {
@@ -178,10 +183,29 @@ fn trace(
         let mut list = catalogue_candidates(&scene);
         // With raw windows a warm pixel is the dark map's business.
         list.retain(|c| c.acts_on_stars() && !(formed.is_some() && c.id() == "hot_pixel"));
-        list.extend(leftover_terms(situation, data));
         list
     };
-    let searched = star_search::run(level, folds, &candidates, &|c| c.id() != EMPIRICAL)?;
+    let quest = Quest {
+        candidates: &candidates,
+        terms: &|| description::terms(situation, data),
+        ways: &description::ways(situation, data),
+    };
+    let Named {
+        searched,
+        described,
+        slow,
+    } = causes::run(level, folds, &quest)?;
+    let mut searched = searched;
+    if situation.questions.empirical {
+        description::offer(
+            searched.evidence.as_ref().unwrap_or(level),
+            folds,
+            &mut searched.found,
+            &described.follows(1.0),
+            description::terms(situation, data),
+            &situation.surroundings(),
+        )?;
+    }
     progress("figures");
     finish(&Finish {
         situation,
@@ -190,6 +214,8 @@ fn trace(
         measured: &measured,
         level: searched.evidence.as_ref().unwrap_or(level),
         found: &searched.found,
+        described: &described,
+        slow,
         wander: searched.wander.as_ref(),
         settled: &settled,
         image: image.as_ref().zip(formed.as_ref()),
@@ -254,6 +280,7 @@ fn evidence<'a>(
         } else {
             star_weights::of(data)
         }),
+        kept: Vec::new(),
     }
 }
 
@@ -268,6 +295,8 @@ fn all_rows<'a>(data: &'a StarData, motion: Option<&'a dyn AttitudeSource>) -> S
         ay_px_s2: &data.acceleration[1],
         mag: &data.mag,
         bv: &data.bv,
+        log_flux: &data.log_flux,
+        window_px: data.window_px.each_ref().map(Vec::as_slice),
         slot: &data.frames.slot,
         star_id: &data.frames.star_id,
         attitude: motion,
@@ -293,52 +322,6 @@ fn scene<'a>(
     }
 }
 
-/// Every variable that the bundle gives values of.
-fn leftover_terms(situation: &Situation<'_>, data: &StarData) -> Vec<Box<dyn Candidate>> {
-    let range = |series: &[&[f64]]| {
-        series
-            .iter()
-            .flat_map(|s| s.iter())
-            .filter(|v| v.is_finite())
-            .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], &v| {
-                [low.min(v), high.max(v)]
-            })
-    };
-    let largest = |series: &[Vec<f64>; 2]| {
-        let [low, high] = range(&[&series[0], &series[1]]);
-        let size = low.abs().max(high.abs());
-        [-size, size]
-    };
-    let mut terms: Vec<Box<dyn Candidate>> = Vec::new();
-    let mut add = |variable: Variable, range: [f64; 2]| {
-        if let Some(term) = Empirical::new(variable, range, true) {
-            terms.push(Box::new(term));
-        }
-    };
-    for axis in 0..2 {
-        add(Variable::Position(axis), range(&[&data.modelled[axis]]));
-        add(Variable::Phase(axis), [0.0, 1.0]);
-    }
-    add(Variable::Time, range(&[&data.t_s]));
-    add(Variable::Rate, largest(&data.velocity));
-    add(Variable::Acceleration, largest(&data.acceleration));
-    add(Variable::Magnitude, range(&[&data.mag]));
-    add(Variable::Colour, range(&[&data.bv]));
-    if !data.free_directions && data.stars.len() <= 64 {
-        add(
-            Variable::Star(data.stars.iter().map(|s| s.id).collect()),
-            [0.0, 1.0],
-        );
-    }
-    for (name, series) in channels_of_interest(&situation.channels) {
-        add(
-            Variable::Housekeeping(name, series.clone()),
-            range(&[series.value()]),
-        );
-    }
-    terms
-}
-
 /// What the report is made of.
 struct Finish<'a> {
     situation: &'a Situation<'a>,
@@ -347,6 +330,8 @@ struct Finish<'a> {
     measured: &'a StarEvidence<'a>,
     level: &'a StarEvidence<'a>,
     found: &'a Found,
+    described: &'a Described,
+    slow: Option<Slow>,
     wander: Option<&'a Wander>,
     settled: &'a Settled,
     image: Option<(&'a ImageLevel, &'a Formed)>,
@@ -418,7 +403,8 @@ fn finish(f: &Finish<'_>) -> Result<Closed, CloseError> {
     }
     let surroundings = f.situation.surroundings();
     // what is left is judged before a term without a cause is added
-    let mut unattributed = figures::unattributed(f.found, &LEADING, last / whole);
+    let mut unattributed = f.described.follows(last / whole);
+
     let questions = f.situation.questions;
     let mut added = chosen.clone();
     let mut after = None;
@@ -480,6 +466,9 @@ fn finish(f: &Finish<'_>) -> Result<Closed, CloseError> {
     leftover.tell(&mut unattributed);
     if let Some(pattern) = pattern {
         pattern.tell(&mut unattributed, last / whole);
+    }
+    if let Some(slow) = f.slow {
+        slow.tell(&mut unattributed, last / whole);
     }
     let excess = excess(f, last);
     let mut considered = figures::considered(f.found, excess);

@@ -41,7 +41,6 @@ use crate::search::{Fitted, Found, borrowed, fit_grams, polish, search};
 use crate::selection::{
     FAMILY_ALPHA, Group, Judgement, Selection, columns_of, judged, price, ranked,
 };
-use crate::stand_ins::stand_ins;
 use crate::star_evidence::StarEvidence;
 use crate::star_moments::StarMoments;
 
@@ -57,8 +56,6 @@ pub(crate) const WIDENING: f64 = 1.3;
 const SLOW_PRICE: f64 = 4.0;
 /// Most effects that are added.
 const MOST: usize = 8;
-/// Searches whose outcome is refused before one is taken as it is.
-const MOST_REFUSALS: usize = 8;
 
 /// The slow error of the reference as it was found.
 #[derive(Clone, Debug)]
@@ -77,40 +74,9 @@ pub(crate) struct Searched<'a> {
     pub(crate) wander: Option<Wander>,
 }
 
-/// Runs the search on `white` evidence. Candidates for which `eligible` is false
-/// are judged but never chosen.
-pub(crate) fn run<'a>(
-    white: &StarEvidence<'a>,
-    folds: &Folds,
-    candidates: &dyn Fn() -> Vec<Box<dyn Candidate>>,
-    eligible: &dyn Fn(&dyn Candidate) -> bool,
-) -> Result<Searched<'a>, CloseError> {
-    let alone = white.data.free_attitude || white.residuals.len() != 1;
-    let start = if alone {
-        None
-    } else {
-        declared_noise(white, folds)?
-    };
-    let mut may: Vec<bool> = candidates().iter().map(|c| eligible(c.as_ref())).collect();
-    for _ in 0..MOST_REFUSALS {
-        let (searched, mut refused) = attempt(white, folds, candidates, &may, start)?;
-        refused.extend(stand_ins(&searched.found));
-        if refused.is_empty() {
-            return Ok(searched);
-        }
-        for g in refused {
-            may[g] = false;
-        }
-    }
-    // no end: what a slow error or a term of one variable explains better is not named
-    for (may, candidate) in may.iter_mut().zip(candidates()) {
-        *may &= !candidate.acts_on_attitude();
-    }
-    Ok(attempt(white, folds, candidates, &may, start)?.0)
-}
-
-/// One search, and what of its outcome a slow error of the reference explains better.
-fn attempt<'a>(
+/// One search on `white` evidence, and what of its outcome a slow error of the reference explains
+/// better. Candidates that may not be chosen are judged.
+pub(crate) fn attempt<'a>(
     white: &StarEvidence<'a>,
     folds: &Folds,
     candidates: &dyn Fn() -> Vec<Box<dyn Candidate>>,
@@ -233,7 +199,7 @@ fn tried(may: &[bool]) -> usize {
 /// Noise of the declared model's residual, where it may hold a slow error. How much
 /// of one shows only later: what is fitted here (a distortion under drifting stars)
 /// takes some of it along.
-fn declared_noise(
+pub(crate) fn declared_noise(
     white: &StarEvidence<'_>,
     folds: &Folds,
 ) -> Result<Option<CommonNoise>, CloseError> {

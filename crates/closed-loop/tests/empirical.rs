@@ -75,15 +75,18 @@ fn run(model: &Model, bundle: &Bundle) -> Closed {
 
 /// Found, added beside a verdict that it does not change, and gone once the written model is read.
 /// `truth` is the coefficient's size for a load of 1.
-fn comes_and_goes(scenario: &Scenario, bundle: &Bundle, coefficient: &str, truth: f64) {
+fn comes_and_goes(
+    scenario: &Scenario,
+    bundle: &Bundle,
+    variable: &str,
+    coefficient: &str,
+    truth: f64,
+) {
     let closed = run(&scenario.model_without_effects(), bundle);
     let report = &closed.report;
     assert_eq!(report.verdict, Verdict::Unexplained);
     assert!(report.unattributed.present);
-    assert_eq!(
-        report.unattributed.depends_on[0].variable,
-        "housekeeping:wheel_load"
-    );
+    assert_eq!(report.unattributed.depends_on[0].variable, variable);
     let ids: Vec<&str> = report.effects.iter().map(|e| e.id.as_str()).collect();
     assert_eq!(ids, ["empirical"]);
     let rms = |e: &telemetry::report::Errors| {
@@ -95,8 +98,12 @@ fn comes_and_goes(scenario: &Scenario, bundle: &Bundle, coefficient: &str, truth
     // the scale of the variable is that of the data: P_1 at the fit's middle and half range
     let parameters = &report.effects[0].parameters;
     let fitted = &parameters[coefficient];
-    let slope = fitted.value / parameters["half"].value;
-    let sigma = fitted.sigma.unwrap() / parameters["half"].value;
+    let half = parameters
+        .get("by_half")
+        .unwrap_or(&parameters["half"])
+        .value;
+    let slope = fitted.value / half;
+    let sigma = fitted.sigma.unwrap() / half;
     assert!(
         (slope - truth).abs() < 5.0 * sigma,
         "{slope} +- {sigma}, {truth}"
@@ -124,7 +131,30 @@ fn a_term_of_the_stars() {
             stars.y_px[row] *= 1.0 + size / scale[1] / half[1];
         }
     }
-    comes_and_goes(&scenario, &bundle, "c3", 1.2);
+    comes_and_goes(&scenario, &bundle, "housekeeping:wheel_load", "c3", 1.2);
+}
+
+/// The image is sheared: 1.5 arcsec along y at the edge in x for each unit of load.
+#[test]
+fn a_term_of_two_variables() {
+    let scenario = scenario("[\"stars\", \"catalog\"]");
+    let mut bundle = with_load(&scenario);
+    let (load, camera) = (load(), bundle.camera.clone().unwrap());
+    let stars = bundle.stars.as_mut().unwrap();
+    let [low, high] = stars
+        .x_px
+        .iter()
+        .fold([0.0_f64; 2], |[l, h], &x| [l.min(x), h.max(x)]);
+    for k in 0..stars.frames() {
+        let size = 1.5 * (load.at(stars.t_s[k]).unwrap() - 15.0);
+        for row in stars.rows_of(k) {
+            // P_1 over the range of the stars
+            let z = (2.0 * stars.x_px[row] - low - high) / (high - low);
+            stars.y_px[row] += size * z / camera.arcsec_per_px()[1];
+        }
+    }
+    let variable = "x_px*housekeeping:wheel_load";
+    comes_and_goes(&scenario, &bundle, variable, "c1", 1.5);
 }
 
 /// The attitude turns about X by 0.6 arcsec for each unit of load.
@@ -138,7 +168,7 @@ fn a_term_of_the_attitude() {
         let angle = 0.6 * load.at(*t).unwrap() / ARCSEC_PER_RAD;
         *q = rotation_from_vector(&(Vector3::x() * angle)) * *q;
     }
-    comes_and_goes(&scenario, &bundle, "c0", 0.6);
+    comes_and_goes(&scenario, &bundle, "housekeeping:wheel_load", "c0", 0.6);
 }
 
 /// A dark map cannot be taken off windows yet: with windows the model is refused, without it is read.

@@ -47,6 +47,10 @@ pub struct StarRows<'a> {
     pub mag: &'a [f64],
     /// Colours B - V; NaN unknown.
     pub bv: &'a [f64],
+    /// Usual fluxes of the stars as their logarithms to base 10; NaN unknown.
+    pub log_flux: &'a [f64],
+    /// Middle of the star's window, x then y, px; NaN unknown.
+    pub window_px: [&'a [f64]; 2],
     /// Slots.
     pub slot: &'a [i32],
     /// Star identities.

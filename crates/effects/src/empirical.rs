@@ -4,7 +4,8 @@
 //! stars     dP = sum_k c_k field_k(v)   arcsec over arcsec per pixel,   z = (v - middle) / half
 //!   smooth  (g, 0)  (0, g)  (-y g, x g)  (x g, y g)        g = P_1(z), P_2(z), P_3(z), x and y over half the detector
 //!   x_px    (g, 0)  (0, g)                                 v the position
-//!   phase   sin, cos of the pixel phase and of twice it, along its axis
+//!   phase   sin, cos of the pixel phase and of 2 to 6 times it, along its axis
+//!   two    the first two columns of x_px, y_px or a pixel phase times P_1(z) of the second variable
 //! attitude  theta = sum_k c_k g_k(z) about x, then y, then z    arcsec, tracker axes
 //! ```
 //!
@@ -27,6 +28,10 @@ use crate::{
 const ID: &str = "empirical";
 /// Orders of the polynomials.
 const ORDERS: usize = 3;
+/// Harmonics of a pixel phase.
+const HARMONICS: usize = 6;
+/// Coefficients of two variables together.
+const OF_A_PAIR: usize = 2;
 /// Most coefficients: four fields of each order.
 const MOST: usize = 4 * ORDERS;
 const NAMES: [&str; MOST] = [
@@ -90,6 +95,24 @@ impl Variable {
     }
 }
 
+impl Variable {
+    /// Whether it is a place on the detector.
+    fn is_place(&self) -> bool {
+        matches!(self, Self::Position(_) | Self::Phase(_))
+    }
+
+    /// Its value where it is no place; NaN where it is unknown.
+    fn value(&self, star: &StarView) -> f64 {
+        match self {
+            Self::Time => star.t_s,
+            Self::Magnitude => star.mag,
+            Self::Colour => star.bv,
+            Self::Channel(_, series) => series.at(star.t_s).unwrap_or(f64::NAN),
+            Self::Position(_) | Self::Phase(_) => f64::NAN,
+        }
+    }
+}
+
 #[derive(Clone, Debug)]
 struct Empirical {
     variable: Variable,
@@ -97,6 +120,8 @@ struct Empirical {
     on_attitude: bool,
     middle: f64,
     half: f64,
+    /// The second variable with its middle and half range.
+    by: Option<(Variable, [f64; 2])>,
     values: Vec<f64>,
 }
 
@@ -123,6 +148,7 @@ impl EffectKind for Kind {
         surroundings: &Surroundings<'_>,
     ) -> Result<Box<dyn Effect>, EffectError> {
         let mut known = vec!["variable", "acts_on", "middle", "half", "coefficients"];
+        known.extend(["by_middle", "by_half"]);
         known.extend(NAMES);
         let reader = Reader::new(ID, parameters, &known)?;
         let name = reader.text("variable")?;
@@ -130,7 +156,24 @@ impl EffectKind for Kind {
             effect: ID,
             name: "variable",
         })?;
+        let (name, second) = match name.split_once('*') {
+            Some((first, second)) => (first, Some(second)),
+            None => (name, None),
+        };
         let variable = Variable::read(name, surroundings)?;
+        let by = second
+            .map(|second| Variable::read(second, surroundings))
+            .transpose()?;
+        if by
+            .as_ref()
+            .is_some_and(|by| !variable.is_place() || by.is_place())
+        {
+            return Err(EffectError::WrongType {
+                effect: ID,
+                name: "variable".to_owned(),
+                expected: "of two variables first x_px, y_px or a pixel phase, then time, mag, colour or housekeeping:<channel>",
+            });
+        }
         let on_attitude = match reader.text("acts_on")? {
             None | Some("stars") => false,
             Some("attitude") if matches!(variable, Variable::Time | Variable::Channel(..)) => true,
@@ -142,15 +185,23 @@ impl EffectKind for Kind {
                 });
             }
         };
-        let half = reader.number("half")?.unwrap_or(1.0);
-        if half <= 0.0 {
-            return Err(EffectError::OutOfRange {
-                effect: ID,
-                name: "half".to_owned(),
-                value: half,
-                expected: "positive",
-            });
-        }
+        let positive = |name: &'static str| {
+            let value = reader.number(name)?.unwrap_or(1.0);
+            if value <= 0.0 {
+                return Err(EffectError::OutOfRange {
+                    effect: ID,
+                    name: name.to_owned(),
+                    value,
+                    expected: "positive",
+                });
+            }
+            Ok(value)
+        };
+        let half = positive("half")?;
+        let by_scale = [
+            reader.number("by_middle")?.unwrap_or(0.0),
+            positive("by_half")?,
+        ];
         let mut values = Vec::new();
         if let Some(list) = reader.text("coefficients")? {
             reader.exclude("coefficients", NAMES)?;
@@ -173,7 +224,8 @@ impl EffectKind for Kind {
             .rposition(Option::is_some)
             .map_or(0, |k| k + 1);
         let most = match (&variable, on_attitude) {
-            (Variable::Phase(_), _) => 4,
+            _ if by.is_some() => OF_A_PAIR,
+            (Variable::Phase(_), _) => 2 * HARMONICS,
             (Variable::Position(_), _) => 2 * ORDERS,
             (_, true) => 3 * ORDERS,
             (_, false) => 4 * ORDERS,
@@ -199,6 +251,7 @@ impl EffectKind for Kind {
             on_attitude,
             middle: reader.number("middle")?.unwrap_or(0.0),
             half,
+            by: by.map(|by| (by, by_scale)),
             values: values[..count].iter().map(|v| v.unwrap_or(0.0)).collect(),
         }))
     }
@@ -225,10 +278,14 @@ impl Empirical {
         let half = self.camera.half_size_px();
         let (x, y) = (star.at.x / half[0], star.at.y / half[1]);
         let mut sum = [0.0; 2];
+        let times = self.by.as_ref().map_or(1.0, |(by, [middle, half])| {
+            let z = (by.value(star) - middle) / half;
+            if z.is_finite() { z } else { 0.0 }
+        });
         let mut put = |k: usize, dx: f64, dy: f64| {
             if let Some(c) = self.values.get(k) {
-                sum[0] += c * dx;
-                sum[1] += c * dy;
+                sum[0] += times * c * dx;
+                sum[1] += times * c * dy;
             }
         };
         match &self.variable {
@@ -242,14 +299,10 @@ impl Empirical {
             Variable::Phase(axis) => {
                 let phase = self.camera.phase_rad([star.at.x, star.at.y][*axis]);
                 let along = [1.0 - *axis as f64, *axis as f64];
-                let waves = [
-                    phase.sin(),
-                    phase.cos(),
-                    (2.0 * phase).sin(),
-                    (2.0 * phase).cos(),
-                ];
-                for (k, g) in waves.into_iter().enumerate() {
-                    put(k, g * along[0], g * along[1]);
+                for k in 0..HARMONICS {
+                    let (sin, cos) = ((k + 1) as f64 * phase).sin_cos();
+                    put(2 * k, sin * along[0], sin * along[1]);
+                    put(2 * k + 1, cos * along[0], cos * along[1]);
                 }
             }
             smooth => {
@@ -308,6 +361,10 @@ impl Effect for Empirical {
             .collect();
         all.push(Parameter::new("middle", self.middle, ""));
         all.push(Parameter::new("half", self.half, ""));
+        if let Some((_, [middle, half])) = &self.by {
+            all.push(Parameter::new("by_middle", *middle, ""));
+            all.push(Parameter::new("by_half", *half, ""));
+        }
         all
     }
     fn selectors(&self) -> BTreeMap<String, String> {
@@ -317,17 +374,25 @@ impl Effect for Empirical {
             "stars"
         };
         BTreeMap::from([
-            ("variable".to_owned(), self.variable.name()),
+            (
+                "variable".to_owned(),
+                match &self.by {
+                    Some((by, _)) => format!("{}*{}", self.variable.name(), by.name()),
+                    None => self.variable.name(),
+                },
+            ),
             ("acts_on".to_owned(), on.to_owned()),
         ])
     }
 }
 
-/// What a term with these coefficients is declared by.
+/// What a term with these coefficients is declared by: middle and half range of its
+/// variable, and of the second one.
 pub fn empirical_parameters(
     variable: &str,
     on_attitude: bool,
     [middle, half]: [f64; 2],
+    by: Option<[f64; 2]>,
     values: &[f64],
 ) -> Parameters {
     let on = if on_attitude { "attitude" } else { "stars" };
@@ -337,6 +402,10 @@ pub fn empirical_parameters(
         ("middle".to_owned(), ParameterValue::from(middle)),
         ("half".to_owned(), ParameterValue::from(half)),
     ]);
+    if let Some([middle, half]) = by {
+        all.insert("by_middle".to_owned(), ParameterValue::from(middle));
+        all.insert("by_half".to_owned(), ParameterValue::from(half));
+    }
     for (k, &value) in values.iter().enumerate() {
         all.insert(format!("c{k}"), ParameterValue::from(value));
     }

@@ -251,6 +251,7 @@ impl Bench {
             .map(|i| (after[i] - 2.0 * now[i] + before[i]) / (h * h))
             .collect();
         let t_s: Vec<f64> = (0..n).map(|row| self.t_s[row / STARS as usize]).collect();
+        let unknown = vec![f64::NAN; n];
         use_rows(&StarRows {
             t_s: &t_s,
             x_px: &now[..n],
@@ -261,6 +262,8 @@ impl Bench {
             ay_px_s2: &a[n..],
             mag: &self.mag,
             bv: &self.bv,
+            log_flux: &unknown,
+            window_px: [&unknown, &unknown],
             slot: &self.slot,
             star_id: &self.star_id,
             attitude: Some(&self.truth),

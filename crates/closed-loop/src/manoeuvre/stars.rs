@@ -108,6 +108,7 @@ impl<'a> Sky<'a> {
             sigma_guess_arcsec: 1.0,
             noise: None,
             weight: vec![1.0; data.t_s.len()].into(),
+            kept: Vec::new(),
         };
         let folds = Folds::cut(data.frames.frames());
         match &self.noise {

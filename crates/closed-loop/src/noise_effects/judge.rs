@@ -33,7 +33,7 @@ const MIN_STARS: usize = 4;
 const MIN_SPREAD_MAG: f64 = 0.02;
 /// A slope this near to the declared one is as declared: photon and read noise together
 /// follow a power of the flux only roughly, and their slope changes by this within half a magnitude.
-const SLOPE_AS_DECLARED: f64 = 0.1;
+pub(super) const SLOPE_AS_DECLARED: f64 = 0.1;
 /// Least relative spread of the squared rate.
 const MIN_SPREAD_RATE: f64 = 0.2;
 /// Largest slope, and noise of a rate in arcsec/(deg/s), that nature makes.
@@ -45,6 +45,12 @@ const MIN_ROWS: usize = 50;
 const MIN_SPIKES: f64 = 3.0;
 /// Nats by which spikes must beat noise with tails.
 const BEYOND_TAILS: f64 = 5.0;
+/// Sigmas within which two estimates agree, and the least sigma of their difference, in
+/// those of the worse one: neighbours are differenced, which costs a third of what they tell.
+const AGREEING: f64 = 4.0;
+const LEAST_SPREAD: f64 = 0.5;
+/// Sigmas beyond what passes for nothing that the estimate from differences has to show.
+const SEEN_QUICK: f64 = 2.0;
 /// Rounds of rows (whose rotation is weighed by the noise) and fit.
 const ROUNDS: usize = 2;
 
@@ -64,6 +70,21 @@ pub(super) struct Judged {
     pub(super) fewest: Option<f64>,
     /// Values with sigmas: slope; rate; share and size.
     pub(super) values: [[f64; 2]; 2],
+}
+
+impl Judged {
+    /// Whether noise that changes from frame to frame tells the same: what is slow is no noise.
+    /// The estimate on all of the residual is the better one if there is nothing else, so
+    /// that the difference has the difference of the variances (Hausman 1978).
+    pub(super) fn agrees(&self, quick: &Self, least: f64) -> bool {
+        let ([value, sigma], [other, its]) = (self.values[0], quick.values[0]);
+        if !quick.observable {
+            return true;
+        }
+        let spread = (its * its - sigma * sigma).max(0.0).sqrt();
+        (value - other).abs() <= AGREEING * spread.max(LEAST_SPREAD * its)
+            && other.abs() > least + SEEN_QUICK * its
+    }
 }
 
 const UNSEEN: Judged = Judged {
@@ -376,4 +397,28 @@ fn wald(value: f64, variance: f64, clusters: usize, spent: usize) -> f64 {
         return 1.0;
     }
     FisherSnedecor::new(1.0, freedom).map_or(1.0, |law| law.sf(value * value / variance))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_slow_is_no_noise() {
+        let judged = |value: f64, sigma: f64| Judged {
+            observable: true,
+            values: [[value, sigma], [0.0; 2]],
+            ..UNSEEN
+        };
+        let all = judged(0.5, 0.05);
+        // 0.08^2 - 0.05^2 = 0.062^2
+        assert!(all.agrees(&judged(0.4, 0.08), 0.1));
+        assert!(
+            !all.agrees(&judged(0.2, 0.08), 0.1),
+            "they differ by 4.8 sigma"
+        );
+        // they agree, and there is nothing in either
+        assert!(!judged(0.2, 0.05).agrees(&judged(0.2, 0.08), 0.1));
+        assert!(all.agrees(&UNSEEN, 0.1), "nothing to hold it against");
+    }
 }

@@ -1,0 +1,264 @@
+//! Which causes may be named: the search, and what speaks against its outcome.
+//!
+//! What the search chose is refused where it stands in for a cause that is in no catalogue:
+//!
+//! - a description by variables explains the same and more ([`crate::stand_ins`]),
+//! - or an effect is not the same wherever it acts ([`crate::invariance`]).
+//!
+//! What refused an effect is kept in every fit from then on, described but not named, and
+//! the search is made anew: what is named has to stand beside it.
+//!
+//! Not physics: the order of the steps.
+
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
+use effects::Candidate;
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+
+use crate::commonness::{self, Slow};
+use crate::description::{Described, Kept};
+use crate::empirical::Empirical;
+use crate::error::CloseError;
+use crate::folds::Folds;
+use crate::invariance::{Change, Changing, Inner, Way, changing};
+use crate::noise_effects;
+use crate::search::{Found, borrowed, family, fit};
+use crate::selection::columns_of;
+use crate::stand_ins::{BY_FAR, Part, describe, stand_ins};
+use crate::star_evidence::StarEvidence;
+use crate::star_search::{Searched, attempt, declared_noise};
+
+/// Searches whose outcome is refused before one is taken as it is.
+const MOST_REFUSALS: usize = 10;
+/// Chance beyond which an effect is doubted beside slow noise of the stars.
+const DOUBT: f64 = 1e-4;
+/// Slow: over this share of the span.
+const SLOW_SHARE: f64 = 0.2;
+
+/// What is looked for.
+pub(crate) struct Quest<'a> {
+    /// Effects that may be named.
+    pub(crate) candidates: &'a dyn Fn() -> Vec<Box<dyn Candidate>>,
+    /// Terms that describe.
+    pub(crate) terms: &'a dyn Fn() -> Vec<Empirical>,
+    /// What effects may change with.
+    pub(crate) ways: &'a [Way],
+}
+
+/// What may be named, and what is left beside it.
+pub(crate) struct Named<'a> {
+    pub(crate) searched: Searched<'a>,
+    pub(crate) described: Described,
+    /// What is left of the stars themselves, and slow.
+    pub(crate) slow: Option<Slow>,
+}
+
+/// The slow error that was found, if it is not the reference's.
+fn slow_of_stars(level: &StarEvidence<'_>, searched: &Searched<'_>) -> Option<Slow> {
+    let wander = searched.wander.as_ref()?;
+    let axes = wander.axes();
+    let residual = noise_effects::in_sample(level, &searched.found)?;
+    let claimed = (0..3).filter(|&a| axes[a]);
+    let tau_s = claimed
+        .map(|a| wander.noise.reference[a].tau_s)
+        .fold(0.0, f64::max);
+    let slow = commonness::slow(level.data, &residual, axes, tau_s)?;
+    Some(slow).filter(Slow::is_of_the_stars)
+}
+
+/// Runs searches until nothing speaks against the outcome.
+pub(crate) fn run<'a>(
+    white: &StarEvidence<'a>,
+    folds: &Folds,
+    quest: &Quest<'_>,
+) -> Result<Named<'a>, CloseError> {
+    let alone = white.data.free_attitude || white.residuals.len() != 1;
+    let mut start = if alone {
+        None
+    } else {
+        declared_noise(white, folds)?
+    };
+    let mut refused: BTreeSet<String> = BTreeSet::new();
+    let mut kept: Vec<Arc<dyn Candidate>> = Vec::new();
+    for round in 0.. {
+        let beside = white.keeping(&kept);
+        let may: Vec<bool> = (quest.candidates)()
+            .iter()
+            .map(|c| !refused.contains(&family(c.as_ref())))
+            .collect();
+        let (mut searched, wander) = attempt(&beside, folds, quest.candidates, &may, start)?;
+        let last = round == MOST_REFUSALS;
+        if !wander.is_empty() && !last {
+            let all = &searched.found.candidates;
+            refused.extend(wander.into_iter().map(|g| family(all[g].as_ref())));
+            continue;
+        }
+        let level = searched.evidence.as_ref().unwrap_or(&beside);
+        if slow_of_stars(level, &searched).is_some() {
+            start = None;
+            continue;
+        }
+        let described = Described::new(level, folds, &searched.found, (quest.terms)(), quest.ways)?;
+        if let Some(wander) = searched.wander.as_ref().filter(|_| !last) {
+            let plain = Described::new(&beside, folds, &searched.found, (quest.terms)(), &[])?;
+            let axes = wander.axes().iter().filter(|a| **a).count();
+            if let Some(instead) = in_place_of_wander(&described, &plain, axes) {
+                kept.extend(whole(&(quest.terms)(), instead));
+                continue;
+            }
+        }
+        let slow = slow_left(level, &searched);
+        if let Some(slow) = slow.filter(|_| !last) {
+            let doubtful = doubtful(&described, &searched.found, slow.inflation(), &may);
+            if !doubtful.is_empty() {
+                refused.extend(doubtful);
+                continue;
+            }
+        }
+        if !last {
+            if let Some((set, instead)) = stand_ins(&described) {
+                let chosen = &searched.found.selection.chosen;
+                refused.extend(
+                    set.iter()
+                        .map(|&k| family(searched.found.candidates[chosen[k]].as_ref())),
+                );
+                kept.extend(whole(&(quest.terms)(), instead));
+                continue;
+            }
+            if let Some(change) = changing(&described) {
+                let g = searched.found.selection.chosen[change.chosen];
+                refused.insert(family(searched.found.candidates[g].as_ref()));
+                kept.extend(keep(&mut searched.found, g, change));
+                continue;
+            }
+            // what is named has to stand beside what is left
+            let named = !described.chosen.is_empty() || searched.wander.is_some();
+            let set = columns_of(&described.fitted.groups, &described.chosen);
+            if named && let Some((_, left)) = describe(&described, &set) {
+                kept.extend(whole(&(quest.terms)(), left));
+                continue;
+            }
+        }
+        if last {
+            // nothing that is still spoken against is named
+            let chosen = searched.found.selection.chosen.clone();
+            let spoken = stand_ins(&described).map(|(set, _)| set);
+            let changes = changing(&described).map(|c| vec![c.chosen]);
+            for k in spoken.or(changes).unwrap_or_default() {
+                searched.found.selection.chosen.retain(|g| *g != chosen[k]);
+            }
+        }
+        if kept.is_empty() && !last {
+            return Ok(Named {
+                searched,
+                described,
+                slow,
+            });
+        }
+        // without what is only described
+        let Searched {
+            found,
+            evidence,
+            wander,
+        } = searched;
+        let evidence = evidence.map(|e| e.keeping(&[]));
+        let level = evidence.as_ref().unwrap_or(white);
+        let fitted = fit(level, folds, &borrowed(&found.candidates))?;
+        let found = Found { fitted, ..found };
+        let described = Described::new(level, folds, &found, (quest.terms)(), quest.ways)?;
+        // how an effect changes may be among what is described
+        if let Some(change) = changing(&described).filter(|_| !last) {
+            let mut found = found;
+            let g = found.selection.chosen[change.chosen];
+            refused.insert(family(found.candidates[g].as_ref()));
+            kept.extend(keep(&mut found, g, change));
+            continue;
+        }
+        let searched = Searched {
+            found,
+            evidence: evidence.clone(),
+            wander,
+        };
+        return Ok(Named {
+            slow: slow_left(level, &searched),
+            described,
+            searched,
+        });
+    }
+    Err(CloseError::Singular)
+}
+
+/// Terms for every fit from now on: whatever bends as well; of many stars only those that
+/// are meant.
+fn whole(terms: &[Empirical], parts: Vec<Part>) -> Vec<Arc<dyn Candidate>> {
+    let mut kept: Vec<Arc<dyn Candidate>> = Vec::new();
+    for (term, part) in parts {
+        let term = &terms[term];
+        let all: Vec<usize> = (0..term.coefficients().len()).collect();
+        let columns = if term.is_of_many() { part } else { all };
+        kept.push(Arc::new(Kept::new(Arc::new(term.clone()), columns)));
+    }
+    kept
+}
+
+/// What the stars follow, where that beats a slow error of the reference about `axes` axes:
+/// `coloured` is beside it, `plain` under white noise.
+fn in_place_of_wander(coloured: &Described, plain: &Described, axes: usize) -> Option<Vec<Part>> {
+    let set = columns_of(&plain.fitted.groups, &plain.chosen);
+    let (worth, parts) = describe(plain, &set)?;
+    let set = columns_of(&coloured.fitted.groups, &coloured.chosen);
+    let with = coloured.fitted.fits.out_of_fold(&set)?.total_loglik() + coloured.fitted.log_scale;
+    // a size and a time each
+    let paid = axes as f64 * plain.fitted.scalars.max(2.0).ln();
+    (worth > with - paid + BY_FAR).then_some(parts)
+}
+
+/// Slow noise that is left of the stars themselves.
+fn slow_left(level: &StarEvidence<'_>, searched: &Searched<'_>) -> Option<Slow> {
+    let residual = noise_effects::in_sample(level, &searched.found)?;
+    let span = level.data.frames.t_s.last()? - level.data.frames.t_s.first()?;
+    commonness::slow(level.data, &residual, [true; 3], SLOW_SHARE * span)
+}
+
+/// Families of chosen effects that slow noise of the stars makes as well.
+fn doubtful(described: &Described, found: &Found, inflation: f64, may: &[bool]) -> Vec<String> {
+    let set = columns_of(&described.fitted.groups, &described.chosen);
+    let Some(estimate) = described.fitted.fits.estimate(&set) else {
+        return Vec::new();
+    };
+    let tried = may.iter().filter(|m| **m).count() as f64;
+    let mut first = 0;
+    let mut doubtful = Vec::new();
+    for (&g, &k) in found.selection.chosen.iter().zip(&described.chosen) {
+        let own: Vec<usize> = (first..first + described.fitted.groups[k].columns.len()).collect();
+        first += own.len();
+        let square = estimate.square(&own).unwrap_or(0.0) / inflation;
+        let law = ChiSquared::new(own.len().max(1) as f64);
+        let p = law.map_or(1.0, |law| law.sf(square)) * tried;
+        if inflation > 1.0 && p > DOUBT {
+            doubtful.push(family(found.candidates[g].as_ref()));
+        }
+    }
+    doubtful
+}
+
+/// The effect and its change, for every fit from now on.
+fn keep(found: &mut Found, g: usize, change: Change) -> Vec<Arc<dyn Candidate>> {
+    let first: usize = found.candidates[..g]
+        .iter()
+        .map(|c| c.coefficients().len())
+        .sum();
+    let columns: Vec<usize> = found.fitted.groups[g]
+        .columns
+        .iter()
+        .map(|c| c - first)
+        .collect();
+    let effect: Arc<dyn Candidate> = Arc::from(found.candidates.swap_remove(g));
+    let mut values = vec![0.0; effect.coefficients().len()];
+    for (&column, value) in columns.iter().zip(&change.values) {
+        values[column] = *value;
+    }
+    let own = Changing::new(Inner::Own(Arc::clone(&effect)), &values, change.way);
+    vec![Arc::new(Kept::new(effect, columns)), Arc::new(own)]
+}

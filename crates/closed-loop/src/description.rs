@@ -1,0 +1,388 @@
+//! What is left beside the effects that were chosen, described.
+//!
+//! One pass over the stars holds the chosen effects, what each would be if it changed
+//! with something ([`crate::invariance`]), and every term of one variable or of two
+//! ([`crate::empirical`]). Whether an effect stands in for another cause, whether it is
+//! the same everywhere, and what the leftover follows are then algebra.
+//!
+//! Not physics: which columns stand beside which.
+
+use effects::{AttitudeRows, Candidate, Coefficient, Effect, EffectError, StarRows, Surroundings};
+use focal_plane::{Camera, PointsMut, VectorsMut};
+use std::sync::Arc;
+
+use crate::attitude_loop::channels_of_interest;
+use crate::empirical::{Empirical, Variable};
+use crate::error::CloseError;
+use crate::figures;
+use crate::folds::Folds;
+use crate::invariance::{Changing, Inner, Way};
+use crate::search::{Fitted, Found, borrowed, fit};
+use crate::selection::{columns_of, judged, price};
+use crate::situation::Situation;
+use crate::star_data::StarData;
+use crate::star_evidence::StarEvidence;
+use telemetry::report::Unattributed;
+
+/// Stars beyond which none has a term of its own.
+const MOST_STARS: usize = 64;
+/// Stars beyond which an effect is not tried with a size for each.
+const MOST_OF_OWN_SIZE: usize = 24;
+/// Channels beyond which none is paired with another variable: all pairs are paid for.
+const MOST_CHANNELS: usize = 6;
+
+/// A term, and where its columns stand.
+#[derive(Debug)]
+pub(crate) struct Term {
+    pub(crate) term: Empirical,
+    /// Its first column.
+    pub(crate) first: usize,
+    /// Parts by which it is judged, as columns; those that the data cannot show are left out.
+    pub(crate) parts: Vec<Vec<usize>>,
+}
+
+/// See the module.
+#[derive(Debug)]
+pub(crate) struct Described {
+    pub(crate) fitted: Fitted,
+    /// The chosen effects are the first groups.
+    pub(crate) chosen: Vec<usize>,
+    pub(crate) terms: Vec<Term>,
+    /// Of each chosen effect, how it may change and the columns of that change.
+    pub(crate) changes: Vec<Vec<(Way, Vec<usize>)>>,
+    /// Ids of the chosen effects.
+    pub(crate) names: Vec<&'static str>,
+    /// Prices of the chosen effects, nats.
+    pub(crate) paid: Vec<f64>,
+}
+
+impl Described {
+    /// The pass; `found` is what was chosen under `evidence`.
+    pub(crate) fn new(
+        evidence: &StarEvidence<'_>,
+        folds: &Folds,
+        found: &Found,
+        terms: Vec<Empirical>,
+        ways: &[Way],
+    ) -> Result<Self, CloseError> {
+        let chosen = &found.selection.chosen;
+        let estimate = found
+            .fitted
+            .fits
+            .estimate(&columns_of(&found.fitted.groups, chosen));
+        let only = found.only(chosen);
+        let mut changing = Vec::new();
+        if let Some(estimate) = estimate {
+            let values = only.spread(&estimate.value);
+            let mut first = 0;
+            for (k, candidate) in only.candidates.iter().enumerate() {
+                let end = first + candidate.coefficients().len();
+                let own = &values.as_slice()[first..end];
+                first = end;
+                for way in ways {
+                    changing.push((
+                        k,
+                        way.clone(),
+                        Changing::new(Inner::Lent(*candidate), own, way.clone()),
+                    ));
+                }
+            }
+        }
+        let mut all: Vec<&dyn Candidate> = only.candidates.clone();
+        all.extend(changing.iter().map(|(_, _, c)| c as &dyn Candidate));
+        all.extend(terms.iter().map(|t| t as &dyn Candidate));
+        let fitted = fit(evidence, folds, &all)?;
+        let n = chosen.len();
+        let names = only.candidates.iter().map(|c| c.id()).collect();
+        let paid = fitted.groups[..n]
+            .iter()
+            .map(|g| price(g, fitted.scalars))
+            .collect();
+        let mut changes = vec![Vec::new(); n];
+        for (at, (k, way, _)) in changing.iter().enumerate() {
+            let columns = fitted.groups[n + at].columns.clone();
+            if !columns.is_empty() {
+                changes[*k].push((way.clone(), columns));
+            }
+        }
+        let mut first: usize = all[..n + changing.len()]
+            .iter()
+            .map(|c| c.coefficients().len())
+            .sum();
+        let groups = &fitted.groups[n + changing.len()..];
+        let terms = terms
+            .into_iter()
+            .zip(groups)
+            .map(|(term, group)| {
+                let mut parts: Vec<Vec<usize>> = Vec::new();
+                for part in term.parts() {
+                    let part: Vec<usize> = part
+                        .into_iter()
+                        .map(|k| first + k)
+                        .filter(|c| group.columns.contains(c))
+                        .collect();
+                    if !part.is_empty() && !parts.contains(&part) {
+                        parts.push(part);
+                    }
+                }
+                let own = first;
+                first += term.coefficients().len();
+                Term {
+                    term,
+                    first: own,
+                    parts,
+                }
+            })
+            .collect();
+        Ok(Self {
+            fitted,
+            chosen: (0..n).collect(),
+            terms,
+            changes,
+            names,
+            paid,
+        })
+    }
+}
+
+impl Described {
+    /// What the leftover follows; `left` is the share of the before variance that is left.
+    pub(crate) fn follows(&self, left: f64) -> Unattributed {
+        let set = columns_of(&self.fitted.groups, &self.chosen);
+        let terms: Vec<_> = self
+            .terms
+            .iter()
+            .map(|t| (t.term.name(), t.parts.clone()))
+            .collect();
+        let tried = terms.len();
+        figures::follows(&self.fitted.fits, &set, &terms, tried, left)
+    }
+}
+
+/// The term that `left` follows most, of those that a model can declare, as a candidate
+/// behind those of `found`.
+pub(crate) fn offer(
+    evidence: &StarEvidence<'_>,
+    folds: &Folds,
+    found: &mut Found,
+    left: &Unattributed,
+    terms: Vec<Empirical>,
+    surroundings: &Surroundings<'_>,
+) -> Result<(), CloseError> {
+    let certain = left.depends_on.iter().filter(|d| figures::certain(d));
+    let Some(term) = certain
+        .filter_map(|d| terms.iter().find(|t| t.name() == d.variable))
+        .find(|t| t.is_declarable(surroundings))
+    else {
+        return Ok(());
+    };
+    found.candidates.push(Box::new(term.clone()));
+    found.fitted = fit(evidence, folds, &borrowed(&found.candidates))?;
+    let (fitted, chosen) = (&found.fitted, &found.selection.chosen);
+    let mut all = judged(&fitted.fits, &fitted.groups, chosen, terms.len());
+    found.selection.judged.extend(all.pop());
+    Ok(())
+}
+
+/// What an effect may change with.
+pub(crate) fn ways(situation: &Situation<'_>, data: &StarData) -> Vec<Way> {
+    let range = |values: &[f64]| {
+        let finite = values.iter().copied().filter(|v| v.is_finite());
+        finite.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| {
+            [low.min(v), high.max(v)]
+        })
+    };
+    let [vx, vy] = &data.velocity;
+    let rate: Vec<f64> = vx.iter().zip(vy).map(|(x, y)| x.hypot(*y)).collect();
+    let mut ways = vec![
+        Way::With(Variable::Time, range(&data.t_s)),
+        Way::With(Variable::Rate, range(&rate)),
+        Way::With(Variable::Magnitude, range(&data.mag)),
+        Way::With(Variable::Colour, range(&data.bv)),
+        Way::With(Variable::Position(0), range(&data.modelled[0])),
+        Way::With(Variable::Position(1), range(&data.modelled[1])),
+    ];
+    for (name, series) in channels_of_interest(&situation.channels) {
+        let known = range(series.value());
+        ways.push(Way::With(
+            Variable::Housekeeping(name, series.clone()),
+            known,
+        ));
+    }
+    ways.retain(|w| match w {
+        Way::With(_, [low, high]) => high > low,
+        Way::Star(_) => true,
+    });
+    if data.stars.len() <= MOST_OF_OWN_SIZE {
+        ways.push(Way::Star(data.stars.iter().map(|s| s.id).collect()));
+    }
+    ways
+}
+
+/// Every variable that the bundle gives values of, and the pairs that matter.
+pub(crate) fn terms(situation: &Situation<'_>, data: &StarData) -> Vec<Empirical> {
+    let range = |series: &[&[f64]]| {
+        series
+            .iter()
+            .flat_map(|s| s.iter())
+            .filter(|v| v.is_finite())
+            .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], &v| {
+                [low.min(v), high.max(v)]
+            })
+    };
+    let largest = |series: &[Vec<f64>; 2]| {
+        let [low, high] = range(&[&series[0], &series[1]]);
+        let size = low.abs().max(high.abs());
+        [-size, size]
+    };
+    let off: Vec<f64> = (0..2)
+        .flat_map(|a| {
+            let (at, window) = (&data.modelled[a], &data.window_px[a]);
+            at.iter().zip(window).map(|(p, w)| p - w)
+        })
+        .collect();
+    let position = [0, 1].map(|a| (Variable::Position(a), range(&[&data.modelled[a]])));
+    let phase = [0, 1].map(|a| (Variable::Phase(a), [0.0, 1.0]));
+    let time = (Variable::Time, range(&[&data.t_s]));
+    let rate = (Variable::Rate, largest(&data.velocity));
+    let mag = (Variable::Magnitude, range(&[&data.mag]));
+    let colour = (Variable::Colour, range(&[&data.bv]));
+    let channels: Vec<_> = channels_of_interest(&situation.channels)
+        .map(|(name, series)| {
+            let known = range(&[series.value()]);
+            (Variable::Housekeeping(name, series.clone()), known)
+        })
+        .collect();
+    let mut terms = Vec::new();
+    let one =
+        |(variable, range): &(Variable, [f64; 2])| Empirical::new(variable.clone(), *range, true);
+    let two = |of: &(Variable, [f64; 2]), by: &(Variable, [f64; 2])| {
+        Empirical::pair(of.0.clone(), of.1, by.0.clone(), by.1)
+    };
+    for axis in 0..2 {
+        terms.extend(one(&position[axis]));
+        terms.extend(one(&phase[axis]));
+    }
+    for single in [&time, &rate, &mag, &colour] {
+        terms.extend(one(single));
+    }
+    terms.extend(one(&(Variable::Acceleration, largest(&data.acceleration))));
+    if mag.1[0] >= mag.1[1] || !mag.1[0].is_finite() {
+        // no magnitudes
+        terms.extend(one(&(Variable::Flux, range(&[&data.log_flux]))));
+    }
+    terms.extend(one(&(Variable::Window, range(&[&off]))));
+    terms.extend(channels.iter().filter_map(one));
+    let few = !data.free_directions && data.stars.len() <= MOST_STARS;
+    let ids: Vec<i64> = data.stars.iter().map(|s| s.id).collect();
+    if few {
+        let star = (Variable::Star(ids), [0.0, 1.0]);
+        terms.extend(one(&star));
+        terms.extend(two(&star, &time));
+        if let Some(slots) = own_slots(data) {
+            terms.extend(one(&(Variable::Slot(slots), [0.0, 1.0])));
+        }
+    }
+    let mut scalars = vec![&time, &mag, &colour];
+    if channels.len() <= MOST_CHANNELS {
+        scalars.extend(&channels);
+    }
+    for by in &scalars {
+        for of in position.iter().chain(&phase) {
+            terms.extend(two(of, by));
+        }
+    }
+    for by in position.iter().chain([&time, &mag, &colour]) {
+        terms.extend(two(&rate, by));
+    }
+    for of in [&mag, &colour] {
+        terms.extend(
+            scalars
+                .iter()
+                .filter(|by| !matches!(by.0, Variable::Magnitude | Variable::Colour))
+                .filter_map(|by| two(of, by)),
+        );
+    }
+    terms
+}
+
+/// The slots, where they are not just the stars under another name.
+fn own_slots(data: &StarData) -> Option<Vec<i32>> {
+    let mut pairs: Vec<(i32, i64)> = data
+        .frames
+        .slot
+        .iter()
+        .copied()
+        .zip(data.frames.star_id.iter().copied())
+        .collect();
+    pairs.sort_unstable();
+    pairs.dedup();
+    let mut slots: Vec<i32> = pairs.iter().map(|p| p.0).collect();
+    slots.dedup();
+    let moved = pairs.len() > slots.len() || pairs.len() > data.stars.len();
+    (moved && slots.len() <= MOST_STARS).then_some(slots)
+}
+
+/// Some of the columns of a candidate, kept in every fit: described, but not named.
+#[derive(Clone, Debug)]
+pub(crate) struct Kept {
+    inner: Arc<dyn Candidate>,
+    columns: Vec<usize>,
+    coefficients: Vec<Coefficient>,
+}
+
+impl Kept {
+    pub(crate) fn new(inner: Arc<dyn Candidate>, columns: Vec<usize>) -> Self {
+        let coefficients = columns
+            .iter()
+            .map(|&c| inner.coefficients()[c].clone())
+            .collect();
+        Self {
+            inner,
+            columns,
+            coefficients,
+        }
+    }
+}
+
+impl Candidate for Kept {
+    fn id(&self) -> &'static str {
+        self.inner.id()
+    }
+    fn coefficients(&self) -> &[Coefficient] {
+        &self.coefficients
+    }
+    fn acts_on_stars(&self) -> bool {
+        true
+    }
+    fn acts_on_attitude(&self) -> bool {
+        false
+    }
+    fn star_columns(&self, camera: &Camera, rows: &StarRows<'_>, out: PointsMut<'_>) -> bool {
+        let n = rows.len();
+        let all = n * self.inner.coefficients().len();
+        let (mut x, mut y) = (vec![0.0; all], vec![0.0; all]);
+        let inner = PointsMut {
+            x: &mut x,
+            y: &mut y,
+        };
+        if !self.inner.star_columns(camera, rows, inner) {
+            return false;
+        }
+        for (to, &from) in self.columns.iter().enumerate() {
+            out.x[to * n..(to + 1) * n].copy_from_slice(&x[from * n..(from + 1) * n]);
+            out.y[to * n..(to + 1) * n].copy_from_slice(&y[from * n..(from + 1) * n]);
+        }
+        true
+    }
+    fn attitude_columns(&self, _: &AttitudeRows<'_>, _: VectorsMut<'_>) -> bool {
+        false
+    }
+    fn realise(
+        &self,
+        values: &[f64],
+        surroundings: &Surroundings<'_>,
+    ) -> Result<Box<dyn Effect>, EffectError> {
+        self.inner.realise(values, surroundings)
+    }
+}

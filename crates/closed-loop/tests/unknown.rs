@@ -1,0 +1,165 @@
+//! Causes that no effect of the catalogue has: what is left is told, and no effect is named. Beside each,
+//! the effect that it could be taken for: that one is named.
+#![expect(clippy::unwrap_used, reason = "helpers of tests")]
+
+use closed_loop::close;
+use focal_plane::StarFrames;
+use scenarios::{Scenario, simulate};
+use telemetry::report::{Report, Verdict};
+
+/// Stars drift over three pixels against a reference without error.
+fn scenario() -> Scenario {
+    let text = r#"
+format = "boresight-model/1"
+kind = "pbm"
+[tracker]
+pixels = [1024, 1024]
+fov_deg = [20.0, 20.0]
+max_stars = 14
+[noise]
+temporal_arcsec = 2.0
+[motion]
+kind = "hold"
+drift_arcsec_s = [0.35, -0.27, 0.02]
+[sky]
+kind = "generated"
+[reference]
+[run]
+duration_s = 600.0
+rate_hz = 2.0
+tables = ["stars", "catalog"]
+"#;
+    Scenario::parse(text, "unknown.toml").unwrap()
+}
+
+/// A number of mean 0 and variance 1 from its place: the sum of twelve uniform ones.
+fn noise(place: usize) -> f64 {
+    let mut state = (place as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ 0x1234_5678;
+    let mut sum = -6.0;
+    for _ in 0..12 {
+        state ^= state << 13;
+        state ^= state >> 7;
+        state ^= state << 17;
+        sum += (state >> 11) as f64 / (1_u64 << 53) as f64;
+    }
+    sum
+}
+
+/// The report on a bundle whose stars are shifted by `shift` (row, frame: x and y in arcsec).
+fn report_on(shift: impl Fn(&StarFrames, usize, usize) -> [f64; 2]) -> Report {
+    let scenario = scenario();
+    let mut bundle = simulate(&scenario).unwrap();
+    let scale = bundle.camera.clone().unwrap().arcsec_per_px();
+    let stars = bundle.stars.as_mut().unwrap();
+    let clean = stars.clone();
+    for k in 0..clean.frames() {
+        for row in clean.rows_of(k) {
+            let [dx, dy] = shift(&clean, row, k);
+            stars.x_px[row] += dx / scale[0];
+            stars.y_px[row] += dy / scale[1];
+        }
+    }
+    let model = scenario.model_without_effects();
+    close(&model, &bundle, &|_| ()).unwrap().report
+}
+
+fn named(report: &Report) -> Vec<&str> {
+    report.effects.iter().map(|e| e.id.as_str()).collect()
+}
+
+fn left(report: &Report) -> Vec<&str> {
+    let all = report.unattributed.depends_on.iter();
+    all.map(|d| d.variable.as_str()).collect()
+}
+
+/// The S-curve of a spot of `size` arcsec.
+fn s_curve(stars: &StarFrames, row: usize, size: f64) -> [f64; 2] {
+    let turn = std::f64::consts::TAU;
+    [stars.x_px[row], stars.y_px[row]].map(|p| size * (turn * p).sin())
+}
+
+/// 0.16 arcsec under 1.4 arcsec of noise an axis in 16 800 rows: 14 sigma, all of it constant.
+#[test]
+fn a_constant_s_curve_is_a_pixel_phase_error() {
+    let report = report_on(|stars, row, _| s_curve(stars, row, 0.16));
+    assert_eq!(named(&report), ["pixel_phase_harmonics"]);
+    assert_eq!(report.verdict, Verdict::Explained);
+}
+
+/// The same that grows from nothing: its mean is seen as well as above, its change at 8 sigma.
+#[test]
+fn an_s_curve_that_grows_is_none() {
+    let report = report_on(|stars, row, k| s_curve(stars, row, 0.32 * k as f64 / 1200.0));
+    assert_eq!(named(&report), [""; 0], "{report:?}");
+    assert_eq!(report.verdict, Verdict::Unexplained);
+    assert!(
+        left(&report)[0].starts_with("pixel_phase_"),
+        "{:?}",
+        left(&report)
+    );
+}
+
+/// One star moves away for half of the time: what it does at all times would be its catalogue position.
+#[test]
+fn a_star_that_moves_is_no_catalogue_error() {
+    let star = |moves: bool| {
+        report_on(move |stars, row, k| {
+            let acts = stars.slot[row] == 3 && (!moves || k >= 600);
+            [if acts { 1.2 } else { 0.0 }, 0.0]
+        })
+    };
+    let (moved, still) = (star(true), star(false));
+    assert_eq!(named(&still), ["catalogue_position"]);
+    assert_eq!(named(&moved), [""; 0]);
+    assert!(
+        left(&moved)
+            .iter()
+            .any(|v| ["time*star", "star"].contains(v)),
+        "{:?}",
+        left(&moved)
+    );
+}
+
+/// A walk with a memory of 40 frames of `size` arcsec; all stars take the same, or each its own.
+fn walks(own: bool, size: f64) -> Report {
+    let mut walk = vec![vec![[0.0; 2]; 1201]; 15];
+    let keep = (-1.0_f64 / 40.0).exp();
+    let step = size * (1.0 - keep * keep).sqrt();
+    for (star, path) in walk.iter_mut().enumerate() {
+        for k in 1..path.len() {
+            for axis in 0..2 {
+                let kick = noise(2 * (1300 * star + k) + axis);
+                path[k][axis] = keep * path[k - 1][axis] + step * kick;
+            }
+        }
+    }
+    report_on(|stars, row, k| {
+        let star = usize::try_from(stars.slot[row]).unwrap();
+        walk[if own { star } else { 0 }][k]
+    })
+}
+
+/// What all stars share is the reference's slow error; what each does by itself is not.
+#[test]
+fn stars_that_wander_by_themselves_are_no_reference_error() {
+    let common = walks(false, 0.5);
+    assert_eq!(named(&common), ["reference_error"]);
+    let own = walks(true, 0.7);
+    assert_eq!(named(&own), [""; 0], "{:?}", own.effects);
+    assert!(
+        own.unattributed.present && left(&own).contains(&"time*star"),
+        "{:?}",
+        left(&own)
+    );
+}
+
+/// A shear that grows: neither place nor time alone.
+#[test]
+fn what_two_variables_do_together() {
+    let report = report_on(|stars, row, k| {
+        let column = (stars.x_px[row] / 512.0).clamp(-1.0, 1.0);
+        [0.0, 0.35 * column * (k as f64 / 600.0 - 1.0)]
+    });
+    assert_eq!(named(&report), [""; 0]);
+    assert_eq!(left(&report)[0], "x_px*time", "{:?}", left(&report));
+}
