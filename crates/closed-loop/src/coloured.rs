@@ -377,6 +377,49 @@ mod tests {
         out
     }
 
+    /// The likelihood of a series is that of its whitened one less the logarithms of the weights, and
+    /// steps side by side are those whitened one by one: rounding alone.
+    #[test]
+    fn sums_are_those_of_the_whitened_series() {
+        let noise = Coloured {
+            white: 0.02,
+            slow: 0.05,
+            tau_s: 40.0,
+        };
+        let t_s: Vec<f64> = (0..3000).map(|k| 0.1 * f64::from(k)).collect();
+        let count: Vec<f64> = (0..3000).map(|k| f64::from(k % 5)).collect();
+        let y = series(&noise, &t_s, 12);
+        let whitened = |series: &[f64]| {
+            let mut out = series.to_vec();
+            noise.whiten(&t_s, &count, &mut [&mut out]);
+            out
+        };
+        let weights = noise.gains(&t_s, &count).into_iter().map(|g| g[2]);
+        let logs: f64 = weights
+            .filter(|w| *w > 0.0)
+            .map(|w| w.ln() - 0.5 * std::f64::consts::TAU.ln())
+            .sum();
+        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        let white = whitened(&y);
+        let direct = logs - 0.5 * dot(&white, &white);
+        let ours = noise.log_likelihood(&t_s, &y, &count);
+        assert!((ours / direct - 1.0).abs() < 1e-9, "{ours} {direct}");
+        let one = whitened(&vec![1.0; y.len()]);
+        let at: Vec<usize> = (5..2900).step_by(263).collect();
+        for (sums, &at) in noise
+            .steps(&t_s, &count, &at, [&one, &white])
+            .iter()
+            .zip(&at)
+        {
+            let step: Vec<f64> = (0..y.len()).map(|k| f64::from(u8::from(k >= at))).collect();
+            let step = whitened(&step);
+            let direct = [dot(&step, &step), dot(&step, &one), dot(&step, &white)];
+            for (a, b) in sums.iter().zip(direct) {
+                assert!((a - b).abs() < 1e-9 * direct[0], "{sums:?} {direct:?}");
+            }
+        }
+    }
+
     /// Whitened noise is N(0,1) and independent: the mean square over n rows has
     /// standard error sqrt(2/n), the lag-one product 1/sqrt(n).
     #[test]
