@@ -167,7 +167,7 @@ fn the_list_stays_sorted_and_keeps_what_explains_more() {
 fn waves_are_sines_and_cosines() {
     for i in -400..400 {
         let cycles = 0.013 * f64::from(i);
-        let (sin, cos) = (std::f64::consts::TAU * cycles).sin_cos();
+        let (sin, cos) = (TAU * cycles).sin_cos();
         let [c, s] = super::wave(cycles);
         assert!(
             (c - cos).abs() < 1e-11 && (s - sin).abs() < 1e-11,
