@@ -29,9 +29,13 @@ const QUIETEST: f64 = 0.1;
 /// Median of |x| for unit variance.
 const MEDIAN_OF_NORMAL: f64 = 0.6745;
 
-/// Weight of every row; all alike where the noise cannot be told.
+/// Weight of every row; all alike where the noise cannot be told from frame to frame.
 pub(crate) fn of(data: &StarData) -> Vec<f64> {
     let rows = data.t_s.len();
+    // pictures of other places have other errors in common
+    if data.frames_are_unrelated() {
+        return vec![1.0; rows];
+    }
     let changes = changes(data);
     let scale = |values: &mut Vec<f64>| {
         let median = robust::median(values)?;
