@@ -34,6 +34,8 @@ const BEYOND_DOUBT: f64 = 3.5;
 const SHARE: f64 = 1.0 / 8.0;
 /// Longest lag, frames.
 const MOST_LAGS: usize = 100;
+/// Products of which a sum is nearly Gaussian.
+const LEAST_PRODUCTS: f64 = 300.0;
 /// Sums of products have wider tails than a Gaussian.
 const WIDER: f64 = 1.3;
 
@@ -187,14 +189,14 @@ pub(crate) fn slow(
         }
         of_stars += products * freedom[k] / rows.len().max(1) as f64;
     }
-    (of_rotation > 0.0 && of_stars > 0.0).then(|| Slow {
+    (of_rotation > 0.0 && of_stars >= LEAST_PRODUCTS).then(|| Slow {
         rotation: rotation / of_rotation,
         stars: stars / of_stars,
         sigma: of_stars.sqrt().recip(),
         lags,
         star: own
             .iter()
-            .filter(|[_, n]| *n > 0.0)
+            .filter(|[_, n]| *n >= LEAST_PRODUCTS)
             .map(|[sum, n]| sum / n.sqrt())
             .fold(0.0, f64::max),
         count: data.stars.len(),
