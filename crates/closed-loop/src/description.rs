@@ -28,6 +28,9 @@ use telemetry::report::Unattributed;
 const MOST_STARS: usize = 64;
 /// Stars beyond which an effect is not tried with a size for each.
 const MOST_OF_OWN_SIZE: usize = 24;
+/// Rows beyond which blocks are this many times as long.
+const MANY_ROWS: usize = 300_000;
+const FEWER: usize = 3;
 /// Channels beyond which none is paired with another variable: all pairs are paid for.
 const MOST_CHANNELS: usize = 6;
 
@@ -91,7 +94,12 @@ impl Described {
         let mut all: Vec<&dyn Candidate> = only.candidates.clone();
         all.extend(changing.iter().map(|(_, _, c)| c as &dyn Candidate));
         all.extend(terms.iter().map(|t| t as &dyn Candidate));
-        let fitted = fit(evidence, folds, &all)?;
+        // products of hundreds of columns a block: in long runs, of fewer blocks
+        let fitted = if evidence.data.t_s.len() > MANY_ROWS {
+            fit(evidence, &folds.coarser(FEWER), &all)?
+        } else {
+            fit(evidence, folds, &all)?
+        };
         let n = chosen.len();
         let names = only.candidates.iter().map(|c| c.id()).collect();
         let paid = fitted.groups[..n]

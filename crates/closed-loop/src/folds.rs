@@ -67,6 +67,30 @@ impl Folds {
         }
     }
 
+    /// The same folds in blocks `times` as long.
+    pub(crate) fn coarser(&self, times: usize) -> Self {
+        let mut out = Self {
+            blocks: Vec::new(),
+            fold_of_block: Vec::new(),
+            ..*self
+        };
+        let mut joined = 0;
+        for (block, &fold) in self.blocks.iter().zip(&self.fold_of_block) {
+            match out.blocks.last_mut() {
+                Some(last) if joined < times && out.fold_of_block.last() == Some(&fold) => {
+                    last.end = block.end;
+                    joined += 1;
+                }
+                _ => {
+                    out.blocks.push(block.clone());
+                    out.fold_of_block.push(fold);
+                    joined = 1;
+                }
+            }
+        }
+        out
+    }
+
     /// The frames of each fold.
     pub(crate) fn fold_ranges(&self) -> Vec<Range<usize>> {
         (0..self.count)
@@ -125,6 +149,17 @@ mod tests {
             assert_eq!(folds.count, if frames < 10 { frames } else { 5 });
             assert_eq!(*fold.last().unwrap() + 1, folds.count);
         }
+    }
+
+    #[test]
+    fn coarser_blocks_stay_within_their_folds() {
+        let folds = Folds::cut(100_003);
+        let coarse = folds.coarser(5);
+        assert_eq!(coarse.fold_ranges(), folds.fold_ranges());
+        // twelve to a fold: 5, 5 and 2
+        assert_eq!((folds.blocks.len(), coarse.blocks.len()), (60, 15));
+        assert_eq!(coarse.blocks[0].end, folds.blocks[4].end);
+        assert!(coarse.blocks.windows(2).all(|w| w[0].end == w[1].start));
     }
 
     #[test]
