@@ -3,7 +3,8 @@
 //! What the search chose is refused where it stands in for a cause that is in no catalogue:
 //!
 //! - a description by variables explains the same and more ([`crate::stand_ins`]),
-//! - or an effect is not the same wherever it acts ([`crate::invariance`]).
+//! - or an effect is not the same wherever it acts ([`crate::invariance`]),
+//! - or more stars are misplaced than a catalogue has: something moves them all.
 //!
 //! What refused an effect is kept in every fit from then on, described but not named, and
 //! the search is made anew: what is named has to stand beside it.
@@ -33,6 +34,10 @@ use crate::star_search::{Searched, attempt, declared_noise};
 const MOST_REFUSALS: usize = 10;
 /// Chance beyond which an effect is doubted beside slow noise of the stars.
 const DOUBT: f64 = 1e-4;
+/// The effect on a single star, and of how many at least it is believed: double stars and
+/// wrong motions are one in some hundred, so that three among a dozen share another cause.
+const MISPLACED: &str = "catalogue_position";
+const MOST_MISPLACED: usize = 2;
 /// Slow: over this share of the span.
 const SLOW_SHARE: f64 = 0.2;
 
@@ -92,6 +97,11 @@ pub(crate) fn run<'a>(
         if !wander.is_empty() && !last {
             let all = &searched.found.candidates;
             refused.extend(wander.into_iter().map(|g| family(all[g].as_ref())));
+            continue;
+        }
+        let pile = pile(&searched.found, white.data.stars.len());
+        if !pile.is_empty() && !last {
+            refused.extend(pile);
             continue;
         }
         let level = searched.evidence.as_ref().unwrap_or(&beside);
@@ -187,6 +197,17 @@ pub(crate) fn run<'a>(
         });
     }
     Err(CloseError::Singular)
+}
+
+/// Families of misplaced stars, if more of `stars` are than a catalogue has.
+fn pile(found: &Found, stars: usize) -> Vec<String> {
+    let misplaced = |g: usize| found.candidates[g].id() == MISPLACED;
+    let chosen = &found.selection.chosen;
+    if chosen.iter().filter(|g| misplaced(**g)).count() <= MOST_MISPLACED.max(stars / 20) {
+        return Vec::new();
+    }
+    let all = (0..found.candidates.len()).filter(|&g| misplaced(g));
+    all.map(|g| family(found.candidates[g].as_ref())).collect()
 }
 
 /// Terms for every fit from now on: whatever bends as well; of many stars only those that
