@@ -206,19 +206,19 @@ pub(crate) fn claim(
     let Some(verdicts) = judge(&make, folds, level.motion.is_some(), outliers) else {
         return Ok(NoiseEffects::default());
     };
-    let quick = quick(data, residual);
-    let source = Source {
-        residual: &quick,
-        ..source
-    };
-    let make = |belief: &dyn Fn(&Row) -> [f64; 2]| source.rows(belief);
-    let fast = judge(&make, folds, level.motion.is_some(), outliers);
     let mut verdicts = verdicts;
-    if let Some(fast) = fast {
-        verdicts.magnitude.stands &= verdicts
-            .magnitude
-            .agrees(&fast.magnitude, SLOPE_AS_DECLARED);
-        verdicts.rate.stands &= verdicts.rate.agrees(&fast.rate, 0.0);
+    if verdicts.magnitude.stands || verdicts.rate.stands {
+        let quick = quick(data, residual);
+        let source = Source {
+            residual: &quick,
+            ..source
+        };
+        let make = |belief: &dyn Fn(&Row) -> [f64; 2]| source.rows(belief);
+        if let Some(fast) = judge(&make, folds, level.motion.is_some(), outliers) {
+            let magnitude = &fast.magnitude;
+            verdicts.magnitude.stands &= verdicts.magnitude.agrees(magnitude, SLOPE_AS_DECLARED);
+            verdicts.rate.stands &= verdicts.rate.agrees(&fast.rate, 0.0);
+        }
     }
     let mut out = NoiseEffects::default();
     out.add(MAGNITUDE, &[("slope", "")], &verdicts.magnitude);
