@@ -10,7 +10,7 @@ use crate::close::{Closed, Rival, catalogue_candidates};
 use crate::coloured::Coloured;
 use crate::confusion;
 use crate::declared;
-use crate::empirical::{Empirical, Variable};
+use crate::empirical::{Empirical, Variable, range};
 use crate::error::CloseError;
 use crate::evidence::{Amplitudes, Evidence, Residuals};
 use crate::figures;
@@ -98,7 +98,7 @@ pub(crate) fn run(
     }
     progress("figures");
     finish(
-        situation, &data, &folds, noise, motion, &found, before, after, rivals,
+        situation, &data, &folds, noise, motion, &found, before, after, rivals, changes,
     )
 }
 
@@ -235,24 +235,17 @@ fn scene<'a>(situation: &'a Situation<'_>, data: &AttitudeData) -> Scene<'a> {
 /// Time and every housekeeping channel but velocities, which belong to
 /// aberration alone.
 fn leftover_terms(situation: &Situation<'_>, data: &AttitudeData) -> Vec<Box<dyn Candidate>> {
-    let range = |values: &mut dyn Iterator<Item = f64>| {
-        values
-            .filter(|v| v.is_finite())
-            .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| {
-                [low.min(v), high.max(v)]
-            })
-    };
     let mut terms: Vec<Box<dyn Candidate>> = Vec::new();
     let mut add = |variable: Variable, range: [f64; 2]| {
         if let Some(term) = Empirical::new(variable, range, false) {
             terms.push(Box::new(term));
         }
     };
-    add(Variable::Time, range(&mut data.t_s.iter().copied()));
+    add(Variable::Time, range(data.t_s.iter().copied()));
     for (name, series) in channels_of_interest(&situation.channels) {
         add(
             Variable::Housekeeping(name, series.clone()),
-            range(&mut series.value().iter().copied()),
+            range(series.value().iter().copied()),
         );
     }
     terms
@@ -383,6 +376,7 @@ fn finish(
     before: Residuals,
     after: Residuals,
     rivals: Vec<Rival>,
+    changes: Option<SpatialErrors>,
 ) -> Result<Closed, CloseError> {
     let chosen = &found.selection.chosen;
     let evidence = evidence(data, situation, noise, motion);
@@ -436,7 +430,6 @@ fn finish(
     )?;
     let mut model = situation.model.clone();
     model.effects.extend(entries);
-    let changes = SpatialErrors::declared(situation, &data.t_s);
     if let Some(changes) = changes {
         let own: f64 = changes.slow_arcsec.iter().map(|s| s * s).sum();
         unattributed.present &= unattributed.variance_fraction.unwrap_or(0.0) * whole > own;

@@ -114,7 +114,7 @@ pub(crate) fn run<'a>(
             let plain = Described::new(&beside, folds, &searched.found, (quest.terms)(), &[])?;
             let axes = wander.axes().iter().filter(|a| **a).count();
             if let Some(instead) = in_place_of_wander(&described, &plain, axes) {
-                kept.extend(whole(&(quest.terms)(), instead));
+                kept.extend(whole(&plain, instead));
                 continue;
             }
         }
@@ -133,7 +133,7 @@ pub(crate) fn run<'a>(
                     set.iter()
                         .map(|&k| family(searched.found.candidates[chosen[k]].as_ref())),
                 );
-                kept.extend(whole(&(quest.terms)(), instead));
+                kept.extend(whole(&described, instead));
                 continue;
             }
             if let Some(change) = changing(&described) {
@@ -146,7 +146,7 @@ pub(crate) fn run<'a>(
             let named = !described.chosen.is_empty() || searched.wander.is_some();
             let set = columns_of(&described.fitted.groups, &described.chosen);
             if named && let Some((_, left)) = describe(&described, &set) {
-                kept.extend(whole(&(quest.terms)(), left));
+                kept.extend(whole(&described, left));
                 continue;
             }
         }
@@ -212,10 +212,10 @@ fn pile(found: &Found, stars: usize) -> Vec<String> {
 
 /// Terms for every fit from now on: whatever bends as well; of many stars only those that
 /// are meant.
-fn whole(terms: &[Empirical], parts: Vec<Part>) -> Vec<Arc<dyn Candidate>> {
+fn whole(described: &Described, parts: Vec<Part>) -> Vec<Arc<dyn Candidate>> {
     let mut kept: Vec<Arc<dyn Candidate>> = Vec::new();
     for (term, part) in parts {
-        let term = &terms[term];
+        let term = &described.terms[term].term;
         let all: Vec<usize> = (0..term.coefficients().len()).collect();
         let columns = if term.is_of_many() { part } else { all };
         kept.push(Arc::new(Kept::new(Arc::new(term.clone()), columns)));

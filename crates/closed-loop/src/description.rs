@@ -12,7 +12,7 @@ use focal_plane::{Camera, PointsMut, VectorsMut};
 use std::sync::Arc;
 
 use crate::attitude_loop::channels_of_interest;
-use crate::empirical::{Empirical, Variable};
+use crate::empirical::{Empirical, Variable, range};
 use crate::error::CloseError;
 use crate::figures;
 use crate::folds::Folds;
@@ -20,6 +20,7 @@ use crate::invariance::{Changing, Inner, Way};
 use crate::search::{Fitted, Found, borrowed, fit};
 use crate::selection::{columns_of, judged, price};
 use crate::situation::Situation;
+use crate::star_columns::star_columns_of;
 use crate::star_data::StarData;
 use crate::star_evidence::StarEvidence;
 use telemetry::report::Unattributed;
@@ -194,12 +195,7 @@ pub(crate) fn offer(
 
 /// What an effect may change with.
 pub(crate) fn ways(situation: &Situation<'_>, data: &StarData) -> Vec<Way> {
-    let range = |values: &[f64]| {
-        let finite = values.iter().copied().filter(|v| v.is_finite());
-        finite.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| {
-            [low.min(v), high.max(v)]
-        })
-    };
+    let range = |values: &[f64]| range(values.iter().copied());
     let [vx, vy] = &data.velocity;
     let rate: Vec<f64> = vx.iter().zip(vy).map(|(x, y)| x.hypot(*y)).collect();
     let mut ways = vec![
@@ -229,35 +225,27 @@ pub(crate) fn ways(situation: &Situation<'_>, data: &StarData) -> Vec<Way> {
 
 /// Every variable that the bundle gives values of, and the pairs that matter.
 pub(crate) fn terms(situation: &Situation<'_>, data: &StarData) -> Vec<Empirical> {
-    let range = |series: &[&[f64]]| {
-        series
-            .iter()
-            .flat_map(|s| s.iter())
-            .filter(|v| v.is_finite())
-            .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], &v| {
-                [low.min(v), high.max(v)]
-            })
-    };
     let largest = |series: &[Vec<f64>; 2]| {
-        let [low, high] = range(&[&series[0], &series[1]]);
+        let [low, high] = range(series.iter().flatten().copied());
         let size = low.abs().max(high.abs());
         [-size, size]
     };
+    let range = |values: &[f64]| range(values.iter().copied());
     let off: Vec<f64> = (0..2)
         .flat_map(|a| {
             let (at, window) = (&data.modelled[a], &data.window_px[a]);
             at.iter().zip(window).map(|(p, w)| p - w)
         })
         .collect();
-    let position = [0, 1].map(|a| (Variable::Position(a), range(&[&data.modelled[a]])));
+    let position = [0, 1].map(|a| (Variable::Position(a), range(&data.modelled[a])));
     let phase = [0, 1].map(|a| (Variable::Phase(a), [0.0, 1.0]));
-    let time = (Variable::Time, range(&[&data.t_s]));
+    let time = (Variable::Time, range(&data.t_s));
     let rate = (Variable::Rate, largest(&data.velocity));
-    let mag = (Variable::Magnitude, range(&[&data.mag]));
-    let colour = (Variable::Colour, range(&[&data.bv]));
+    let mag = (Variable::Magnitude, range(&data.mag));
+    let colour = (Variable::Colour, range(&data.bv));
     let channels: Vec<_> = channels_of_interest(&situation.channels)
         .map(|(name, series)| {
-            let known = range(&[series.value()]);
+            let known = range(series.value());
             (Variable::Housekeeping(name, series.clone()), known)
         })
         .collect();
@@ -277,9 +265,9 @@ pub(crate) fn terms(situation: &Situation<'_>, data: &StarData) -> Vec<Empirical
     terms.extend(one(&(Variable::Acceleration, largest(&data.acceleration))));
     if mag.1[0] >= mag.1[1] || !mag.1[0].is_finite() {
         // no magnitudes
-        terms.extend(one(&(Variable::Flux, range(&[&data.log_flux]))));
+        terms.extend(one(&(Variable::Flux, range(&data.log_flux))));
     }
-    terms.extend(one(&(Variable::Window, range(&[&off]))));
+    terms.extend(one(&(Variable::Window, range(&off))));
     terms.extend(channels.iter().filter_map(one));
     let few = !data.free_directions && data.stars.len() <= MOST_STARS;
     let ids: Vec<i64> = data.stars.iter().map(|s| s.id).collect();
@@ -368,15 +356,9 @@ impl Candidate for Kept {
     }
     fn star_columns(&self, camera: &Camera, rows: &StarRows<'_>, out: PointsMut<'_>) -> bool {
         let n = rows.len();
-        let all = n * self.inner.coefficients().len();
-        let (mut x, mut y) = (vec![0.0; all], vec![0.0; all]);
-        let inner = PointsMut {
-            x: &mut x,
-            y: &mut y,
-        };
-        if !self.inner.star_columns(camera, rows, inner) {
+        let Some([x, y]) = star_columns_of(self.inner.as_ref(), camera, rows) else {
             return false;
-        }
+        };
         for (to, &from) in self.columns.iter().enumerate() {
             out.x[to * n..(to + 1) * n].copy_from_slice(&x[from * n..(from + 1) * n]);
             out.y[to * n..(to + 1) * n].copy_from_slice(&y[from * n..(from + 1) * n]);

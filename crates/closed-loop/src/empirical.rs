@@ -253,6 +253,14 @@ impl Empirical {
     }
 }
 
+/// Least and largest of the values that are known.
+pub(crate) fn range(values: impl IntoIterator<Item = f64>) -> [f64; 2] {
+    let known = values.into_iter().filter(|v| v.is_finite());
+    known.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| {
+        [low.min(v), high.max(v)]
+    })
+}
+
 fn coefficients(count: usize) -> Vec<Coefficient> {
     (0..count)
         .map(|k| Coefficient::new(format!("c{k}"), "arcsec", f64::INFINITY))

@@ -26,6 +26,7 @@ use focal_plane::{Camera, PointsMut, VectorsMut};
 use crate::description::Described;
 use crate::empirical::Variable;
 use crate::selection::columns_of;
+use crate::star_columns::star_columns_of;
 
 /// Chance that any effect of a bundle is called changing although it is constant.
 const ALPHA: f64 = 0.003;
@@ -103,15 +104,9 @@ impl Candidate for Changing<'_> {
     }
     fn star_columns(&self, camera: &Camera, rows: &StarRows<'_>, out: PointsMut<'_>) -> bool {
         let n = rows.len();
-        let all = n * self.values.len();
-        let (mut x, mut y) = (vec![0.0; all], vec![0.0; all]);
-        let inner = PointsMut {
-            x: &mut x,
-            y: &mut y,
-        };
-        if !self.inner.get().star_columns(camera, rows, inner) {
+        let Some([x, y]) = star_columns_of(self.inner.get(), camera, rows) else {
             return false;
-        }
+        };
         out.x.fill(0.0);
         out.y.fill(0.0);
         for i in 0..n {

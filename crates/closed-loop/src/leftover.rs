@@ -322,11 +322,11 @@ impl Track {
             *self = left;
             let declared = self.changes.map_or(0.0, |(c, axis)| c.slow_arcsec[axis]);
             let rms = |k: usize| size[1 + 2 * k].hypot(size[2 + 2 * k]) / std::f64::consts::SQRT_2;
-            let mut k = 0;
-            found.retain(|_| {
-                k += 1;
-                rms(k - 1) > declared
-            });
+            let each = found.into_iter().enumerate();
+            found = each
+                .filter(|(k, _)| rms(*k) > declared)
+                .map(|(_, f)| f)
+                .collect();
         }
         found
     }

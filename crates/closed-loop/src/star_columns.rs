@@ -16,7 +16,7 @@
 use std::ops::Range;
 
 use effects::{AttitudeRows, Candidate, StarRows};
-use focal_plane::{ARCSEC_PER_RAD, AttitudeSource, PointsMut, VectorsMut};
+use focal_plane::{ARCSEC_PER_RAD, AttitudeSource, Camera, PointsMut, VectorsMut};
 use nalgebra::{DMatrix, DVector, Vector3};
 
 use crate::frame_rotation::rotation_row;
@@ -296,4 +296,19 @@ fn scale(values: &mut [f64], weight: f64) {
     } else {
         values.fill(0.0);
     }
+}
+
+/// The columns of `candidate` on stars, x and y; `None` where it does not act on these rows.
+pub(crate) fn star_columns_of(
+    candidate: &dyn Candidate,
+    camera: &Camera,
+    rows: &StarRows<'_>,
+) -> Option<[Vec<f64>; 2]> {
+    let all = rows.len() * candidate.coefficients().len();
+    let (mut x, mut y) = (vec![0.0; all], vec![0.0; all]);
+    let out = PointsMut {
+        x: &mut x,
+        y: &mut y,
+    };
+    candidate.star_columns(camera, rows, out).then_some([x, y])
 }
