@@ -280,6 +280,6 @@ fn keep(found: &mut Found, g: usize, change: Change) -> Vec<Arc<dyn Candidate>> 
     for (&column, value) in columns.iter().zip(&change.values) {
         values[column] = *value;
     }
-    let own = Changing::new(Inner::Own(Arc::clone(&effect)), &values, change.way);
+    let own = Changing::new(Inner::Own(Arc::clone(&effect)), &values, vec![change.way]);
     vec![Arc::new(Kept::new(effect, columns)), Arc::new(own)]
 }

@@ -79,21 +79,15 @@ impl Described {
         if let Some(estimate) = estimate {
             let values = only.spread(&estimate.value);
             let mut first = 0;
-            for (k, candidate) in only.candidates.iter().enumerate() {
+            for candidate in &only.candidates {
                 let end = first + candidate.coefficients().len();
                 let own = &values.as_slice()[first..end];
                 first = end;
-                for way in ways {
-                    changing.push((
-                        k,
-                        way.clone(),
-                        Changing::new(Inner::Lent(*candidate), own, way.clone()),
-                    ));
-                }
+                changing.push(Changing::new(Inner::Lent(*candidate), own, ways.to_vec()));
             }
         }
         let mut all: Vec<&dyn Candidate> = only.candidates.clone();
-        all.extend(changing.iter().map(|(_, _, c)| c as &dyn Candidate));
+        all.extend(changing.iter().map(|c| c as &dyn Candidate));
         all.extend(terms.iter().map(|t| t as &dyn Candidate));
         // products of hundreds of columns a block: in long runs, of fewer blocks
         let fitted = if evidence.data.t_s.len() > MANY_ROWS {
@@ -107,17 +101,19 @@ impl Described {
             .iter()
             .map(|g| price(g, fitted.scalars))
             .collect();
+        let mut first: usize = only.candidates.iter().map(|c| c.coefficients().len()).sum();
         let mut changes = vec![Vec::new(); n];
-        for (at, (k, way, _)) in changing.iter().enumerate() {
-            let columns = fitted.groups[n + at].columns.clone();
-            if !columns.is_empty() {
-                changes[*k].push((way.clone(), columns));
+        for (k, changing) in changing.iter().enumerate() {
+            let seen = &fitted.groups[n + k].columns;
+            for (way, columns) in changing.ways() {
+                let own = first + columns.start..first + columns.end;
+                let columns: Vec<usize> = own.filter(|c| seen.contains(c)).collect();
+                if !columns.is_empty() {
+                    changes[k].push((way.clone(), columns));
+                }
             }
+            first += changing.coefficients().len();
         }
-        let mut first: usize = all[..n + changing.len()]
-            .iter()
-            .map(|c| c.coefficients().len())
-            .sum();
         let groups = &fitted.groups[n + changing.len()..];
         let terms = terms
             .into_iter()

@@ -47,4 +47,9 @@ pub(crate) trait Evidence: Sync {
         candidates: &[&dyn Candidate],
         amplitudes: &Amplitudes,
     ) -> Residuals;
+    /// How far two forms of a candidate shift the rows apart at the same `values`: the sum of
+    /// squares, of the scalars of the design under white noise. Infinite where that is not known.
+    fn distance(&self, _one: &dyn Candidate, _other: &dyn Candidate, _values: &[f64]) -> f64 {
+        f64::INFINITY
+    }
 }

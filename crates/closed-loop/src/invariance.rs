@@ -18,6 +18,7 @@
 //! model behind it), as a test of an added variable.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 use std::sync::Arc;
 
 use effects::{AttitudeRows, Candidate, Coefficient, Effect, EffectError, StarRows, Surroundings};
@@ -67,25 +68,35 @@ impl Inner<'_> {
     }
 }
 
-/// An effect at its estimate, times how it changes.
+/// An effect at its estimate, times how it changes: columns of one way behind those of another.
 #[derive(Debug)]
 pub(crate) struct Changing<'a> {
     inner: Inner<'a>,
     values: Vec<f64>,
-    way: Way,
+    ways: Vec<Way>,
     coefficients: Vec<Coefficient>,
 }
 
 impl<'a> Changing<'a> {
-    pub(crate) fn new(inner: Inner<'a>, values: &[f64], way: Way) -> Self {
+    pub(crate) fn new(inner: Inner<'a>, values: &[f64], ways: Vec<Way>) -> Self {
+        let columns = ways.iter().map(Way::columns).sum();
         Self {
             inner,
             values: values.to_vec(),
-            coefficients: (0..way.columns())
+            coefficients: (0..columns)
                 .map(|k| Coefficient::new(format!("g{k}"), "", f64::INFINITY))
                 .collect(),
-            way,
+            ways,
         }
+    }
+
+    /// The ways, and where the columns of each stand.
+    pub(crate) fn ways(&self) -> impl Iterator<Item = (&Way, Range<usize>)> {
+        self.ways.iter().scan(0, |end, way| {
+            let first = *end;
+            *end += way.columns();
+            Some((way, first..*end))
+        })
     }
 }
 
@@ -104,28 +115,37 @@ impl Candidate for Changing<'_> {
     }
     fn star_columns(&self, camera: &Camera, rows: &StarRows<'_>, out: PointsMut<'_>) -> bool {
         let n = rows.len();
-        let Some([x, y]) = star_columns_of(self.inner.get(), camera, rows) else {
+        let Some(inner) = star_columns_of(self.inner.get(), camera, rows) else {
             return false;
         };
+        let [x, y] = inner.map(|columns| -> Vec<f64> {
+            let each = |i: usize| {
+                self.values
+                    .iter()
+                    .enumerate()
+                    .map(move |(j, v)| (j * n + i, v))
+            };
+            (0..n)
+                .map(|i| each(i).map(|(at, v)| v * columns[at]).sum())
+                .collect()
+        });
         out.x.fill(0.0);
         out.y.fill(0.0);
-        for i in 0..n {
-            let of = |columns: &[f64]| -> f64 {
-                let each = self.values.iter().enumerate();
-                each.map(|(j, v)| v * columns[j * n + i]).sum()
-            };
-            let (k, z) = match &self.way {
-                Way::With(variable, [low, high]) => {
-                    let z = (2.0 * variable.value(rows, i) - low - high) / (high - low);
-                    (0, if z.is_finite() { z } else { 0.0 })
-                }
-                Way::Star(ids) => match ids.iter().position(|&id| id == rows.star_id[i]) {
-                    Some(k) => (k, 1.0),
-                    None => continue,
-                },
-            };
-            out.x[k * n + i] = z * of(&x);
-            out.y[k * n + i] = z * of(&y);
+        for (way, columns) in self.ways() {
+            for i in 0..n {
+                let (k, z) = match way {
+                    Way::With(variable, [low, high]) => {
+                        let z = (2.0 * variable.value(rows, i) - low - high) / (high - low);
+                        (columns.start, if z.is_finite() { z } else { 0.0 })
+                    }
+                    Way::Star(ids) => match ids.iter().position(|&id| id == rows.star_id[i]) {
+                        Some(k) => (columns.start + k, 1.0),
+                        None => continue,
+                    },
+                };
+                out.x[k * n + i] = z * x[i];
+                out.y[k * n + i] = z * y[i];
+            }
         }
         true
     }

@@ -31,7 +31,7 @@
 use std::f64::consts::PI;
 use std::ops::Range;
 
-use nalgebra::{Cholesky, DMatrix, DVector, Matrix2, Matrix4, Vector2, Vector4};
+use nalgebra::{Cholesky, Matrix2, Matrix4, SMatrix, SVector, Vector2, Vector3, Vector4};
 use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 use telemetry::report::{Dependence, Unattributed};
@@ -75,7 +75,7 @@ struct Field {
     y_px: Vec<f64>,
     /// Residual of each axis, arcsec, less the mean of its star.
     residual: [Vec<f64>; 2],
-    frame: Vec<usize>,
+    frame: Vec<u32>,
     /// Rows of each star.
     stars: Vec<Range<usize>>,
 }
@@ -139,10 +139,7 @@ pub(crate) fn search(
     order: Option<u32>,
 ) -> Option<Pattern> {
     let [rx, ry] = residual else { return None };
-    let mut frame = vec![0; data.t_s.len()];
-    for k in 0..data.frames.frames() {
-        frame[data.frames.rows_of(k)].fill(k);
-    }
+    let frame = data.frames.frame_of_rows();
     let counts = |r: usize| {
         !data.outlier[r]
             && [rx, ry, &data.modelled[0], &data.modelled[1]]
@@ -161,24 +158,36 @@ pub(crate) fn search(
             &of_star,
         )
     };
-    let as_left = field([rx, ry]);
+    let as_left = || field([rx, ry]);
     let turning = data.t_s.len() >= STARS_TO_TURN * data.frames.frames();
-    if !turning {
-        return as_left.clone().pattern(&as_left, folds, order);
-    }
-    let turned: Vec<[f64; 2]> = (0..data.frames.frames())
+    let searched = if turning {
+        let [x, y] = without_rotation(data, residual);
+        field([&x, &y])
+    } else {
+        as_left()
+    };
+    searched.pattern(&as_left, folds, order)
+}
+
+/// The residuals less what a rotation of their frame does.
+fn without_rotation(data: &StarData, residual: &[Vec<f64>]) -> [Vec<f64>; 2] {
+    let turn: Vec<Vector3<f64>> = (0..data.frames.frames())
         .into_par_iter()
-        .flat_map_iter(|k| {
-            let theta = rotation_of(data, k, residual).unwrap_or_default();
-            data.frames.rows_of(k).map(move |row| {
-                let a = rotation_row(data, row);
-                let by = a.map(|a| a[0] * theta[0] + a[1] * theta[1] + a[2] * theta[2]);
-                [rx[row] - by[0], ry[row] - by[1]]
-            })
-        })
+        .map(|k| rotation_of(data, k, residual).unwrap_or_default())
         .collect();
-    let axis = |a: usize| -> Vec<f64> { turned.iter().map(|r| r[a]).collect() };
-    field([&axis(0), &axis(1)]).pattern(&as_left, folds, order)
+    [0, 1].map(|axis| {
+        let of = |k: usize| {
+            let row = move |r: usize| (k, r);
+            data.frames.rows_of(k).map(row)
+        };
+        (0..turn.len())
+            .into_par_iter()
+            .flat_map_iter(of)
+            .map(|(k, r)| {
+                residual[axis][r] - Vector3::from(rotation_row(data, r)[axis]).dot(&turn[k])
+            })
+            .collect()
+    })
 }
 
 /// Sums of the columns cos and sin, less the mean of each star, with each other and with
@@ -272,12 +281,7 @@ impl Sums {
 }
 
 impl Field {
-    fn new(
-        at: [&[f64]; 2],
-        residual: [&[f64]; 2],
-        frame: &[usize],
-        of_star: &[Vec<usize>],
-    ) -> Self {
+    fn new(at: [&[f64]; 2], residual: [&[f64]; 2], frame: &[u32], of_star: &[Vec<usize>]) -> Self {
         let mut field = Self::default();
         for rows in of_star.iter().filter(|rows| rows.len() > 1) {
             let first = field.frame.len();
@@ -310,8 +314,13 @@ impl Field {
             .map(|r| r.iter().map(|v| v * v).sum::<f64>() / r.len() as f64)
     }
 
-    /// The whole search; amplitudes and the share they explain are those of `as_left`.
-    fn pattern(mut self, as_left: &Self, folds: &Folds, order: Option<u32>) -> Option<Pattern> {
+    /// The whole search; amplitudes and the share they explain are those of the field `as_left`.
+    fn pattern(
+        mut self,
+        as_left: &dyn Fn() -> Self,
+        folds: &Folds,
+        order: Option<u32>,
+    ) -> Option<Pattern> {
         let extent = self.extent();
         if self.frame.is_empty() || extent.iter().any(|l| *l < LEAST_EXTENT_PX) {
             return None;
@@ -362,7 +371,7 @@ impl Field {
             return None;
         }
         let p_value = trials * chance.max(self.chance_around(wave, variance, extent)?);
-        let explained = as_left.share_out_of_fold(wave, folds)?;
+        let explained = as_left().share_out_of_fold(wave, folds)?;
         (p_value < FAMILY_ALPHA && explained > 0.0).then_some(Pattern {
             wave,
             p_value,
@@ -472,40 +481,56 @@ impl Field {
             let k = (h / 2 + 1) as f64;
             if h % 2 == 0 { [k, 0.0] } else { [0.0, k] }
         });
-        let design: Vec<[f64; 2 * WAVES]> = self
+        let design = |rows: &Range<usize>| {
+            let mut out = vec![[0.0; 2 * WAVES]; rows.len()];
+            let mut columns = Vec::new();
+            for (h, k) in waves.iter().enumerate() {
+                self.columns(rows, *k, &mut columns);
+                for (row, c) in out.iter_mut().zip(&columns) {
+                    row[2 * h..2 * h + 2].copy_from_slice(c);
+                }
+            }
+            out
+        };
+        type Normal = SMatrix<f64, { 2 * WAVES }, { 2 * WAVES }>;
+        type Score = SMatrix<f64, { 2 * WAVES }, 2>;
+        let sums: Vec<(Normal, Score)> = self
             .stars
             .par_iter()
-            .flat_map_iter(|rows| {
-                let mut out = vec![[0.0; 2 * WAVES]; rows.len()];
-                let mut columns = Vec::new();
-                for (h, k) in waves.iter().enumerate() {
-                    self.columns(rows, *k, &mut columns);
-                    for (row, c) in out.iter_mut().zip(&columns) {
-                        row[2 * h..2 * h + 2].copy_from_slice(c);
-                    }
+            .map(|rows| {
+                let (mut normal, mut score) = (Normal::zeros(), Score::zeros());
+                for (row, a) in rows.clone().zip(design(rows)) {
+                    let a = SVector::from(a);
+                    normal.ger(1.0, &a, &a, 1.0);
+                    let of = SVector::from([self.residual[0][row], self.residual[1][row]]);
+                    score.ger(1.0, &a, &of, 1.0);
                 }
-                out
+                (normal, score)
             })
             .collect();
-        let mut normal = DMatrix::zeros(2 * WAVES, 2 * WAVES);
-        let mut score = DMatrix::zeros(2 * WAVES, 2);
-        for (row, a) in design.iter().enumerate() {
-            for i in 0..2 * WAVES {
-                for j in 0..=i {
-                    normal[(i, j)] += a[i] * a[j];
-                }
-                score[(i, 0)] += a[i] * self.residual[0][row];
-                score[(i, 1)] += a[i] * self.residual[1][row];
-            }
-        }
-        normal.fill_upper_triangle_with_lower_triangle();
+        let (normal, score) = sums
+            .into_iter()
+            .fold((Normal::zeros(), Score::zeros()), |all, own| {
+                (all.0 + own.0, all.1 + own.1)
+            });
         // where stars stand still there is nothing to take out
-        let least = 1e-6 * design.len() as f64;
+        let least = 1e-6 * self.rows() as f64;
         let beta = normal.svd(true, true).solve(&score, least).ok()?;
-        for (axis, residual) in self.residual.iter_mut().enumerate() {
-            let beta: DVector<f64> = beta.column(axis).into_owned();
-            for (r, a) in residual.iter_mut().zip(&design) {
-                *r -= a.iter().zip(beta.iter()).map(|(a, b)| a * b).sum::<f64>();
+        let left: Vec<[Vec<f64>; 2]> = self
+            .stars
+            .par_iter()
+            .map(|rows| {
+                let design = design(rows);
+                [0, 1].map(|axis| {
+                    let beta = beta.column(axis);
+                    let own = self.residual[axis][rows.clone()].iter().zip(&design);
+                    own.map(|(r, a)| r - SVector::from(*a).dot(&beta)).collect()
+                })
+            })
+            .collect();
+        for (rows, left) in self.stars.iter().zip(left) {
+            for (residual, left) in self.residual.iter_mut().zip(left) {
+                residual[rows.clone()].copy_from_slice(&left);
             }
         }
         Some(())
@@ -525,9 +550,10 @@ impl Field {
                 let row = rows.start + j;
                 let [x, y] = [self.residual[0][row], self.residual[1][row]];
                 let u = Vector4::new(c * x, s * x, c * y, s * y);
-                frames[self.frame[row]] += u;
-                if block[self.frame[row]] != last {
-                    last = block[self.frame[row]];
+                let frame = self.frame[row] as usize;
+                frames[frame] += u;
+                if block[frame] != last {
+                    last = block[frame];
                     cells.push(Vector4::zeros());
                 }
                 if let Some(cell) = cells.last_mut() {
@@ -576,7 +602,9 @@ impl Field {
         for rows in &self.stars {
             self.columns(rows, k, &mut columns);
             for (f, sums) in each.iter_mut().enumerate() {
-                let part = self.sums_of(rows.start, &columns, |row| fold[self.frame[row]] == f);
+                let part = self.sums_of(rows.start, &columns, |row| {
+                    fold[self.frame[row] as usize] == f
+                });
                 *sums = sums.add(&part);
             }
         }

@@ -29,6 +29,9 @@ const SCAN: usize = 9;
 const SCAN_ROUNDS: usize = 3;
 /// Rounds of selection and polish; the choice settles in two or three.
 const ROUNDS: usize = 4;
+/// Columns at an estimate that differ from those it was found with by less than this, in
+/// squared sigmas over all data, are the same: no amplitude moves by a tenth of its sigma.
+const SAME: f64 = 0.01;
 
 /// Fits of one list of candidates, with the groups that selection moves.
 #[derive(Debug)]
@@ -216,8 +219,15 @@ pub(crate) fn search(
                 selection,
             });
         }
+        let changed = polish(evidence, folds, &mut candidates, &fitted, &selection.chosen)?;
+        if !changed {
+            return Ok(Found {
+                candidates,
+                fitted,
+                selection,
+            });
+        }
         before.clone_from(&selection.chosen);
-        polish(evidence, folds, &mut candidates, &fitted, &selection.chosen)?;
     }
     Err(CloseError::Singular)
 }
@@ -227,18 +237,20 @@ pub(crate) fn borrowed(candidates: &[Box<dyn Candidate>]) -> Vec<&dyn Candidate>
     candidates.iter().map(AsRef::as_ref).collect()
 }
 
-/// Improves each chosen candidate beside the others.
+/// Improves each chosen candidate beside the others; returns whether any differs from what was fitted.
 pub(crate) fn polish(
     evidence: &dyn Evidence,
     folds: &Folds,
     candidates: &mut [Box<dyn Candidate>],
     fitted: &Fitted,
     chosen: &[usize],
-) -> Result<(), CloseError> {
+) -> Result<bool, CloseError> {
     let set = columns_of(&fitted.groups, chosen);
     let Some(estimate) = fitted.fits.estimate(&set) else {
-        return Ok(());
+        return Ok(false);
     };
+    let same = SAME * fitted.fits.variance(&set).unwrap_or(0.0);
+    let mut changed = false;
     let mut first = 0;
     for &g in chosen {
         let columns = &fitted.groups[g].columns;
@@ -251,14 +263,17 @@ pub(crate) fn polish(
         first += columns.len();
         if columns.len() == candidates[g].coefficients().len()
             && let Some(better) = candidates[g].refined(&values)
+            && evidence.distance(candidates[g].as_ref(), better.as_ref(), &values) > same
         {
             candidates[g] = better;
+            changed = true;
         }
         for k in 0..candidates[g].nonlinear().len() {
             scan(evidence, folds, candidates, chosen, g, k)?;
+            changed = true;
         }
     }
-    Ok(())
+    Ok(changed)
 }
 
 /// Scans non-linear parameter `k` of candidate `g`, ever finer.

@@ -18,10 +18,14 @@ use std::ops::Range;
 use effects::{AttitudeRows, Candidate, StarRows};
 use focal_plane::{ARCSEC_PER_RAD, AttitudeSource, Camera, PointsMut, VectorsMut};
 use nalgebra::{DMatrix, DVector, Vector3};
+use rayon::prelude::*;
 
 use crate::frame_rotation::rotation_row;
 use crate::nuisance::StarNuisance;
 use crate::star_data::StarData;
+
+/// Frames whose columns are compared at once.
+const CHUNK_FRAMES: usize = 64;
 
 /// The columns of one bundle's star rows.
 pub(crate) struct StarColumns<'a> {
@@ -45,6 +49,8 @@ pub(crate) struct Filled {
     pub(crate) own: [DMatrix<f64>; 2],
     /// T: rotations, arcsec, three rows a frame.
     pub(crate) turn: DMatrix<f64>,
+    /// Weight of each row, once they are weighed.
+    weight: Vec<f64>,
 }
 
 impl Default for Filled {
@@ -54,6 +60,7 @@ impl Default for Filled {
             shared: empty(),
             own: [empty(), empty()],
             turn: empty(),
+            weight: Vec::new(),
         }
     }
 }
@@ -241,17 +248,57 @@ impl StarColumns<'_> {
     pub(crate) fn weigh(&self, frames: Range<usize>, out: &mut Filled) -> usize {
         let data = self.data;
         let rows = data.frames.first_row[frames.start]..data.frames.first_row[frames.end];
-        for (i, row) in rows.clone().enumerate() {
-            scale(out.shared.column_mut(i).as_mut_slice(), self.weight_of(row));
+        let weight = &mut out.weight;
+        weight.clear();
+        weight.extend(rows.clone().map(|row| self.weight_of(row)));
+        for (i, &w) in weight.iter().enumerate() {
+            let values = out.shared.column_mut(i);
+            values.into_iter().for_each(|v| *v = weighed(*v, w));
         }
         for own in out.own.iter_mut().filter(|m| !m.is_empty()) {
-            for column in own.as_mut_slice().chunks_exact_mut(rows.len()) {
-                for (v, row) in column.chunks_exact_mut(1).zip(rows.clone()) {
-                    scale(v, self.weight_of(row));
+            for column in own.as_mut_slice().chunks_exact_mut(weight.len()) {
+                for (v, &w) in column.iter_mut().zip(&*weight) {
+                    *v = weighed(*v, w);
                 }
             }
         }
-        rows.clone().filter(|&row| !data.outlier[row]).count()
+        rows.filter(|&row| !data.outlier[row]).count()
+    }
+
+    /// Weighed squares of what the first two candidates, at the same `values`, shift the rows apart by,
+    /// arcsec^2; infinite where one of them does not act.
+    pub(crate) fn distance(&self, values: &[f64]) -> f64 {
+        let data = self.data;
+        let arcsec = data.camera.arcsec_per_px();
+        let frames = data.frames.frames();
+        let chunks: Vec<f64> = (0..frames.div_ceil(CHUNK_FRAMES))
+            .into_par_iter()
+            .map(|chunk| {
+                let end = ((chunk + 1) * CHUNK_FRAMES).min(frames);
+                let first_row = &data.frames.first_row;
+                let rows = first_row[chunk * CHUNK_FRAMES]..first_row[end];
+                let seen = self.rows(rows.clone());
+                let both = [0, 1].map(|k| star_columns_of(self.candidates[k], &data.camera, &seen));
+                let [Some(one), Some(other)] = &both else {
+                    return f64::INFINITY;
+                };
+                let mut sum = 0.0;
+                for (i, row) in rows.clone().enumerate().filter(|(_, r)| !data.outlier[*r]) {
+                    for axis in 0..2 {
+                        let each = values.iter().enumerate();
+                        let apart: f64 = each
+                            .map(|(j, v)| {
+                                let at = j * rows.len() + i;
+                                v * (one[axis][at] - other[axis][at])
+                            })
+                            .sum();
+                        sum += (self.weight[row] * arcsec[axis] * apart).powi(2);
+                    }
+                }
+                sum
+            })
+            .collect();
+        chunks.iter().sum()
     }
 
     /// What `amplitudes` (nuisance and candidates) shift the filled rows of `frames`
@@ -289,13 +336,9 @@ impl StarColumns<'_> {
     }
 }
 
-/// Weighs `values`; what does not count is zero, whatever it was.
-fn scale(values: &mut [f64], weight: f64) {
-    if weight > 0.0 {
-        values.iter_mut().for_each(|v| *v *= weight);
-    } else {
-        values.fill(0.0);
-    }
+/// `value` by its weight; what does not count is zero, whatever it was.
+fn weighed(value: f64, weight: f64) -> f64 {
+    if weight > 0.0 { value * weight } else { 0.0 }
 }
 
 /// The columns of `candidate` on stars, x and y; `None` where it does not act on these rows.

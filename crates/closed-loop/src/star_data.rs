@@ -33,6 +33,7 @@ use telemetry::WindowTable;
 use spectra::robust;
 
 use crate::directions;
+use crate::evidence::Residuals;
 use crate::frame_rotation::{rotation_of, rotation_row};
 
 /// A star with fewer rows has no scatter of its own: the median deviation of so many
@@ -468,18 +469,30 @@ impl StarData {
         }
     }
 
-    /// Moves the modelled positions to projection + `shift` (arcsec, the fitted
-    /// misalignment, distortion and directions) and evaluates the declared
-    /// centroid error there.
-    pub(crate) fn move_modelled(&mut self, shift_arcsec: &[Vec<f64>], phase: &CentroidError) {
+    /// Moves the modelled positions to projection + what `residual` was modelled by (the fitted
+    /// misalignment, distortion and directions), and evaluates the declared centroid error there.
+    /// Takes its change out of `residual`; returns the sum of its squares, arcsec^2.
+    pub(crate) fn move_modelled(&mut self, residual: &mut Residuals, phase: &CentroidError) -> f64 {
         let scale = self.camera.arcsec_per_px();
+        let known = self.phase_error.clone();
         for axis in 0..2 {
             for row in 0..self.t_s.len() {
                 self.modelled[axis][row] =
-                    self.projected[axis][row] + shift_arcsec[axis][row] / scale[axis];
+                    self.projected[axis][row] + residual.modelled[axis][row] / scale[axis];
             }
         }
         self.update_phase(phase);
+        let mut squares = 0.0;
+        for axis in 0..2 {
+            for (row, known) in known[axis].iter().enumerate() {
+                let change = (self.phase_error[axis][row] - known) * scale[axis];
+                residual.axes[axis][row] -= change;
+                if !self.outlier[row] {
+                    squares += change * change;
+                }
+            }
+        }
+        squares
     }
 
     fn update_phase(&mut self, phase: &CentroidError) {

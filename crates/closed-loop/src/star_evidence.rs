@@ -185,6 +185,15 @@ impl Evidence for StarEvidence<'_> {
         }
         out
     }
+
+    fn distance(&self, one: &dyn Candidate, other: &dyn Candidate, values: &[f64]) -> f64 {
+        let both = [one, other];
+        let columns = StarColumns {
+            residuals: &[],
+            ..self.columns(&both)
+        };
+        columns.distance(values) / self.noise.map_or(1.0, |n| n.centroid * n.centroid)
+    }
 }
 
 /// Takes from a frame's residuals the rotation that its stars (outliers aside)

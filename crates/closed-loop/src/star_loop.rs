@@ -51,8 +51,9 @@ use spectra::robust;
 const MIN_FRAMES: usize = 2;
 /// How often rows that only the effects found make stand out are set aside.
 const OUTLIER_ROUNDS: usize = 2;
-/// Fits of the declared unknowns, each at better modelled positions.
+/// Fits of the declared unknowns, each at better modelled positions: at most, and at least.
 const SETTLING_ROUNDS: usize = 4;
+const LEAST_ROUNDS: usize = 2;
 
 pub(crate) fn run(
     situation: &Situation<'_>,
@@ -239,12 +240,17 @@ fn settle(
 ) -> Result<Settled, CloseError> {
     let mut round = 0;
     loop {
-        let (before, loglik) = {
+        let (mut before, loglik, variance) = {
             let evidence = evidence(data, situation, vec![data.measured_residual()], None);
             let fitted = fit(&evidence, folds, &[])?;
             let amplitudes = amplitudes(&fitted, folds, &[], 0).ok_or(CloseError::Singular)?;
             let loglik = fitted.fits.out_of_fold(&[]).map(|o| o.total_loglik());
-            (evidence.residuals(folds, &[], &amplitudes), loglik)
+            let variance = fitted.fits.variance(&[]).unwrap_or(0.0);
+            (
+                evidence.residuals(folds, &[], &amplitudes),
+                loglik,
+                variance,
+            )
         };
         let added = data.mark_outliers(&before.axes);
         round += 1;
@@ -255,7 +261,11 @@ fn settle(
         if data.free_attitude {
             data.turn_frames(&before.modelled);
         }
-        data.move_modelled(&before.modelled, phase);
+        let moved = data.move_modelled(&mut before, phase);
+        // all rows together by less than the noise of one: another fit would move them by a hundredth of that
+        if round >= LEAST_ROUNDS && added == 0 && !data.free_attitude && moved < variance {
+            return Ok(Settled { before, loglik });
+        }
     }
 }
 

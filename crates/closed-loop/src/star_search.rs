@@ -509,12 +509,13 @@ fn coloured<'a>(
             });
         };
         chosen.push(added);
-        polished = true;
         noise = its_noise;
         let fitted = under(&noise)?;
         let evidence = white.with_noise(&noise);
-        polish(&evidence, folds, &mut candidates, &fitted, &chosen)?;
-        moments = white.moments(folds, &borrowed(&candidates));
+        if polish(&evidence, folds, &mut candidates, &fitted, &chosen)? {
+            polished = true;
+            moments = white.moments(folds, &borrowed(&candidates));
+        }
     }
 }
 

@@ -39,7 +39,7 @@ fn field(
             let (x, y) = (start[0] + along * cos, start[1] + along * sin);
             at[0].push(x);
             at[1].push(y);
-            frame.push(k);
+            frame.push(u32::try_from(k).unwrap());
             for axis in 0..2 {
                 wander[axis] =
                     decay * wander[axis] + slow * (1.0 - decay * decay).sqrt() * normal();
@@ -58,7 +58,9 @@ fn field(
 }
 
 fn search(field: &Field) -> Option<Pattern> {
-    field.clone().pattern(field, &Folds::cut(FRAMES), Some(7))
+    field
+        .clone()
+        .pattern(&|| field.clone(), &Folds::cut(FRAMES), Some(7))
 }
 
 fn wave(k: [f64; 2], size: f64) -> impl Fn(f64, f64) -> f64 {
