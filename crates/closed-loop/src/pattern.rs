@@ -31,7 +31,7 @@
 use std::f64::consts::PI;
 use std::ops::Range;
 
-use nalgebra::{Cholesky, Matrix2, Matrix4, SMatrix, SVector, Vector2, Vector3, Vector4};
+use nalgebra::{Cholesky, Matrix2, Matrix4, Vector2, Vector3, Vector4};
 use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 use telemetry::report::{Dependence, Unattributed};
@@ -41,6 +41,7 @@ use crate::frame_rotation::{rotation_of, rotation_row};
 use crate::selection::FAMILY_ALPHA;
 use crate::star_data::StarData;
 
+mod pixel_phase;
 #[cfg(test)]
 mod tests;
 mod transform;
@@ -55,8 +56,6 @@ const ORDERS: f64 = 2.0;
 const USUAL_ORDER: u32 = 7;
 /// Cycles over the extent within which a wave is one of pixel phase.
 const PHASE_GUARD: f64 = 3.0;
-/// Harmonics of pixel phase taken out.
-const HARMONICS: usize = crate::empirical::HARMONICS;
 /// Share of a wave's power that must change along the stars' paths.
 const LEAST_MOTION: f64 = 0.1;
 /// Fewest clusters of a covariance.
@@ -472,68 +471,6 @@ impl Field {
             normal: Matrix2::new(cc, cs, cs, ss),
             score: score.map(Vector2::from),
         }
-    }
-
-    /// Whole cycles per pixel along one axis: pixel phase has terms of its own.
-    fn take_out_pixel_phase(&mut self) -> Option<()> {
-        const WAVES: usize = 2 * HARMONICS;
-        let waves: [[f64; 2]; WAVES] = std::array::from_fn(|h| {
-            let k = (h / 2 + 1) as f64;
-            if h % 2 == 0 { [k, 0.0] } else { [0.0, k] }
-        });
-        let design = |rows: &Range<usize>| {
-            let mut out = vec![[0.0; 2 * WAVES]; rows.len()];
-            let mut columns = Vec::new();
-            for (h, k) in waves.iter().enumerate() {
-                self.columns(rows, *k, &mut columns);
-                for (row, c) in out.iter_mut().zip(&columns) {
-                    row[2 * h..2 * h + 2].copy_from_slice(c);
-                }
-            }
-            out
-        };
-        type Normal = SMatrix<f64, { 2 * WAVES }, { 2 * WAVES }>;
-        type Score = SMatrix<f64, { 2 * WAVES }, 2>;
-        let sums: Vec<(Normal, Score)> = self
-            .stars
-            .par_iter()
-            .map(|rows| {
-                let (mut normal, mut score) = (Normal::zeros(), Score::zeros());
-                for (row, a) in rows.clone().zip(design(rows)) {
-                    let a = SVector::from(a);
-                    normal.ger(1.0, &a, &a, 1.0);
-                    let of = SVector::from([self.residual[0][row], self.residual[1][row]]);
-                    score.ger(1.0, &a, &of, 1.0);
-                }
-                (normal, score)
-            })
-            .collect();
-        let (normal, score) = sums
-            .into_iter()
-            .fold((Normal::zeros(), Score::zeros()), |all, own| {
-                (all.0 + own.0, all.1 + own.1)
-            });
-        // where stars stand still there is nothing to take out
-        let least = 1e-6 * self.rows() as f64;
-        let beta = normal.svd(true, true).solve(&score, least).ok()?;
-        let left: Vec<[Vec<f64>; 2]> = self
-            .stars
-            .par_iter()
-            .map(|rows| {
-                let design = design(rows);
-                [0, 1].map(|axis| {
-                    let beta = beta.column(axis);
-                    let own = self.residual[axis][rows.clone()].iter().zip(&design);
-                    own.map(|(r, a)| r - SVector::from(*a).dot(&beta)).collect()
-                })
-            })
-            .collect();
-        for (rows, left) in self.stars.iter().zip(left) {
-            for (residual, left) in self.residual.iter_mut().zip(left) {
-                residual[rows.clone()].copy_from_slice(&left);
-            }
-        }
-        Some(())
     }
 
     /// The chance of the scores at `k` under both covariances, without a search.
