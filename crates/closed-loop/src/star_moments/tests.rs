@@ -214,6 +214,41 @@ fn close(ours: &DMatrix<f64>, dense: &DMatrix<f64>) {
     assert!(off < 1e-11, "off by {off} of the whole");
 }
 
+/// Of several chunks, by weight, without outliers.
+#[test]
+fn two_forms_are_as_far_apart_as_their_columns() {
+    let data = data(true, 171);
+    let model = Model::parse(
+        "format = \"boresight-model/1\"\n[noise]\ntemporal_arcsec = 7.0\n",
+        "model.toml",
+        &[],
+    )
+    .unwrap();
+    let span = [data.t_s[0], data.t_s[data.t_s.len() - 1]];
+    let one = Empirical::new(Variable::Time, span, true).unwrap();
+    let two = data.stars.iter().map(|s| s.id).take(2).collect();
+    let other = Empirical::new(Variable::Star(two), [0.0, 1.0], true).unwrap();
+    let candidates: [&dyn Candidate; 2] = [&one, &other];
+    let columns = StarColumns {
+        data: &data,
+        nuisance: &StarNuisance::declared(&model, &data),
+        candidates: &candidates,
+        residuals: &[],
+        motion: None,
+        weight: &weights(&data),
+    };
+    let values = [0.3, -1.2, 0.7, 2.0];
+    let (c, _) = dense(&columns);
+    let first = c.ncols() - 2 * values.len();
+    let apart = DVector::from_fn(c.nrows(), |i, _| {
+        let each = values.iter().enumerate();
+        each.map(|(j, v)| v * (c[(i, first + j)] - c[(i, first + values.len() + j)]))
+            .sum::<f64>()
+    });
+    let (ours, dense) = (columns.distance(&values), apart.norm_squared());
+    assert!((ours - dense).abs() < 1e-11 * dense, "{ours} {dense}");
+}
+
 /// Sums of a thousand products: rounding alone.
 #[test]
 fn products_are_those_of_every_row() {
