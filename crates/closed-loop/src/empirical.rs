@@ -339,7 +339,7 @@ impl Candidate for Empirical {
                     }
                 }
                 Variable::Phase(axis) => {
-                    let (sin, cos) = camera.phase_rad(at[*axis]).sin_cos();
+                    let (sin, cos) = camera.phase_rad(rows.landed_px[*axis][i]).sin_cos();
                     let along = [1.0 - *axis as f64, *axis as f64];
                     let (mut s, mut c) = (sin, cos);
                     for k in 0..HARMONICS {
@@ -478,6 +478,7 @@ mod tests {
             t_s: &[1.0, 4.0],
             x_px: &[-100.3, 200.2],
             y_px: &[50.7, -300.1],
+            landed_px: [&[-100.3, 200.2], &[50.7, -300.1]],
             vx_px_s: &[1.0, 0.0],
             vy_px_s: &[2.0, -1.0],
             ax_px_s2: &[0.0; 2],

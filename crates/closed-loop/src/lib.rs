@@ -38,6 +38,7 @@ mod manoeuvre;
 mod motion;
 mod noise_effects;
 mod nuisance;
+mod own_attitude;
 mod pattern;
 mod reference_wander;
 mod search;

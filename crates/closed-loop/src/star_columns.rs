@@ -147,6 +147,7 @@ impl StarColumns<'_> {
             t_s: &d.t_s[rows.clone()],
             x_px: &d.modelled[0][rows.clone()],
             y_px: &d.modelled[1][rows.clone()],
+            landed_px: d.landed().map(|p| &p[rows.clone()]),
             vx_px_s: &d.velocity[0][rows.clone()],
             vy_px_s: &d.velocity[1][rows.clone()],
             ax_px_s2: &d.acceleration[0][rows.clone()],

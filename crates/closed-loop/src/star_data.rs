@@ -44,6 +44,8 @@ const FEW_ROWS: usize = 10;
 const NEAR_SHARE: f64 = 1.0 / 16.0;
 /// Frames with a smaller share of stars that stayed are unrelated.
 const SAME_SHARE: f64 = 0.1;
+/// Light that falls this far off has another pixel phase: by a fifth of a radian.
+const ELSEWHERE_PX: f64 = 0.03;
 
 /// What is known of one star.
 #[derive(Clone, Debug)]
@@ -82,11 +84,13 @@ pub(crate) struct StarData {
     pub(crate) projected: [Vec<f64>; 2],
     /// Modelled position, px: where regressors are evaluated.
     pub(crate) modelled: [Vec<f64>; 2],
+    /// Where the light falls, px, where effects that were found shift it by much.
+    landed: Option<[Vec<f64>; 2]>,
     /// Velocity and acceleration of the image, px/s and px/s^2; zero where the
     /// motion is not known.
     pub(crate) velocity: [Vec<f64>; 2],
     pub(crate) acceleration: [Vec<f64>; 2],
-    /// Declared centroid error at the modelled position, px.
+    /// Declared centroid error where the light falls, px.
     pub(crate) phase_error: [Vec<f64>; 2],
     /// Rows left out of every fit and figure.
     pub(crate) outlier: Vec<bool>,
@@ -330,6 +334,7 @@ impl StarData {
             attitude: kept_attitude,
             projected: pair(),
             modelled: pair(),
+            landed: None,
             velocity: pair(),
             acceleration: pair(),
             phase_error: pair(),
@@ -495,11 +500,61 @@ impl StarData {
         squares
     }
 
+    /// Where the light falls, as far as is known, px.
+    pub(crate) fn landed(&self) -> [&[f64]; 2] {
+        let at = self.landed.as_ref().unwrap_or(&self.modelled);
+        at.each_ref().map(Vec::as_slice)
+    }
+
+    /// Takes the light to fall where it is modelled.
+    pub(crate) fn lands_as_modelled(&mut self) {
+        self.landed = None;
+    }
+
+    /// Whether `shift_arcsec`, with the effects that were found, takes the light off from where it was
+    /// taken to fall by enough for its pixel phase to be another one.
+    pub(crate) fn lands_elsewhere(&self, shift_arcsec: &[Vec<f64>]) -> bool {
+        let scale = self.camera.arcsec_per_px();
+        let known = self.landed();
+        let (mut squares, mut count) = (0.0, 0.0);
+        for row in (0..self.t_s.len()).filter(|&r| !self.outlier[r]) {
+            for axis in 0..2 {
+                let at = self.projected[axis][row] + shift_arcsec[axis][row] / scale[axis];
+                squares += (at - known[axis][row]).powi(2);
+            }
+            count += 2.0;
+        }
+        squares > ELSEWHERE_PX * ELSEWHERE_PX * count
+    }
+
+    /// Evaluates the declared centroid error where `shift_arcsec` takes the light. Columns of what moves
+    /// the image stay those at the modelled position, which that motion starts from.
+    pub(crate) fn land(&mut self, shift_arcsec: &[Vec<f64>], phase: &CentroidError) {
+        if self.free_attitude {
+            let known = self.projected.clone();
+            self.turn_frames(shift_arcsec);
+            for axis in 0..2 {
+                let turned = self.projected[axis].iter().zip(&known[axis]);
+                for (at, (to, from)) in self.modelled[axis].iter_mut().zip(turned) {
+                    *at += to - from;
+                }
+            }
+        }
+        let scale = self.camera.arcsec_per_px();
+        self.landed = Some([0, 1].map(|axis| {
+            let each = self.projected[axis].iter().zip(&shift_arcsec[axis]);
+            each.map(|(from, shift)| from + shift / scale[axis])
+                .collect()
+        }));
+        self.update_phase(phase);
+    }
+
     fn update_phase(&mut self, phase: &CentroidError) {
         let [x, y] = &mut self.phase_error;
+        let landed = self.landed.as_ref().unwrap_or(&self.modelled);
         let at = Points {
-            x: &self.modelled[0],
-            y: &self.modelled[1],
+            x: &landed[0],
+            y: &landed[1],
         };
         phase
             .scaled(self.camera.arcsec_per_px().map(|s| 1.0 / s))

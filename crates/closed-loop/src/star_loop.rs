@@ -7,13 +7,12 @@
 //!
 //! Not physics: the order of the steps.
 
-use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use effects::{Scene, StarFacts, StarRows};
-use focal_plane::{AttitudeSource, Points, rotation_vector};
+use focal_plane::{AttitudeSource, Points};
 use telemetry::report::{Errors, FoundEffect, Report, Rows};
-use telemetry::{AttitudeResiduals, DarkMap, Model, StarResiduals};
+use telemetry::{DarkMap, Model, StarResiduals};
 
 use crate::attitude_loop::resolved_motion;
 use crate::causes::{self, Named, Quest};
@@ -26,7 +25,6 @@ use crate::error::CloseError;
 use crate::evidence::{Evidence, Residuals};
 use crate::figures;
 use crate::folds::Folds;
-use crate::frame_rotation::rotation_of;
 use crate::hypothesis::{self, Grounds};
 use crate::image_level::{self, ImageLevel, Side};
 use crate::images::{self, Formed};
@@ -36,6 +34,7 @@ use crate::manoeuvre::stars::Sky;
 use crate::motion::{self, Around};
 use crate::noise_effects;
 use crate::nuisance::StarNuisance;
+use crate::own_attitude;
 use crate::pattern;
 use crate::reference_wander::{self, REFERENCE_ERROR};
 use crate::search::{Found, amplitudes, amplitudes_as, fit};
@@ -45,7 +44,6 @@ use crate::star_data::{Inputs, Star, StarData, median_step};
 use crate::star_evidence::StarEvidence;
 use crate::star_search::Wander;
 use crate::star_weights;
-use spectra::robust;
 
 /// Fewest frames: every fold needs data to be predicted from.
 const MIN_FRAMES: usize = 2;
@@ -54,6 +52,8 @@ const OUTLIER_ROUNDS: usize = 2;
 /// Fits of the declared unknowns, each at better modelled positions: at most, and at least.
 const SETTLING_ROUNDS: usize = 4;
 const LEAST_ROUNDS: usize = 2;
+/// Searches after which the light is taken to fall where what was found takes it.
+const LANDINGS: usize = 2;
 
 pub(crate) fn run(
     situation: &Situation<'_>,
@@ -115,8 +115,42 @@ fn trace(
     progress: &dyn Fn(&str),
 ) -> Result<Closed, CloseError> {
     progress("residuals of the declared model");
-    let settled = settle(data, situation, phase, folds)?;
+    data.lands_as_modelled();
+    let mut settled = settle(data, situation, phase, folds)?;
+    for _ in 0..LANDINGS {
+        let moved = match explain(data, situation, folds, &settled, false, progress)? {
+            Explained::Closed(closed) => return Ok(*closed),
+            Explained::Elsewhere(moved) => moved,
+        };
+        // the declared model knows nothing of where the light falls
+        settled
+            .phase_error
+            .get_or_insert_with(|| data.phase_error.clone());
+        data.land(&moved, phase);
+    }
+    match explain(data, situation, folds, &settled, true, progress)? {
+        Explained::Closed(closed) => Ok(*closed),
+        Explained::Elsewhere(_) => Err(CloseError::Singular),
+    }
+}
 
+/// What a search ends with.
+enum Explained {
+    Closed(Box<Closed>),
+    /// What was found shifts the light to another pixel phase than the fits assumed: by this, with the
+    /// nuisance, arcsec.
+    Elsewhere(Vec<Vec<f64>>),
+}
+
+/// From the declared model at its best to the report, or to where the light falls.
+fn explain(
+    data: &mut StarData,
+    situation: &Situation<'_>,
+    folds: &Folds,
+    settled: &Settled,
+    last: bool,
+    progress: &dyn Fn(&str),
+) -> Result<Explained, CloseError> {
     let around: Option<Box<dyn AttitudeSource>> = match &situation.reference {
         Some(_) => resolved_motion(situation, &data.frames.t_s),
         None => data
@@ -207,8 +241,7 @@ fn trace(
             &situation.surroundings(),
         )?;
     }
-    progress("figures");
-    finish(&Finish {
+    let whole = Finish {
         situation,
         data,
         folds,
@@ -218,16 +251,24 @@ fn trace(
         described: &described,
         slow,
         wander: searched.wander.as_ref(),
-        settled: &settled,
+        settled,
         image: image.as_ref().zip(formed.as_ref()),
-    })
+    };
+    let after = whole.residuals(&searched.found.selection.chosen)?;
+    if !last && formed.is_none() && data.lands_elsewhere(&after.modelled) {
+        return Ok(Explained::Elsewhere(after.modelled));
+    }
+    progress("figures");
+    Ok(Explained::Closed(Box::new(finish(&whole, after)?)))
 }
 
 /// The declared model at its best.
-struct Settled {
-    before: Residuals,
+pub(crate) struct Settled {
+    pub(crate) before: Residuals,
     /// Log-likelihood out of fold; `None` where rows were left out since.
     loglik: Option<f64>,
+    /// The declared centroid error in it, px, where it is no longer that of the data.
+    pub(crate) phase_error: Option<[Vec<f64>; 2]>,
 }
 
 /// Fits what the declared model leaves unknown, moves the modelled positions and
@@ -256,7 +297,11 @@ fn settle(
         round += 1;
         if round >= SETTLING_ROUNDS && (added == 0 || round > 3 * SETTLING_ROUNDS) {
             let loglik = loglik.filter(|_| added == 0);
-            return Ok(Settled { before, loglik });
+            return Ok(Settled {
+                before,
+                loglik,
+                phase_error: None,
+            });
         }
         if data.free_attitude {
             data.turn_frames(&before.modelled);
@@ -264,7 +309,11 @@ fn settle(
         let moved = data.move_modelled(&mut before, phase);
         // all rows together by less than the noise of one: another fit would move them by a hundredth of that
         if round >= LEAST_ROUNDS && added == 0 && !data.free_attitude && moved < variance {
-            return Ok(Settled { before, loglik });
+            return Ok(Settled {
+                before,
+                loglik,
+                phase_error: None,
+            });
         }
     }
 }
@@ -299,6 +348,7 @@ fn all_rows<'a>(data: &'a StarData, motion: Option<&'a dyn AttitudeSource>) -> S
         t_s: &data.t_s,
         x_px: &data.modelled[0],
         y_px: &data.modelled[1],
+        landed_px: data.landed(),
         vx_px_s: &data.velocity[0],
         vy_px_s: &data.velocity[1],
         ax_px_s2: &data.acceleration[0],
@@ -396,9 +446,9 @@ impl Finish<'_> {
     }
 }
 
-fn finish(f: &Finish<'_>) -> Result<Closed, CloseError> {
+/// `plain`: what the chosen effects leave.
+fn finish(f: &Finish<'_>, plain: Residuals) -> Result<Closed, CloseError> {
     let chosen = &f.found.selection.chosen;
-    let plain = f.residuals(chosen)?;
     let whole = f.power(&f.settled.before);
     let mut explained = Vec::new();
     let mut last = f.power(&f.residuals(&[])?);
@@ -523,7 +573,7 @@ fn finish(f: &Finish<'_>) -> Result<Closed, CloseError> {
     );
 
     let after = after.unwrap_or(plain);
-    let attitude = attitude_residuals(f, &after);
+    let attitude = own_attitude::residuals(f.situation, f.data, f.folds, f.settled, &after);
     let attitude_rms = |series: &[Vec<f64>; 3], outlier: &[bool]| {
         std::array::from_fn(|a| figures::rms(&series[a], outlier).unwrap_or(f64::NAN))
     };
@@ -643,57 +693,4 @@ fn remarkable(f: &Finish<'_>, power: f64) -> Option<f64> {
     let unit = f.level.noise.map_or(1.0, |n| n.centroid);
     let variance = 0.5 * sigma * sigma / (unit * unit);
     hypothesis::beyond(excess(f, power), variance, f.found.fitted.scalars)
-}
-
-/// The tracker's own attitude beside the stars: its error against the reference,
-/// less the rotation that the modelled star shifts amount to.
-fn attitude_residuals(f: &Finish<'_>, after: &Residuals) -> Option<AttitudeResiduals> {
-    let table = f.situation.bundle.attitude.as_ref()?;
-    let data = f.data;
-    if data.free_attitude {
-        return None;
-    }
-    let scale = data.camera.arcsec_per_px();
-    let shift = |residual: &Residuals| -> Vec<Vec<f64>> {
-        (0..2)
-            .map(|a| {
-                (0..data.t_s.len())
-                    .map(|r| residual.modelled[a][r] + data.phase_error[a][r] * scale[a])
-                    .collect()
-            })
-            .collect()
-    };
-    let (shift_before, shift_after) = (shift(&f.settled.before), shift(after));
-    let fold = f.folds.column();
-    let own: BTreeMap<u64, usize> = table
-        .t_s
-        .iter()
-        .enumerate()
-        .map(|(k, t)| (t.to_bits(), k))
-        .collect();
-    let mut out = AttitudeResiduals::default();
-    for k in 0..data.frames.frames() {
-        let Some(&at) = own.get(&data.frames.t_s[k].to_bits()) else {
-            continue;
-        };
-        let theta = rotation_vector(&table.q[at], &data.attitude[k]) * focal_plane::ARCSEC_PER_RAD;
-        let (Some(b), Some(a)) = (
-            rotation_of(data, k, &shift_before),
-            rotation_of(data, k, &shift_after),
-        ) else {
-            continue;
-        };
-        out.t_s.push(data.frames.t_s[k]);
-        for axis in 0..3 {
-            out.before_arcsec[axis].push(theta[axis] - b[axis]);
-            out.after_arcsec[axis].push(theta[axis] - a[axis]);
-        }
-        out.fold.push(fold[k]);
-    }
-    out.outlier = vec![false; out.t_s.len()];
-    let group = vec![0; out.t_s.len()];
-    for axis in 0..3 {
-        robust::mark_outliers(&out.before_arcsec[axis], &group, 1, &mut out.outlier);
-    }
-    (!out.t_s.is_empty()).then_some(out)
 }

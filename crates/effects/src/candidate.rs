@@ -35,6 +35,9 @@ pub struct StarRows<'a> {
     pub x_px: &'a [f64],
     /// Modelled y, px.
     pub y_px: &'a [f64],
+    /// Where the light falls, x then y: the modelled position with all that effects shift it by, as far
+    /// as that is known, px. What acts on the centroid is evaluated there.
+    pub landed_px: [&'a [f64]; 2],
     /// Velocity of the modelled x, px/s.
     pub vx_px_s: &'a [f64],
     /// Velocity of the modelled y, px/s.

@@ -256,6 +256,7 @@ impl Bench {
             t_s: &t_s,
             x_px: &now[..n],
             y_px: &now[n..],
+            landed_px: [&now[..n], &now[n..]],
             vx_px_s: &v[..n],
             vy_px_s: &v[n..],
             ax_px_s2: &a[..n],

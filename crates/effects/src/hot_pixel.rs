@@ -83,7 +83,7 @@ impl EffectKind for Kind {
         let camera = scene.surroundings.camera;
         let mut seen: BTreeMap<(i64, i64), usize> = BTreeMap::new();
         for i in 0..rows.len() {
-            let [column, row] = pixel_of(camera, rows.at(i));
+            let [column, row] = pixel_of(camera, rows.landed(i));
             *seen.entry((column, row)).or_default() += 1;
         }
         // ties go to the lower coordinates: the list never depends on the order of a hash

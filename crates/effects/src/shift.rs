@@ -146,11 +146,16 @@ impl<S: Shift> Candidate for ShiftCandidate<S> {
         let mut terms = [[0.0; 2]; MAX_TERMS];
         out.x.fill(0.0);
         out.y.fill(0.0);
+        let centroid = self.shift.stages().centroid;
         for i in 0..n {
-            if !self.shift.reaches(rows.at(i)) {
+            let mut star = rows.view(i);
+            if centroid {
+                star.at = rows.landed(i);
+            }
+            if !self.shift.reaches(star.at) {
                 continue;
             }
-            self.shift.terms(&rows.view(i), &mut terms[..p]);
+            self.shift.terms(&star, &mut terms[..p]);
             for (j, term) in terms[..p].iter().enumerate() {
                 out.x[j * n + i] = term[0];
                 out.y[j * n + i] = term[1];
@@ -180,6 +185,14 @@ impl StarRows<'_> {
             mag: self.mag[i],
             bv: self.bv[i],
             at: self.at(i),
+        }
+    }
+
+    /// Where the light of row `i` falls.
+    pub(crate) fn landed(&self, i: usize) -> Pixel {
+        Pixel {
+            x: self.landed_px[0][i],
+            y: self.landed_px[1][i],
         }
     }
 
