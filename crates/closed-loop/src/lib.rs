@@ -43,6 +43,7 @@ mod pattern;
 mod reference_wander;
 mod search;
 mod selection;
+mod settling;
 mod situation;
 mod spatial_errors;
 mod stand_ins;

@@ -15,9 +15,9 @@ use telemetry::AttitudeResiduals;
 use crate::evidence::Residuals;
 use crate::folds::Folds;
 use crate::frame_rotation::rotation_of;
+use crate::settling::Settled;
 use crate::situation::Situation;
 use crate::star_data::StarData;
-use crate::star_loop::Settled;
 
 /// The tracker's own attitude beside the stars: its error against the reference,
 /// less the rotation that the modelled star shifts amount to.

@@ -528,24 +528,23 @@ impl StarData {
     }
 
     /// Evaluates the declared centroid error where `shift_arcsec` takes the light. Columns of what moves
-    /// the image stay those at the modelled position, which that motion starts from.
-    pub(crate) fn land(&mut self, shift_arcsec: &[Vec<f64>], phase: &CentroidError) {
+    /// the image are those where that motion starts from: projection + `fitted_arcsec`, without it.
+    pub(crate) fn land(
+        &mut self,
+        fitted_arcsec: &[Vec<f64>],
+        shift_arcsec: &[Vec<f64>],
+        phase: &CentroidError,
+    ) {
         if self.free_attitude {
-            let known = self.projected.clone();
             self.turn_frames(shift_arcsec);
-            for axis in 0..2 {
-                let turned = self.projected[axis].iter().zip(&known[axis]);
-                for (at, (to, from)) in self.modelled[axis].iter_mut().zip(turned) {
-                    *at += to - from;
-                }
-            }
         }
         let scale = self.camera.arcsec_per_px();
-        self.landed = Some([0, 1].map(|axis| {
-            let each = self.projected[axis].iter().zip(&shift_arcsec[axis]);
-            each.map(|(from, shift)| from + shift / scale[axis])
-                .collect()
-        }));
+        let moved = |axis: usize, by: &[Vec<f64>]| -> Vec<f64> {
+            let each = self.projected[axis].iter().zip(&by[axis]);
+            each.map(|(from, by)| from + by / scale[axis]).collect()
+        };
+        self.modelled = [0, 1].map(|axis| moved(axis, fitted_arcsec));
+        self.landed = Some([0, 1].map(|axis| moved(axis, shift_arcsec)));
         self.update_phase(phase);
     }
 

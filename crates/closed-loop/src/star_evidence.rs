@@ -20,9 +20,11 @@ use crate::folds::Folds;
 use crate::frame_rotation::{rotation_of, rotation_row};
 use crate::gram::BlockGrams;
 use crate::nuisance::StarNuisance;
+use crate::situation::Situation;
 use crate::star_columns::{Filled, StarColumns};
 use crate::star_data::StarData;
 use crate::star_moments::{Keep, MOST_BINS, StarMoments};
+use crate::star_weights;
 
 /// Frames whose residuals are formed at once.
 const CHUNK_FRAMES: usize = 64;
@@ -46,6 +48,32 @@ pub(crate) struct StarEvidence<'a> {
 }
 
 impl<'a> StarEvidence<'a> {
+    /// `residuals` against the declared model, under white noise.
+    pub(crate) fn new(
+        data: &'a StarData,
+        situation: &Situation<'_>,
+        residuals: Vec<[Vec<f64>; 2]>,
+        motion: Option<&'a dyn AttitudeSource>,
+    ) -> Self {
+        let temporal = situation.model.noise.temporal_arcsec.filter(|s| *s > 0.0);
+        Self {
+            data,
+            nuisance: StarNuisance::declared(situation.model, data),
+            residuals: Arc::new(residuals),
+            motion,
+            // circular to per axis
+            sigma_guess_arcsec: temporal.map_or(1.0, |s| s / std::f64::consts::SQRT_2),
+            noise: None,
+            // where windows are sent, centroids are formed anew, with another noise
+            weight: Arc::new(if situation.bundle.images.is_some() {
+                vec![1.0; data.t_s.len()]
+            } else {
+                star_weights::of(data)
+            }),
+            kept: Vec::new(),
+        }
+    }
+
     /// The same evidence under a noise that frames share.
     pub(crate) fn with_noise(&self, noise: &CommonNoise) -> Self {
         Self {

@@ -7,10 +7,9 @@
 //!
 //! Not physics: the order of the steps.
 
-use std::sync::Arc;
-
 use effects::{Scene, StarFacts, StarRows};
 use focal_plane::{AttitudeSource, Points};
+use nalgebra::DVector;
 use telemetry::report::{Errors, FoundEffect, Report, Rows};
 use telemetry::{DarkMap, Model, StarResiduals};
 
@@ -33,25 +32,21 @@ use crate::leftover;
 use crate::manoeuvre::stars::Sky;
 use crate::motion::{self, Around};
 use crate::noise_effects;
-use crate::nuisance::StarNuisance;
 use crate::own_attitude;
 use crate::pattern;
 use crate::reference_wander::{self, REFERENCE_ERROR};
-use crate::search::{Found, amplitudes, amplitudes_as, fit};
+use crate::search::{Found, amplitudes_as, fit};
 use crate::selection::columns_of;
+use crate::settling::{Settled, settle};
 use crate::situation::Situation;
 use crate::star_data::{Inputs, Star, StarData, median_step};
 use crate::star_evidence::StarEvidence;
 use crate::star_search::Wander;
-use crate::star_weights;
 
 /// Fewest frames: every fold needs data to be predicted from.
 const MIN_FRAMES: usize = 2;
 /// How often rows that only the effects found make stand out are set aside.
 const OUTLIER_ROUNDS: usize = 2;
-/// Fits of the declared unknowns, each at better modelled positions: at most, and at least.
-const SETTLING_ROUNDS: usize = 4;
-const LEAST_ROUNDS: usize = 2;
 /// Searches after which the light is taken to fall where what was found takes it.
 const LANDINGS: usize = 2;
 
@@ -122,11 +117,12 @@ fn trace(
             Explained::Closed(closed) => return Ok(*closed),
             Explained::Elsewhere(moved) => moved,
         };
+        let [fitted, whole] = moved;
         // the declared model knows nothing of where the light falls
         settled
             .phase_error
             .get_or_insert_with(|| data.phase_error.clone());
-        data.land(&moved, phase);
+        data.land(&fitted, &whole, phase);
     }
     match explain(data, situation, folds, &settled, true, progress)? {
         Explained::Closed(closed) => Ok(*closed),
@@ -137,9 +133,9 @@ fn trace(
 /// What a search ends with.
 enum Explained {
     Closed(Box<Closed>),
-    /// What was found shifts the light to another pixel phase than the fits assumed: by this, with the
-    /// nuisance, arcsec.
-    Elsewhere(Vec<Vec<f64>>),
+    /// What was found shifts the light to another pixel phase than the fits assumed: what the
+    /// nuisance shifts rows by, and with it all, arcsec.
+    Elsewhere([Vec<Vec<f64>>; 2]),
 }
 
 /// From the declared model at its best to the report, or to where the light falls.
@@ -161,7 +157,7 @@ fn explain(
     let motion = around.as_deref();
     data.follow(motion);
     let data = &*data;
-    let measured = evidence(data, situation, vec![data.measured_residual()], motion);
+    let measured = StarEvidence::new(data, situation, vec![data.measured_residual()], motion);
 
     let formed = match &situation.bundle.images {
         Some(windows) => {
@@ -175,7 +171,7 @@ fn explain(
             .iter()
             .map(|c| data.residual_arcsec(Points { x: &c[0], y: &c[1] }))
             .collect();
-        let evidence = evidence(data, situation, residuals, motion);
+        let evidence = StarEvidence::new(data, situation, residuals, motion);
         StarEvidence {
             nuisance: evidence.nuisance.with_zeros(data, zero_px),
             ..evidence
@@ -256,91 +252,10 @@ fn explain(
     };
     let after = whole.residuals(&searched.found.selection.chosen)?;
     if !last && formed.is_none() && data.lands_elsewhere(&after.modelled) {
-        return Ok(Explained::Elsewhere(after.modelled));
+        return Ok(Explained::Elsewhere([whole.fitted()?, after.modelled]));
     }
     progress("figures");
     Ok(Explained::Closed(Box::new(finish(&whole, after)?)))
-}
-
-/// The declared model at its best.
-pub(crate) struct Settled {
-    pub(crate) before: Residuals,
-    /// Log-likelihood out of fold; `None` where rows were left out since.
-    loglik: Option<f64>,
-    /// The declared centroid error in it, px, where it is no longer that of the data.
-    pub(crate) phase_error: Option<[Vec<f64>; 2]>,
-}
-
-/// Fits what the declared model leaves unknown, moves the modelled positions and
-/// marks outliers, until both stand still; returns the before residual.
-fn settle(
-    data: &mut StarData,
-    situation: &Situation<'_>,
-    phase: &centroid::CentroidError,
-    folds: &Folds,
-) -> Result<Settled, CloseError> {
-    let mut round = 0;
-    loop {
-        let (mut before, loglik, variance) = {
-            let evidence = evidence(data, situation, vec![data.measured_residual()], None);
-            let fitted = fit(&evidence, folds, &[])?;
-            let amplitudes = amplitudes(&fitted, folds, &[], 0).ok_or(CloseError::Singular)?;
-            let loglik = fitted.fits.out_of_fold(&[]).map(|o| o.total_loglik());
-            let variance = fitted.fits.variance(&[]).unwrap_or(0.0);
-            (
-                evidence.residuals(folds, &[], &amplitudes),
-                loglik,
-                variance,
-            )
-        };
-        let added = data.mark_outliers(&before.axes);
-        round += 1;
-        if round >= SETTLING_ROUNDS && (added == 0 || round > 3 * SETTLING_ROUNDS) {
-            let loglik = loglik.filter(|_| added == 0);
-            return Ok(Settled {
-                before,
-                loglik,
-                phase_error: None,
-            });
-        }
-        if data.free_attitude {
-            data.turn_frames(&before.modelled);
-        }
-        let moved = data.move_modelled(&mut before, phase);
-        // all rows together by less than the noise of one: another fit would move them by a hundredth of that
-        if round >= LEAST_ROUNDS && added == 0 && !data.free_attitude && moved < variance {
-            return Ok(Settled {
-                before,
-                loglik,
-                phase_error: None,
-            });
-        }
-    }
-}
-
-fn evidence<'a>(
-    data: &'a StarData,
-    situation: &Situation<'_>,
-    residuals: Vec<[Vec<f64>; 2]>,
-    motion: Option<&'a dyn AttitudeSource>,
-) -> StarEvidence<'a> {
-    let temporal = situation.model.noise.temporal_arcsec.filter(|s| *s > 0.0);
-    StarEvidence {
-        data,
-        nuisance: StarNuisance::declared(situation.model, data),
-        residuals: Arc::new(residuals),
-        motion,
-        // circular to per axis
-        sigma_guess_arcsec: temporal.map_or(1.0, |s| s / std::f64::consts::SQRT_2),
-        noise: None,
-        // where windows are sent, centroids are formed anew, with another noise
-        weight: Arc::new(if situation.bundle.images.is_some() {
-            vec![1.0; data.t_s.len()]
-        } else {
-            star_weights::of(data)
-        }),
-        kept: Vec::new(),
-    }
 }
 
 fn all_rows<'a>(data: &'a StarData, motion: Option<&'a dyn AttitudeSource>) -> StarRows<'a> {
@@ -407,6 +322,15 @@ impl Finish<'_> {
         Ok(self
             .level
             .residuals(self.folds, &only.candidates, &amplitudes))
+    }
+
+    /// What the nuisance shifts each row by beside the chosen effects, arcsec.
+    fn fitted(&self) -> Result<Vec<Vec<f64>>, CloseError> {
+        let chosen = &self.found.selection.chosen;
+        let none = |_: &_| DVector::zeros(0);
+        let amplitudes = amplitudes_as(&self.found.fitted, self.folds, chosen, none)
+            .ok_or(CloseError::Singular)?;
+        Ok(self.level.residuals(self.folds, &[], &amplitudes).modelled)
     }
 
     fn power(&self, residual: &Residuals) -> f64 {
