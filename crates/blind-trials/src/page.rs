@@ -131,7 +131,7 @@ const HOW: &str = "\n## How the counts are made\n\n\
 - **Right**: the id, and every selector of the truth (channel, star). Each effect that acts answers for one found; a second of its kind counts among others. In pairs either may be first.\n\
 - **Seeds**: a new detector, new noise and, where it is random, a new motion each. Worlds with windows, on which the loop takes twenty times as long, have a quarter of the seeds, at least one.\n\
 - **A value off by 5σ**: |estimate − truth| over the σ that the report gives, of parameters that the world's truth names. **rms z** is the root mean square of the same ratio: 1 if the σ's are honest, with a scatter of 1/√(2n). An instant has an interval in place of a σ: it holds the truth or not. Effects near the limit are found where noise helps them, so that those few found are too large.\n\
-- **scatter**: rms of estimate − truth over the bundles in which it was found.\n\
+- **scatter**: rms of estimate − truth over the bundles in which it was found. In all: the root mean square of its ratio to the bound, of those parameters that have one, and 1/√(2n).\n\
 - **bound**: Cramér–Rao, from differences of runs rendered without noise with the instrument's setting ± 10 %, the noise of each star's centroids and the reference's declared white error, for somebody who knows which effects act and estimates the truth's parameters and a constant misalignment (`crates/blind-trials/src/bound.rs::bounds`). It shares no regressor with the loop. A loop that also fits what is 0 (a third axis, k2, the decentring) must lie above it; an instant, a frequency or a pixel has none.\n\
 - **floor**: what perfect knowledge of everything but the noise leaves: the same bundle less the same run rendered without noise, less a constant misalignment (without a reference: less every frame's own rotation), over the rows in the loop's own figures. *After over floor* should be 0 within 2 %. Where positions are fitted to windows it may be below: such a fit has less noise than the centroids.\n\
 - **honest**: something is left, its first variable is one that the truth allows, and nothing is named that does not act.\n\
@@ -196,6 +196,20 @@ fn summary(pixel: &Rows<'_>, model: &Rows<'_>, known: &Rows<'_>, outside: &Rows<
         line(
             "rms z of all parameters",
             format!("{} ({n} values)", fixed(z)),
+        );
+        let bounded = known.iter().flat_map(|(_, t)| &t.parameters);
+        let (squares, n) = bounded
+            .filter_map(|row| Some((row.count as f64, row.scatter / row.bound?)))
+            .fold((0.0, 0.0), |(s, n), (count, over)| {
+                (s + count * over * over, n + count)
+            });
+        line(
+            "scatter of all parameters over the bound",
+            format!(
+                "{} ± {} ({n} values)",
+                fixed((squares / n).sqrt()),
+                fixed((0.5 / n).sqrt())
+            ),
         );
         let held = [0, 1].map(|k| sum(known, &|t| t.held[k]));
         line(
@@ -466,6 +480,10 @@ mod tests {
         assert!(text.contains("| `time_tag_offset` | `time_tag_offset offset_s` | s | -1.00e-3 | 1 | -1.10e-3 | 1.00e-4 | 2.00e-4 | 0.50 | 0.50 |"), "{text}");
         assert!(
             text.contains("| one effect: a right one first | 1 of 1 (100 %) |"),
+            "{text}"
+        );
+        assert!(
+            text.contains("| scatter of all parameters over the bound | 0.50 ± 0.71 (1 values) |"),
             "{text}"
         );
     }
