@@ -45,6 +45,8 @@ pub(crate) struct Side<'a> {
     pub(crate) unbiased: StarEvidence<'a>,
     pub(crate) fitted: StarEvidence<'a>,
     pub(crate) gaussian: StarEvidence<'a>,
+    /// Where pixels switch.
+    pub(crate) followed: Option<StarEvidence<'a>>,
 }
 
 /// 1 sigma of where the zero of a star's own spot is, px.
@@ -79,6 +81,7 @@ enum Way {
     Unbiased,
     Fitted,
     Gaussian,
+    Followed,
 }
 
 impl ImageLevel {
@@ -99,6 +102,7 @@ impl ImageLevel {
             Way::Unbiased => &side.unbiased,
             Way::Fitted => &side.fitted,
             Way::Gaussian => &side.gaussian,
+            Way::Followed => &side.followed,
         };
         let own = if spot { OWN_ZERO_PX } else { 0.0 };
         let zero = |z: &[f64; 2]| z.map(|z| z.hypot(own));
@@ -107,7 +111,7 @@ impl ImageLevel {
 
     /// Whether the noise of the centroids is no longer that of the declared ones.
     pub(crate) fn new_noise(&self) -> bool {
-        matches!(self.way, Way::Fitted | Way::Gaussian)
+        matches!(self.way, Way::Fitted | Way::Gaussian | Way::Followed)
             && (self.dark_map.stands || self.effective_psf.stands)
     }
 }
@@ -132,6 +136,7 @@ pub(crate) fn compare(
     measured: &StarEvidence<'_>,
     sides: &[Side<'_>; 2],
     phase: &[Box<dyn Candidate>],
+    others: &[Box<dyn Candidate>],
     folds: &Folds,
     data: &StarData,
 ) -> Result<ImageLevel, CloseError> {
@@ -153,6 +158,13 @@ pub(crate) fn compare(
         tell("dark_map + effective_psf", &map.fitted)?,
         tell("dark_map + gaussian spot", &map.gaussian)?,
     ];
+    let followed = match &sides[1].followed {
+        Some(evidence) => Some(tell(
+            "dark_map + effective_psf, switching pixels",
+            evidence,
+        )?),
+        None => None,
+    };
     // What only leads to a decision is not an account to be shown.
     rivals.retain(|r| !r.what.contains(" - spot"));
     let zero = rivals.first().map_or(0.0, |r| r.delta_loglik);
@@ -212,12 +224,12 @@ pub(crate) fn compare(
     .filter(|(way, _)| match way {
         Way::Moments | Way::Gaussian => !spot_stands,
         Way::Unbiased => spot_stands,
-        Way::Fitted => true,
+        Way::Fitted | Way::Followed => true,
     })
     .max_by(|a, b| a.1.alone.total().total_cmp(&b.1.alone.total()))
     .unwrap_or((Way::Moments, moments));
     let by_map = if spot_stands { &map[0] } else { last };
-    let dark_map = Step {
+    let mut dark_map = Step {
         stands: claim.stands,
         p_value: claim.p_value,
         ..step(
@@ -230,6 +242,26 @@ pub(crate) fn compare(
             whole,
         )
     };
+    // What switches is the map's, whatever the way; a static map is claimed by itself first.
+    let side = if claim.stands { &sides[1] } else { &sides[0] };
+    let fixed = match way {
+        Way::Moments => &side.moments,
+        Way::Unbiased => &side.unbiased,
+        Way::Fitted | Way::Followed => &side.fitted,
+        Way::Gaussian => &side.gaussian,
+    };
+    let follows = match side.followed.as_ref().filter(|_| claim.stands) {
+        Some(followed) => {
+            let [with, without] =
+                [followed, fixed].map(|evidence| beside_others(evidence, others, folds));
+            Some(step(&with?, &without?, whole)).filter(|s| s.stands)
+        }
+        None => None,
+    };
+    if let Some(further) = &follows {
+        dark_map.delta_loglik += further.delta_loglik;
+        dark_map.explained += further.explained;
+    }
     let effective_psf = Step {
         stands: spot_stands,
         p_value: spot.p_value,
@@ -239,7 +271,11 @@ pub(crate) fn compare(
         rivals,
         dark_map,
         effective_psf,
-        way,
+        way: if follows.is_some() {
+            Way::Followed
+        } else {
+            way
+        },
     })
 }
 
@@ -322,6 +358,28 @@ fn score(
     })
 }
 
+/// A level beside the effect of the catalogue that improves it most: what moves the stars may be far larger than
+/// what a pixel that switches does.
+fn beside_others(
+    evidence: &StarEvidence<'_>,
+    others: &[Box<dyn Candidate>],
+    folds: &Folds,
+) -> Result<Score, CloseError> {
+    let fitted = fit(evidence, folds, &borrowed(others))?;
+    let scored = |set: &[usize]| {
+        fitted
+            .fits
+            .out_of_fold_by_block(set)
+            .map(|o| Score::new(&o, folds))
+    };
+    (0..others.len())
+        .filter(|&g| !fitted.groups[g].columns.is_empty())
+        .filter_map(|g| scored(&columns_of(&fitted.groups, &[g])))
+        .chain(scored(&[]))
+        .max_by(|a, b| a.total().total_cmp(&b.total()))
+        .ok_or(CloseError::Singular)
+}
+
 /// Gain of one score over another, block by block: its mean against its scatter
 /// is honest however the errors within a block hang together.
 fn step(with: &Score, without: &Score, whole: f64) -> Step {
@@ -360,7 +418,7 @@ pub(crate) fn effects(level: &ImageLevel, formed: &Formed) -> Vec<(FoundEffect, 
         let pixels = formed.map.pixels.len() as f64;
         let rms = formed.map.rms_dn();
         // The rms of n independent pixels is known to rms/sqrt(2 n).
-        let numbers = [
+        let mut numbers = vec![
             ("pixels", pixels, None, ""),
             (
                 "rms_dn",
@@ -369,6 +427,10 @@ pub(crate) fn effects(level: &ImageLevel, formed: &Formed) -> Vec<(FoundEffect, 
                 "DN",
             ),
         ];
+        if level.way == Way::Followed {
+            let switching = formed.with_map.switching as f64;
+            numbers.push(("switching", switching, None, ""));
+        }
         out.push(entry(
             DARK_MAP,
             &level.dark_map,

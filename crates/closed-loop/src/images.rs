@@ -14,7 +14,7 @@ use crate::star_data::StarData;
 use learn::Learned;
 use sample::{Entry, Sample};
 use spline::Grid;
-use window_fit::Pixels;
+use window_fit::{Fitted, Pixels};
 
 mod banded;
 mod coupling;
@@ -28,6 +28,7 @@ mod pixel_noise;
 mod sample;
 mod spline;
 mod spot;
+mod switching;
 #[cfg(test)]
 mod synthetic;
 #[cfg(test)]
@@ -92,6 +93,10 @@ pub(crate) struct Centroids {
     pub(crate) fitted: Variants,
     /// Positions fitted with the round Gaussian nearest to it.
     pub(crate) gaussian: Variants,
+    /// Positions fitted with the effective spot, pixels that switch followed in time; empty where none does.
+    pub(crate) followed: Variants,
+    /// How many pixels are followed, from all data.
+    pub(crate) switching: usize,
     /// 1 sigma of what is constant for each star, px: what the map takes off moments, and the zeros of
     /// spots, that are set to them.
     pub(crate) zero_px: Vec<[f64; 2]>,
@@ -171,25 +176,43 @@ pub(crate) fn form(data: &StarData, windows: &WindowTable, folds: &Folds) -> Opt
 /// Centroids of every star row from each of `learned`, the last of which has seen all frames, the others
 /// those outside their `fold`; rows whose window does not give all of them keep the centroid of the table.
 fn centroids(data: &StarData, sample: &Sample, learned: &[Learned], fold: &[usize]) -> Centroids {
-    let made: Vec<([[Vec<f64>; 2]; 4], usize)> = learned
+    let made: Vec<Made> = learned
         .par_iter()
         .enumerate()
         .map(|(k, one)| one_variant(data, sample, one, |frame| fold[frame] != k))
         .collect();
     let mut out = Centroids::default();
-    for ([moments, unbiased, fitted, gaussian], fallback) in made {
+    let any = made.iter().any(|m| m.switching > 0);
+    for one in made {
+        let [moments, unbiased, fitted, gaussian, followed] = one.variants;
         out.moments.push(moments);
         out.unbiased.push(unbiased);
         out.fitted.push(fitted);
         out.gaussian.push(gaussian);
-        out.fallback_rows = out.fallback_rows.max(fallback);
+        if any {
+            out.followed.push(followed);
+        }
+        out.switching = one.switching;
+        out.fallback_rows = out.fallback_rows.max(one.fallback);
     }
     out.zero_px = zeros(data, &[&out.moments, &out.fitted]);
     out
 }
 
-/// Moments, moments less their bias, fits and Gaussian fits of every star row by `one`, that was learned from
-/// the frames `taken`; and how many rows are those of the table.
+/// Centroids by what was learned from some frames.
+struct Made {
+    /// Moments, moments less their bias, fits, Gaussian fits, and fits with switching pixels followed.
+    variants: [[Vec<f64>; 2]; WAYS],
+    /// Rows that are those of the table.
+    fallback: usize,
+    /// Pixels that are followed.
+    switching: usize,
+}
+
+/// Ways to form a centroid.
+const WAYS: usize = 5;
+
+/// Centroids of every star row by `one`, that was learned from the frames `taken`.
 ///
 /// A spot has no zero of its own: positions found with it are set such that they are, in the mean over a
 /// star, where its first moments are.
@@ -198,36 +221,46 @@ fn one_variant(
     sample: &Sample,
     one: &Learned,
     taken: impl Fn(usize) -> bool,
-) -> ([[Vec<f64>; 2]; 4], usize) {
+) -> Made {
     let table = [data.frames.x_px.clone(), data.frames.y_px.clone()];
-    let mut variants = [(); 4].map(|()| table.clone());
-    let mut fallback = data.t_s.len() - sample.windows();
+    let mut variants = [(); WAYS].map(|()| table.clone());
     let mut pixels = Pixels::default();
     let mut formed = Vec::with_capacity(sample.windows());
-    let mut off = vec![[const { Vec::new() }; 6]; sample.stars];
+    let mut fits = Vec::with_capacity(sample.windows());
+    let mut frame_taken = Vec::with_capacity(sample.windows());
     for frame in 0..fold_frames(sample) {
         for w in sample.windows_of(frame) {
-            let found = one.fitted(sample, w, &mut pixels).and_then(|f| {
+            let fit = one.fitted(sample, w, &mut pixels);
+            let found = fit.and_then(|fit| {
+                let f = fit.at;
                 let m = one.moment(sample, w, &pixels)?;
                 let b = one.moment_bias(sample, w, f, &pixels)?;
                 let g = one.by_gaussian(sample, w, &mut pixels)?;
-                Some([m, [m[0] - b[0], m[1] - b[1]], f, g])
+                Some([m, [m[0] - b[0], m[1] - b[1]], f, g, f])
             });
-            if let Some([m, others @ ..]) = found.filter(|_| taken(frame)) {
-                let star = &mut off[sample.star[w]];
-                for (k, at) in others.iter().enumerate() {
-                    for axis in 0..2 {
-                        star[2 * k + axis].push(m[axis] - at[axis]);
-                    }
-                }
-            }
+            fits.push(fit);
             formed.push(found);
+            frame_taken.push(taken(frame));
         }
     }
-    let zero: Vec<[f64; 6]> = off
+    let switching = follow(data, sample, one, &fits, &frame_taken, &mut formed);
+    let mut off = vec![[const { Vec::new() }; 2 * (WAYS - 1)]; sample.stars];
+    for (w, found) in formed.iter().enumerate() {
+        let Some([m, others @ ..]) = found.filter(|_| frame_taken[w]) else {
+            continue;
+        };
+        let star = &mut off[sample.star[w]];
+        for (k, at) in others.iter().enumerate() {
+            for axis in 0..2 {
+                star[2 * k + axis].push(m[axis] - at[axis]);
+            }
+        }
+    }
+    let zero: Vec<[f64; 2 * (WAYS - 1)]> = off
         .into_iter()
         .map(|star| star.map(|list| clipped_mean(&list)))
         .collect();
+    let mut fallback = data.t_s.len() - sample.windows();
     for (w, found) in formed.into_iter().enumerate() {
         let Some(found) = found else {
             fallback += 1;
@@ -242,7 +275,42 @@ fn one_variant(
             }
         }
     }
-    (variants, fallback)
+    Made {
+        variants,
+        fallback,
+        switching,
+    }
+}
+
+/// Follows pixels that switch and sets the last way of every window that they touch; returns their number.
+fn follow(
+    data: &StarData,
+    sample: &Sample,
+    one: &Learned,
+    fits: &[Option<Fitted>],
+    taken: &[bool],
+    formed: &mut [Option<[[f64; 2]; WAYS]>],
+) -> usize {
+    if !one.mapped {
+        return 0;
+    }
+    let t_s: Vec<f64> = sample.row.iter().map(|&row| data.t_s[row]).collect();
+    let Some(followed) = switching::follow(sample, one, fits, &t_s, taken) else {
+        return 0;
+    };
+    let mut pixels = Pixels::default();
+    for (w, (found, start)) in formed.iter_mut().zip(fits).enumerate() {
+        let (Some(found), Some(start)) = (found, start) else {
+            continue;
+        };
+        if followed.shift[sample.cells_of(w)].iter().all(|s| *s == 0.0) {
+            continue;
+        }
+        if let Some(fit) = one.fitted_with(sample, w, start, &followed.shift, &mut pixels) {
+            found[WAYS - 1] = fit.at;
+        }
+    }
+    followed.pixels
 }
 
 fn fold_frames(sample: &Sample) -> usize {

@@ -183,6 +183,7 @@ fn explain(
             unbiased: anew(&c.unbiased, &c.zero_px),
             fitted: anew(&c.fitted, &c.zero_px),
             gaussian: anew(&c.gaussian, &c.zero_px),
+            followed: (!c.followed.is_empty()).then(|| anew(&c.followed, &c.zero_px)),
         })
     });
 
@@ -200,9 +201,14 @@ fn explain(
     let scene = scene(situation, data, &facts, &rows);
     let image = match &sides {
         Some(sides) => {
-            let mut phase = catalogue_candidates(&scene);
-            phase.retain(|c| c.id() == "pixel_phase_harmonics");
-            Some(image_level::compare(&measured, sides, &phase, folds, data)?)
+            let mut others = catalogue_candidates(&scene);
+            others.retain(|c| c.acts_on_stars());
+            let phase: Vec<_> = others
+                .extract_if(.., |c| c.id() == "pixel_phase_harmonics")
+                .collect();
+            Some(image_level::compare(
+                &measured, sides, &phase, &others, folds, data,
+            )?)
         }
         None => None,
     };

@@ -63,8 +63,9 @@ pub(crate) struct Spot {
     pub(crate) psi: Vec<f64>,
     roughness: f64,
     pub(crate) background: f64,
-    background_variance: f64,
-    scale: f64,
+    pub(crate) background_variance: f64,
+    /// Noise of the star's pixels over that of all.
+    pub(crate) scale: f64,
     /// What is taken off every pixel for a first moment.
     level: f64,
     /// Spline coefficients of the Gaussian nearest to it; empty where there is none.
@@ -79,6 +80,8 @@ pub(crate) struct Learned {
     finer: Grid,
     pub(crate) spots: Vec<Spot>,
     pub(crate) dark: Dark,
+    /// Whether the map was free.
+    pub(crate) mapped: bool,
     pub(crate) noise: PixelNoise,
     /// Pixels left out as particle hits in the last round.
     pub(crate) clipped: usize,
@@ -137,6 +140,7 @@ pub(crate) fn learn(
             .map(|list| first_guess(sample, list, &mut state, &grid))
             .collect(),
         dark: Dark::none(sample.centre.len()),
+        mapped,
         noise: PixelNoise {
             a: (0.1 * robust_median(sample.z.clone()).unwrap_or(0.0)).max(0.0) + 1.0,
             b: 1.0,
@@ -454,18 +458,30 @@ impl Learned {
             background_variance: spot.background_variance,
             dark: &self.dark.value,
             dark_variance,
+            shift: None,
         }
     }
 
     /// Position of the star of window `w` by its spot, everything learned frozen.
-    pub(crate) fn fitted(
+    pub(crate) fn fitted(&self, sample: &Sample, w: usize, pixels: &mut Pixels) -> Option<Fitted> {
+        let spot = &self.spots[sample.star[w]];
+        self.by(&self.grid, &spot.psi, sample, w, pixels)
+    }
+
+    /// The same with `shift`, what the pixels add to their map, value by value; from where the star was found without.
+    pub(crate) fn fitted_with(
         &self,
         sample: &Sample,
         w: usize,
+        start: &Fitted,
+        shift: &[f64],
         pixels: &mut Pixels,
-    ) -> Option<[f64; 2]> {
-        let spot = &self.spots[sample.star[w]];
-        self.by(&self.grid, &spot.psi, sample, w, pixels)
+    ) -> Option<Fitted> {
+        let known = Known {
+            shift: Some(shift),
+            ..self.known(sample.star[w], Some(&self.dark.variance))
+        };
+        window_fit::fit(&known, sample, w, start, FINAL_STEPS, pixels)
     }
 
     /// The same by the Gaussian nearest to the spot.
@@ -477,6 +493,7 @@ impl Learned {
     ) -> Option<[f64; 2]> {
         let spot = &self.spots[sample.star[w]];
         self.by(&self.finer, &spot.gaussian, sample, w, pixels)
+            .map(|f| f.at)
     }
 
     fn by(
@@ -486,7 +503,7 @@ impl Learned {
         sample: &Sample,
         w: usize,
         pixels: &mut Pixels,
-    ) -> Option<[f64; 2]> {
+    ) -> Option<Fitted> {
         if psi.is_empty() {
             return None;
         }
@@ -502,7 +519,7 @@ impl Learned {
             psi,
             ..self.known(star, Some(&self.dark.variance))
         };
-        window_fit::fit(&known, sample, w, &start, FINAL_STEPS, pixels).map(|f| f.at)
+        window_fit::fit(&known, sample, w, &start, FINAL_STEPS, pixels)
     }
 
     /// First moment of window `w`, map and a constant level taken off. Pixels with a

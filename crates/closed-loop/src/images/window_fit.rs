@@ -62,6 +62,8 @@ pub(crate) struct Known<'a> {
     pub(crate) dark: &'a [f64],
     /// Its variance, if it is to be counted.
     pub(crate) dark_variance: Option<&'a [f64]>,
+    /// What the pixels add to it at this time, by value of the sample.
+    pub(crate) shift: Option<&'a [f64]>,
 }
 
 /// One window's four numbers.
@@ -112,7 +114,8 @@ pub(crate) fn fit(
                     .grid
                     .evaluate(known.psi, &pixels.taps.x[c], &pixels.taps.y[r]);
             let dark = sample.pixel[i];
-            let model = now.flux * psi + now.background + known.dark[dark];
+            let shift = known.shift.map_or(0.0, |s| s[i]);
+            let model = now.flux * psi + now.background + known.dark[dark] + shift;
             let residual = sample.z[i] - model;
             let variance =
                 known.noise.variance(model) + known.dark_variance.map_or(0.0, |v| v[dark]);
@@ -201,6 +204,7 @@ mod tests {
                     background_variance: 9.0,
                     dark: &dark,
                     dark_variance: None,
+                    shift: None,
                 };
                 let start = Fitted {
                     at: start,
