@@ -158,13 +158,9 @@ pub(crate) fn compare(
         tell("dark_map + effective_psf", &map.fitted)?,
         tell("dark_map + gaussian spot", &map.gaussian)?,
     ];
-    let followed = match &sides[1].followed {
-        Some(evidence) => Some(tell(
-            "dark_map + effective_psf, switching pixels",
-            evidence,
-        )?),
-        None => None,
-    };
+    if let Some(followed) = &sides[1].followed {
+        tell("dark_map, switching + effective_psf", followed)?;
+    }
     // What only leads to a decision is not an account to be shown.
     rivals.retain(|r| !r.what.contains(" - spot"));
     let zero = rivals.first().map_or(0.0, |r| r.delta_loglik);
@@ -428,8 +424,8 @@ pub(crate) fn effects(level: &ImageLevel, formed: &Formed) -> Vec<(FoundEffect, 
             ),
         ];
         if level.way == Way::Followed {
-            let switching = formed.with_map.switching as f64;
-            numbers.push(("switching", switching, None, ""));
+            let followed = formed.with_map.switching as f64;
+            numbers.push(("followed", followed, None, ""));
         }
         out.push(entry(
             DARK_MAP,

@@ -243,7 +243,7 @@ fn one_variant(
             frame_taken.push(taken(frame));
         }
     }
-    let switching = follow(data, sample, one, &fits, &frame_taken, &mut formed);
+    let switching = follow(sample, one, &fits, &frame_taken, &mut formed);
     let mut off = vec![[const { Vec::new() }; 2 * (WAYS - 1)]; sample.stars];
     for (w, found) in formed.iter().enumerate() {
         let Some([m, others @ ..]) = found.filter(|_| frame_taken[w]) else {
@@ -284,7 +284,6 @@ fn one_variant(
 
 /// Follows pixels that switch and sets the last way of every window that they touch; returns their number.
 fn follow(
-    data: &StarData,
     sample: &Sample,
     one: &Learned,
     fits: &[Option<Fitted>],
@@ -294,8 +293,7 @@ fn follow(
     if !one.mapped {
         return 0;
     }
-    let t_s: Vec<f64> = sample.row.iter().map(|&row| data.t_s[row]).collect();
-    let Some(followed) = switching::follow(sample, one, fits, &t_s, taken) else {
+    let Some(followed) = switching::follow(sample, one, fits, taken) else {
         return 0;
     };
     let mut pixels = Pixels::default();
@@ -401,6 +399,7 @@ fn entries<'a>(data: &StarData, windows: &'a WindowTable) -> Vec<Vec<Entry<'a>>>
                     };
                     Some(Entry {
                         row,
+                        t_s: data.t_s[row],
                         star: data.star[row],
                         start: [data.frames.x_px[row], data.frames.y_px[row]],
                         flux: data.frames.flux.as_ref().map(|f| f[row]),

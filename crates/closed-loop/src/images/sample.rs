@@ -26,6 +26,7 @@ const MAX_PIXEL_INDEX: f64 = 1e6;
 pub(crate) struct Entry<'a> {
     /// Row of the stars table.
     pub(crate) row: usize,
+    pub(crate) t_s: f64,
     pub(crate) star: usize,
     /// Centroid of the stars table, px.
     pub(crate) start: [f64; 2],
@@ -49,6 +50,7 @@ pub(crate) struct Sample {
     /// First window of each frame, and the end of the last.
     pub(crate) first_window: Vec<usize>,
     pub(crate) row: Vec<usize>,
+    pub(crate) t_s: Vec<f64>,
     pub(crate) star: Vec<usize>,
     pub(crate) start: Vec<[f64; 2]>,
     pub(crate) flux: Vec<f64>,
@@ -91,6 +93,7 @@ impl Sample {
             stars,
             first_window: vec![0],
             row: Vec::new(),
+            t_s: Vec::new(),
             star: Vec::new(),
             start: Vec::new(),
             flux: Vec::new(),
@@ -172,6 +175,7 @@ impl Sample {
             self.pixel.push(pixels.number(key));
         }
         self.row.push(entry.row);
+        self.t_s.push(entry.t_s);
         self.star.push(entry.star);
         self.start.push(entry.start);
         self.background.push(background);
@@ -346,6 +350,7 @@ mod tests {
         let at = [corner[0] + 1.0, corner[1] + 0.5];
         Entry {
             row: 0,
+            t_s: 0.0,
             star: 0,
             start: at,
             flux: None,

@@ -50,13 +50,12 @@ pub(crate) struct Followed {
     pub(crate) pixels: usize,
 }
 
-/// Follows the pixels of all windows. `fitted` by window, as `learned` found them; `t_s` and `taken`, whether its
-/// frame may be learned from, too. `None` where nothing switches.
+/// Follows the pixels of all windows. `fitted` by window, as `learned` found them; `taken`, whether
+/// its frame may be learned from, too. `None` where nothing switches.
 pub(crate) fn follow(
     sample: &Sample,
     learned: &Learned,
     fitted: &[Option<Fitted>],
-    t_s: &[f64],
     taken: &[bool],
 ) -> Option<Followed> {
     let visits = visits(sample);
@@ -67,7 +66,7 @@ pub(crate) fn follow(
         let series: Vec<Visit> = visits
             .iter()
             .filter(|v| taken[v[0]])
-            .map(|&v| scores.visit(v, shift, t_s))
+            .map(|&v| scores.visit(sample, v, shift))
             .filter(|v| v.information > 0.0)
             .collect();
         likeliest(&series).filter(|found| found.0 > least)
@@ -86,7 +85,10 @@ pub(crate) fn follow(
             if round < CHOOSING {
                 *process = choose(&scores, &shift, list).map(|found| found.1);
             }
-            let series: Vec<Visit> = list.iter().map(|&v| scores.visit(v, &shift, t_s)).collect();
+            let series: Vec<Visit> = list
+                .iter()
+                .map(|&v| scores.visit(sample, v, &shift))
+                .collect();
             let smoothed = match process {
                 Some(process) => process.smooth(&series),
                 None => vec![0.0; series.len()],
@@ -222,12 +224,12 @@ impl Scores {
     }
 
     /// What one visit says of its pixel, all other pixels as they are.
-    fn visit(&self, [w, i]: [usize; 2], shift: &[f64], t_s: &[f64]) -> Visit {
+    fn visit(&self, sample: &Sample, [w, i]: [usize; 2], shift: &[f64]) -> Visit {
         let x = Vector4::from(self.column[i]);
         let weight = self.weight[i];
         let information = (weight - weight * weight * x.dot(&(self.inverse[w] * x))).max(0.0);
         Visit {
-            t_s: t_s[w],
+            t_s: sample.t_s[w],
             information,
             score: self.score[i] + information * shift[i],
         }

@@ -191,6 +191,7 @@ pub(crate) fn few_windows(count: usize) -> Sample {
         .map(|(row, (&(at, corner), values))| {
             vec![Entry {
                 row,
+                t_s: row as f64,
                 star: 0,
                 start: [at.x, at.y],
                 flux: Some(FLUX),
