@@ -304,7 +304,7 @@ fn follow(
         if followed.shift[sample.cells_of(w)].iter().all(|s| *s == 0.0) {
             continue;
         }
-        if let Some(fit) = one.fitted_with(sample, w, start, &followed.shift, &mut pixels) {
+        if let Some(fit) = one.fitted_with(sample, w, start, &followed, &mut pixels) {
             found[WAYS - 1] = fit.at;
         }
     }

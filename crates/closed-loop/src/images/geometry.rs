@@ -271,6 +271,7 @@ mod tests {
                     base[a] + 0.1 * star as f64 + turn + bend
                 }));
                 frame.push(Entry {
+                    t_s: 0.0,
                     row: at.len() - 1,
                     star,
                     start: base,

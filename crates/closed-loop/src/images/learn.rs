@@ -24,6 +24,7 @@ use super::pixel_noise::{self, MIN_READ_VARIANCE};
 use super::sample::Sample;
 use super::spline::Grid;
 use super::spot::{self, Normal};
+use super::switching::Followed;
 use super::window_fit::{self, Fitted, Known, PixelNoise, Pixels};
 use super::{MAD_SCALE, robust_median};
 
@@ -468,18 +469,18 @@ impl Learned {
         self.by(&self.grid, &spot.psi, sample, w, pixels)
     }
 
-    /// The same with `shift`, what the pixels add to their map, value by value; from where the star was found without.
+    /// The same with what the pixels add to their map in time; from where the star was found without.
     pub(crate) fn fitted_with(
         &self,
         sample: &Sample,
         w: usize,
         start: &Fitted,
-        shift: &[f64],
+        followed: &Followed,
         pixels: &mut Pixels,
     ) -> Option<Fitted> {
         let known = Known {
-            shift: Some(shift),
-            ..self.known(sample.star[w], Some(&self.dark.variance))
+            shift: Some(&followed.shift),
+            ..self.known(sample.star[w], Some(&followed.variance))
         };
         window_fit::fit(&known, sample, w, start, FINAL_STEPS, pixels)
     }

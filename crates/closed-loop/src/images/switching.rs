@@ -46,6 +46,8 @@ const CLIP: f64 = 5.0;
 /// What the pixels add to their map, value by value.
 pub(crate) struct Followed {
     pub(crate) shift: Vec<f64>,
+    /// Variance of the map where pixels are not followed: what is followed knows its mean as well.
+    pub(crate) variance: Vec<f64>,
     /// How many are followed.
     pub(crate) pixels: usize,
 }
@@ -107,8 +109,16 @@ pub(crate) fn follow(
             break;
         }
     }
-    let pixels = pixels.iter().filter(|p| p.2.is_some()).count();
-    (pixels > 0).then_some(Followed { shift, pixels })
+    let mut variance = learned.dark.variance.clone();
+    pixels.retain(|p| p.2.is_some());
+    for &(_, p, _) in &pixels {
+        variance[p] = 0.0;
+    }
+    (!pixels.is_empty()).then_some(Followed {
+        shift,
+        variance,
+        pixels: pixels.len(),
+    })
 }
 
 /// Window and value of every visit to each pixel, in time.
@@ -154,9 +164,9 @@ impl Scores {
                     continue;
                 }
                 let [psi, gx, gy] = learned.grid.evaluate(&spot.psi, &taps.x[c], &taps.y[r]);
-                let pixel = sample.pixel[i];
-                let model = fitted.flux * psi + fitted.background + learned.dark.value[pixel];
-                let variance = learned.noise.variance(model) + learned.dark.variance[pixel];
+                let dark = learned.dark.value[sample.pixel[i]];
+                let model = fitted.flux * psi + fitted.background + dark;
+                let variance = learned.noise.variance(model);
                 scores.column[i] = [psi, 1.0, -fitted.flux * gx, -fitted.flux * gy];
                 scores.weight[i] = 1.0 / (spot.scale * spot.scale * variance);
                 scores.score[i] = sample.z[i] - model;

@@ -22,8 +22,12 @@ pub(crate) struct Scenario<'a> {
     pub(crate) stars: &'a [[f64; 2]],
     /// Shift of all stars in a frame, px.
     pub(crate) motion: &'a dyn Fn(usize) -> [f64; 2],
+    /// Shift of one star in a frame along x, px.
+    pub(crate) wander: &'a dyn Fn(usize, usize) -> f64,
     /// What the pixel with this centre adds.
     pub(crate) dark: &'a dyn Fn([f64; 2]) -> f64,
+    /// What it adds beside that in a frame.
+    pub(crate) switching: &'a dyn Fn(usize, [f64; 2]) -> f64,
     /// Windows (row index) with a particle hit.
     pub(crate) hit: &'a dyn Fn(usize) -> bool,
     /// Whether the image of a star in a frame is in the bundle.
@@ -39,6 +43,14 @@ pub(crate) const BACKGROUND: f64 = 30.0;
 pub(crate) const NOISE: [f64; 2] = [4.0, 0.25];
 
 pub(crate) fn nothing(_: [f64; 2]) -> f64 {
+    0.0
+}
+
+pub(crate) fn steady(_: usize, _: [f64; 2]) -> f64 {
+    0.0
+}
+
+pub(crate) fn rigid(_: usize, _: usize) -> f64 {
     0.0
 }
 
@@ -83,7 +95,7 @@ impl Scenario<'_> {
             let t_s = k as f64;
             for (s, star) in self.stars.iter().enumerate() {
                 let row = truth[0].len();
-                let at = [star[0] + shift[0], star[1] + shift[1]];
+                let at = [star[0] + shift[0] + (self.wander)(k, s), star[1] + shift[1]];
                 let half = (self.size as f64 - 1.0) / 2.0;
                 let corner = at.map(|v| (v - half - self.pixel_centre).round() + self.pixel_centre);
                 let (first, place) = (
@@ -104,9 +116,10 @@ impl Scenario<'_> {
                         corner[0] + (i % self.size) as f64,
                         corner[1] + (i / self.size) as f64,
                     ];
-                    let signal = light + BACKGROUND + (self.dark)(centre);
+                    let own = (self.dark)(centre) + (self.switching)(k, centre);
+                    let signal = light + BACKGROUND + own;
                     let e: f64 = StandardNormal.sample(&mut rng);
-                    values.push(signal + (NOISE[0] + NOISE[1] * signal).sqrt() * e);
+                    values.push(signal + (NOISE[0] + NOISE[1] * signal.max(0.0)).sqrt() * e);
                 }
                 if (self.hit)(row) {
                     values[(row * 7) % (self.size * self.size)] += 3000.0;

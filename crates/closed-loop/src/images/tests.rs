@@ -2,7 +2,9 @@
 //!
 //! Not physics: tests.
 
-use super::synthetic::{BACKGROUND, Made, SIGMA_PX, Scenario, all, dither, no_hit, nothing, rms};
+use super::synthetic::{
+    BACKGROUND, Made, SIGMA_PX, Scenario, all, dither, no_hit, nothing, rigid, rms, steady,
+};
 use super::*;
 
 const FIELD: [[f64; 2]; 4] = [
@@ -17,7 +19,9 @@ fn scenario<'a>() -> Scenario<'a> {
         frames: 400,
         stars: &FIELD,
         motion: &dither,
+        wander: &rigid,
         dark: &nothing,
+        switching: &steady,
         hit: &no_hit,
         kept: &all,
         size: 6,
@@ -49,13 +53,18 @@ fn out_of_fold(made: &Made, variants: &[[Vec<f64>; 2]]) -> [Vec<f64>; 2] {
     out
 }
 
-/// A value for every pixel, exponential with mean 25, the same on every call.
-fn warm(centre: [f64; 2]) -> f64 {
+/// A number between 0 and 1 for every pixel and `key`, the same on every call.
+fn uniform(centre: [f64; 2], key: u64) -> f64 {
     let mut z = centre[0].to_bits().wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ centre[1].to_bits();
+    z ^= key.wrapping_mul(0xD6E8_FEB8_6659_FD93);
     z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
     z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-    let uniform = ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64;
-    -25.0 * (1.0 - uniform).ln()
+    ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
+}
+
+/// A value for every pixel, exponential with mean 25.
+fn warm(centre: [f64; 2]) -> f64 {
+    -25.0 * (1.0 - uniform(centre, 0)).ln()
 }
 
 /// (map - truth) over sigma, each against its mean over the pixels of one star.
@@ -578,5 +587,84 @@ mod measured {
         assert!(moments.iter().all(|v| *v <= 0.065), "{moments:?}");
         assert!(fitted.iter().all(|v| *v <= 0.04), "{fitted:?}");
         assert!(bent.iter().all(|v| *v <= 0.025), "{bent:?}");
+    }
+}
+
+/// One pixel in eight has 120 more half of the time, drawn anew every 40 frames.
+fn telegraph(k: usize, centre: [f64; 2]) -> f64 {
+    let on = uniform(centre, 2 + (k / 40) as u64) < 0.5;
+    if on && uniform(centre, 1) < 0.125 {
+        120.0
+    } else {
+        0.0
+    }
+}
+
+/// Slow motion of the first star, px.
+fn slow(k: usize, star: usize) -> f64 {
+    if star == 0 {
+        0.03 * (k as f64 / 25.0).sin()
+    } else {
+        0.0
+    }
+}
+
+#[test]
+fn pixels_that_switch_are_followed() {
+    for seed in 0..2 {
+        let scene = Scenario {
+            dark: &warm,
+            frames: 800,
+            seed,
+            ..scenario()
+        };
+        let still = scene.make();
+        let made = Scenario {
+            switching: &telegraph,
+            ..scene
+        }
+        .make();
+        let formed_still = formed(&still);
+        let f = formed(&made);
+        println!(
+            "{seed} still {} followed {} moving {}",
+            rms(
+                &still,
+                &out_of_fold(&still, &formed_still.with_map.fitted),
+                &every
+            ),
+            formed_still.with_map.switching,
+            f.with_map.switching
+        );
+        println!(
+            "  fitted {} followed {}",
+            rms(&made, &out_of_fold(&made, &f.with_map.fitted), &every),
+            rms(&made, &out_of_fold(&made, &f.with_map.followed), &every)
+        );
+        let drift = Scenario {
+            dark: &warm,
+            frames: 800,
+            seed,
+            switching: &telegraph,
+            wander: &slow,
+            ..scenario()
+        }
+        .make();
+        let d = formed(&drift);
+        for (n, v) in [
+            ("fitted", &d.with_map.fitted),
+            ("followed", &d.with_map.followed),
+        ] {
+            let at = out_of_fold(&drift, v);
+            let (mut a, mut b) = (0.0, 0.0);
+            for (r, &x) in at[0].iter().enumerate() {
+                if drift.data.star[r] == 0 {
+                    let s = slow(r / 4, 0);
+                    a += s * (x - drift.truth[0][r]);
+                    b += s * s;
+                }
+            }
+            println!("  {n} slope {}  rms {}", a / b, rms(&drift, &at, &every));
+        }
     }
 }
