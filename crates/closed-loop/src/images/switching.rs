@@ -61,7 +61,7 @@ pub(crate) fn follow(
     taken: &[bool],
 ) -> Option<Followed> {
     let visits = visits(sample);
-    let mut scores = Scores::new(sample, learned, fitted, &visits);
+    let scores = Scores::new(sample, learned, fitted, &visits, |_| true);
     let all = visits.iter().filter(|v| v.len() >= MIN_VISITS).count();
     let least = LEAST_GAIN + (all.max(1) as f64).ln();
     let choose = |scores: &Scores, shift: &[f64], visits: &[[usize; 2]]| {
@@ -79,6 +79,15 @@ pub(crate) fn follow(
         .enumerate()
         .filter_map(|(p, list)| choose(&scores, &shift, list).map(|(gain, _)| (gain, p, None)))
         .collect();
+    if pixels.is_empty() {
+        return None;
+    }
+    // what is far off in a pixel that nobody follows is left out, as it is of positions
+    let mut may = vec![false; visits.len()];
+    for &(_, p, _) in &pixels {
+        may[p] = true;
+    }
+    let mut scores = Scores::new(sample, learned, fitted, &visits, |p| may[p]);
     pixels.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
     for round in 0..ROUNDS {
         let mut change = 0.0_f64;
@@ -122,7 +131,7 @@ pub(crate) fn follow(
 }
 
 /// Window and value of every visit to each pixel, in time.
-fn visits(sample: &Sample) -> Vec<Vec<[usize; 2]>> {
+pub(crate) fn visits(sample: &Sample) -> Vec<Vec<[usize; 2]>> {
     let mut visits = vec![Vec::new(); sample.centre.len()];
     for w in 0..sample.windows() {
         for i in sample.cells_of(w) {
@@ -133,19 +142,20 @@ fn visits(sample: &Sample) -> Vec<Vec<[usize; 2]>> {
 }
 
 /// Scores of all values, and what they are made of.
-struct Scores {
-    weight: Vec<f64>,
-    column: Vec<[f64; 4]>,
+pub(crate) struct Scores {
+    pub(crate) weight: Vec<f64>,
+    pub(crate) column: Vec<[f64; 4]>,
     inverse: Vec<Matrix4<f64>>,
-    score: Vec<f64>,
+    pub(crate) score: Vec<f64>,
 }
 
 impl Scores {
-    fn new(
+    pub(crate) fn new(
         sample: &Sample,
         learned: &Learned,
         fitted: &[Option<Fitted>],
         visits: &[Vec<[usize; 2]>],
+        may: impl Fn(usize) -> bool,
     ) -> Self {
         let mut scores = Self {
             weight: vec![0.0; sample.z.len()],
@@ -164,15 +174,21 @@ impl Scores {
                     continue;
                 }
                 let [psi, gx, gy] = learned.grid.evaluate(&spot.psi, &taps.x[c], &taps.y[r]);
-                let dark = learned.dark.value[sample.pixel[i]];
-                let model = fitted.flux * psi + fitted.background + dark;
-                let variance = learned.noise.variance(model);
+                let pixel = sample.pixel[i];
+                let model = fitted.flux * psi + fitted.background + learned.dark.value[pixel];
+                // the map of a pixel that is followed is in what is followed
+                let map = if may(pixel) {
+                    0.0
+                } else {
+                    learned.dark.variance[pixel]
+                };
+                let variance = learned.noise.variance(model) + map;
                 scores.column[i] = [psi, 1.0, -fitted.flux * gx, -fitted.flux * gy];
                 scores.weight[i] = 1.0 / (spot.scale * spot.scale * variance);
                 scores.score[i] = sample.z[i] - model;
             }
         }
-        scores.leave_out_hits(visits);
+        scores.leave_out_hits(visits, may);
         for (w, fitted) in fitted.iter().enumerate() {
             let Some(fitted) = fitted else { continue };
             scores.project(sample, learned, w, fitted);
@@ -180,10 +196,10 @@ impl Scores {
         scores
     }
 
-    /// Weight zero to residuals that are far off and alone with it in time.
-    fn leave_out_hits(&mut self, visits: &[Vec<[usize; 2]>]) {
+    /// Weight zero to residuals that are far off; in pixels that may switch to those that are alone with it in time.
+    fn leave_out_hits(&mut self, visits: &[Vec<[usize; 2]>], may: impl Fn(usize) -> bool) {
         let mut hits = Vec::new();
-        for list in visits {
+        for (p, list) in visits.iter().enumerate() {
             let seen: Vec<usize> = list
                 .iter()
                 .map(|v| v[1])
@@ -197,7 +213,7 @@ impl Scores {
                 let alone = |j: usize| off(i, self.score[j], 1.0 / self.weight[j]);
                 let near = [k.checked_sub(1), Some(k + 1)];
                 let mut near = near.iter().filter_map(|k| seen.get((*k)?));
-                if off(i, 0.0, 0.0) && near.all(|&j| alone(j)) {
+                if off(i, 0.0, 0.0) && (!may(p) || near.all(|&j| alone(j))) {
                     hits.push(i);
                 }
             }

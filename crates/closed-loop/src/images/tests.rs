@@ -7,6 +7,8 @@ use super::synthetic::{
 };
 use super::*;
 
+mod switching;
+
 const FIELD: [[f64; 2]; 4] = [
     [-210.3, 95.2],
     [180.7, 240.4],
@@ -587,84 +589,5 @@ mod measured {
         assert!(moments.iter().all(|v| *v <= 0.065), "{moments:?}");
         assert!(fitted.iter().all(|v| *v <= 0.04), "{fitted:?}");
         assert!(bent.iter().all(|v| *v <= 0.025), "{bent:?}");
-    }
-}
-
-/// One pixel in eight has 120 more half of the time, drawn anew every 40 frames.
-fn telegraph(k: usize, centre: [f64; 2]) -> f64 {
-    let on = uniform(centre, 2 + (k / 40) as u64) < 0.5;
-    if on && uniform(centre, 1) < 0.125 {
-        120.0
-    } else {
-        0.0
-    }
-}
-
-/// Slow motion of the first star, px.
-fn slow(k: usize, star: usize) -> f64 {
-    if star == 0 {
-        0.03 * (k as f64 / 25.0).sin()
-    } else {
-        0.0
-    }
-}
-
-#[test]
-fn pixels_that_switch_are_followed() {
-    for seed in 0..2 {
-        let scene = Scenario {
-            dark: &warm,
-            frames: 800,
-            seed,
-            ..scenario()
-        };
-        let still = scene.make();
-        let made = Scenario {
-            switching: &telegraph,
-            ..scene
-        }
-        .make();
-        let formed_still = formed(&still);
-        let f = formed(&made);
-        println!(
-            "{seed} still {} followed {} moving {}",
-            rms(
-                &still,
-                &out_of_fold(&still, &formed_still.with_map.fitted),
-                &every
-            ),
-            formed_still.with_map.switching,
-            f.with_map.switching
-        );
-        println!(
-            "  fitted {} followed {}",
-            rms(&made, &out_of_fold(&made, &f.with_map.fitted), &every),
-            rms(&made, &out_of_fold(&made, &f.with_map.followed), &every)
-        );
-        let drift = Scenario {
-            dark: &warm,
-            frames: 800,
-            seed,
-            switching: &telegraph,
-            wander: &slow,
-            ..scenario()
-        }
-        .make();
-        let d = formed(&drift);
-        for (n, v) in [
-            ("fitted", &d.with_map.fitted),
-            ("followed", &d.with_map.followed),
-        ] {
-            let at = out_of_fold(&drift, v);
-            let (mut a, mut b) = (0.0, 0.0);
-            for (r, &x) in at[0].iter().enumerate() {
-                if drift.data.star[r] == 0 {
-                    let s = slow(r / 4, 0);
-                    a += s * (x - drift.truth[0][r]);
-                    b += s * s;
-                }
-            }
-            println!("  {n} slope {}  rms {}", a / b, rms(&drift, &at, &every));
-        }
     }
 }
