@@ -7,7 +7,7 @@ use super::synthetic::{
 };
 use super::*;
 
-mod switching;
+mod switching_pixels;
 
 const FIELD: [[f64; 2]; 4] = [
     [-210.3, 95.2],
