@@ -235,7 +235,7 @@ fn one_variant(
                 let f = fit.at;
                 let m = one.moment(sample, w, &pixels)?;
                 let b = one.moment_bias(sample, w, f, &pixels)?;
-                let g = one.by_gaussian(sample, w, &mut pixels)?;
+                let g = one.by_gaussian(sample, w, &fit, &mut pixels)?;
                 Some([m, [m[0] - b[0], m[1] - b[1]], f, g, f])
             });
             fits.push(fit);

@@ -77,6 +77,8 @@ struct Field {
     frame: Vec<u32>,
     /// Rows of each star.
     stars: Vec<Range<usize>>,
+    /// Whether the stars have spots of their own.
+    own_spots: bool,
 }
 
 /// What was found.
@@ -130,12 +132,13 @@ impl Pattern {
 }
 
 /// The pattern that `residual` (arcsec, per axis over all rows) follows, if one is beyond
-/// doubt. `order` is the declared distortion's.
+/// doubt. `order` is the declared distortion's; with `own_spots` the stars' centroids were learned from windows.
 pub(crate) fn search(
     data: &StarData,
     residual: &[Vec<f64>],
     folds: &Folds,
     order: Option<u32>,
+    own_spots: bool,
 ) -> Option<Pattern> {
     let [rx, ry] = residual else { return None };
     let frame = data.frames.frame_of_rows();
@@ -149,13 +152,10 @@ pub(crate) fn search(
     for row in (0..frame.len()).filter(|&r| counts(r)) {
         of_star[data.star[row]].push(row);
     }
-    let field = |residual: [&[f64]; 2]| {
-        Field::new(
-            [&data.modelled[0], &data.modelled[1]],
-            residual,
-            &frame,
-            &of_star,
-        )
+    let at = [data.modelled[0].as_slice(), &data.modelled[1]];
+    let field = |residual: [&[f64]; 2]| Field {
+        own_spots,
+        ..Field::new(at, residual, &frame, &of_star)
     };
     let as_left = || field([rx, ry]);
     let turning = data.t_s.len() >= STARS_TO_TURN * data.frames.frames();

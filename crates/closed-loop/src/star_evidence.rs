@@ -74,6 +74,11 @@ impl<'a> StarEvidence<'a> {
         }
     }
 
+    /// Whether the centroids were learned outside each fold.
+    pub(crate) fn learned(&self) -> bool {
+        self.residuals.len() > 1
+    }
+
     /// The same evidence under a noise that frames share.
     pub(crate) fn with_noise(&self, noise: &CommonNoise) -> Self {
         Self {

@@ -441,7 +441,7 @@ fn finish(f: &Finish<'_>, plain: Residuals) -> Result<Closed, CloseError> {
             let order = f.situation.model.noise.distortion_order;
             rayon::join(
                 || leftover::describe(&leftover::star_tracks(f.data, residual)),
-                || pattern::search(f.data, residual, f.folds, order),
+                || pattern::search(f.data, residual, f.folds, order, f.level.learned()),
             )
         },
     );

@@ -76,6 +76,20 @@ impl Banded {
     }
 }
 
+/// Sum of products, in lanes.
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    const LANES: usize = 8;
+    let mut sums = [0.0; LANES];
+    let (mut x, mut y) = (a.chunks_exact(LANES), b.chunks_exact(LANES));
+    for (x, y) in (&mut x).zip(&mut y) {
+        for (s, (x, y)) in sums.iter_mut().zip(x.iter().zip(y)) {
+            *s += x * y;
+        }
+    }
+    let rest = x.remainder().iter().zip(y.remainder());
+    sums.iter().sum::<f64>() + rest.map(|(x, y)| x * y).sum::<f64>()
+}
+
 impl Factor {
     fn order(&self) -> usize {
         self.entries.len() / (self.width + 1)
@@ -97,7 +111,7 @@ impl Factor {
         }
         for i in (0..self.order()).rev() {
             let row = self.row(i);
-            let tail: f64 = row[1..].iter().zip(&b[i + 1..]).map(|(l, v)| l * v).sum();
+            let tail = dot(&row[1..], &b[i + 1..i + row.len()]);
             b[i] = b[i] / row[0] - tail;
         }
     }
@@ -137,9 +151,7 @@ impl Factor {
                 for (s, v) in sums[k..=reach].iter_mut().zip(known) {
                     *s += l * v;
                 }
-                for j in k + 1..=reach {
-                    sums[k] += row[j] * known[j - k];
-                }
+                sums[k] += dot(&row[k + 1..=reach], &known[1..]);
             }
             let mut diagonal = 1.0 / row[0];
             for k in 1..=reach {

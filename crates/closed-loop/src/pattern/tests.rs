@@ -177,3 +177,31 @@ fn waves_are_sines_and_cosines() {
         );
     }
 }
+
+/// Stars whose spots err with the pixel phase, each in a way of its own, have no pattern in common: a wave near one cycle
+/// per pixel fits what twelve stars do by chance. A fringe beside it is found as before.
+#[test]
+fn spots_of_their_own_are_no_pattern() {
+    let phase = |x: f64, y: f64| {
+        // paths start at least a few pixels apart
+        let star = ((x / 64.0).floor() * 5.0 + (y / 64.0).floor() * 3.0).sin();
+        4.0 * star * (TAU * (x + 0.3 * star)).sin()
+    };
+    let fringe = wave([0.31, 0.17], 2.0);
+    let own = |field: Field| Field {
+        own_spots: true,
+        ..field
+    };
+    let mut pooled = 0;
+    for seed in 0..5 {
+        let errs = field(seed, 60.0, [5.0, 0.0], &phase);
+        pooled += usize::from(search(&errs).is_some());
+        assert_eq!(search(&own(errs)), None, "seed {seed}");
+        let both = own(field(seed, 60.0, [5.0, 0.0], &|x, y| {
+            phase(x, y) + fringe(x, y)
+        }));
+        let found = search(&both).expect("beyond doubt");
+        assert_eq!(found.variable(), "x_px*y_px");
+    }
+    assert!(pooled > 0);
+}
