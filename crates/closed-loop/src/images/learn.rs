@@ -465,22 +465,49 @@ impl Learned {
 
     /// Position of the star of window `w` by its spot, everything learned frozen.
     pub(crate) fn fitted(&self, sample: &Sample, w: usize, pixels: &mut Pixels) -> Option<Fitted> {
-        let star = sample.star[w];
-        let spot = &self.spots[star];
-        if spot.psi.is_empty() {
+        let spot = &self.spots[sample.star[w]];
+        self.by(&self.grid, &spot.psi, sample, w, pixels)
+    }
+
+    /// The same by the Gaussian nearest to the spot.
+    pub(crate) fn by_gaussian(
+        &self,
+        sample: &Sample,
+        w: usize,
+        pixels: &mut Pixels,
+    ) -> Option<[f64; 2]> {
+        let spot = &self.spots[sample.star[w]];
+        self.by(&self.finer, &spot.gaussian, sample, w, pixels)
+            .map(|f| f.at)
+    }
+
+    fn by(
+        &self,
+        grid: &Grid,
+        psi: &[f64],
+        sample: &Sample,
+        w: usize,
+        pixels: &mut Pixels,
+    ) -> Option<Fitted> {
+        if psi.is_empty() {
             return None;
         }
+        let star = sample.star[w];
         let start = Fitted {
             at: sample.start[w],
             flux: sample.flux[w],
-            background: spot.background,
+            background: self.spots[star].background,
             ..Fitted::default()
         };
-        let known = self.known(star, Some(&self.dark.variance));
+        let known = Known {
+            grid,
+            psi,
+            ..self.known(star, Some(&self.dark.variance))
+        };
         window_fit::fit(&known, sample, w, &start, FINAL_STEPS, pixels)
     }
 
-    /// The same with what the pixels add to their map in time; from where the star was found without.
+    /// The position by the spot with what the pixels add to their map in time, from where the star was found without.
     pub(crate) fn fitted_with(
         &self,
         sample: &Sample,
@@ -494,27 +521,6 @@ impl Learned {
             ..self.known(sample.star[w], Some(&followed.variance))
         };
         window_fit::fit(&known, sample, w, start, FINAL_STEPS, pixels)
-    }
-
-    /// The same by the Gaussian nearest to the spot, from where the star was found.
-    pub(crate) fn by_gaussian(
-        &self,
-        sample: &Sample,
-        w: usize,
-        start: &Fitted,
-        pixels: &mut Pixels,
-    ) -> Option<[f64; 2]> {
-        let star = sample.star[w];
-        let psi = &self.spots[star].gaussian;
-        if psi.is_empty() {
-            return None;
-        }
-        let known = Known {
-            grid: &self.finer,
-            psi,
-            ..self.known(star, Some(&self.dark.variance))
-        };
-        window_fit::fit(&known, sample, w, start, FINAL_STEPS, pixels).map(|f| f.at)
     }
 
     /// First moment of window `w`, map and a constant level taken off. Pixels with a
