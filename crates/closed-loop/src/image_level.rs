@@ -8,7 +8,7 @@
 //!
 //! - the map is claimed if the best account with it beats the best without it:
 //!   anything else that the windows allow may stand in for it; or if it frees first moments of more than the spot
-//!   and pixel phase do, and no account is the worse for it; in both cases a pixel of it has to stand out;
+//!   and pixel phase do, and no account is the worse for it;
 //! - the spot is claimed if first moments corrected by it beat first moments as they
 //!   are, and as well as any function of pixel phase does; or if its positions beat both first moments
 //!   and those of the Gaussian, a function of pixel phase beside them or not. That a fitted spot has less
@@ -135,7 +135,6 @@ impl Scored {
 pub(crate) fn compare(
     measured: &StarEvidence<'_>,
     sides: &[Side<'_>; 2],
-    formed: &Formed,
     [phase, others]: [&[Box<dyn Candidate>]; 2],
     folds: &Folds,
     data: &StarData,
@@ -187,13 +186,11 @@ pub(crate) fn compare(
         whole,
     );
     let harmless = with.total() > without.total() - LEAST_GAIN;
-    let mut claim = if !predicts.stands && frees.stands && harmless {
+    let claim = if !predicts.stands && frees.stands && harmless {
         frees
     } else {
         predicts
     };
-    // a map of pixels none of which is warm beyond doubt stands in for something else
-    claim.stands &= formed.map.stands_out();
     // Without a map, plain moments are those of the table or those formed anew.
     let plain = if bare[0].alone.total() > measured.alone.total() {
         &bare[0]

@@ -63,14 +63,6 @@ pub(crate) struct DarkMap {
 }
 
 impl DarkMap {
-    /// Whether a pixel is off the usual one beyond doubt: chance makes one in some thousand maps.
-    pub(crate) fn stands_out(&self) -> bool {
-        let usual = robust_median(self.pixels.iter().map(|p| p.dn).collect()).unwrap_or(0.0);
-        self.pixels
-            .iter()
-            .any(|p| p.dn - usual > STANDS_OUT * p.sigma_dn)
-    }
-
     /// Root mean square of the map about its mean: only contrasts mean anything.
     pub(crate) fn rms_dn(&self) -> f64 {
         let n = self.pixels.len().max(1) as f64;
@@ -129,9 +121,6 @@ const KNOTS_PX: f64 = 0.4;
 const MARGIN_PX: f64 = 0.5;
 /// Fewest frames to learn from.
 const MIN_FRAMES: usize = 30;
-
-/// Multiples of its error by which a warm pixel is off the usual one.
-const STANDS_OUT: f64 = 5.0;
 
 /// The MAD of a Gaussian times this is its standard deviation.
 pub(crate) const MAD_SCALE: f64 = 1.482_602_218_505_602;

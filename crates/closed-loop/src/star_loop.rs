@@ -199,19 +199,17 @@ fn explain(
         .collect();
     let rows = all_rows(data, motion);
     let scene = scene(situation, data, &facts, &rows);
-    let image = match (&sides, &formed) {
-        (Some(sides), Some(formed)) => {
+    let image = match &sides {
+        Some(sides) => {
             let mut others = catalogue_candidates(&scene);
             others.retain(|c| c.acts_on_stars());
             let phase: Vec<_> = others
                 .extract_if(.., |c| c.id() == "pixel_phase_harmonics")
                 .collect();
             let beside = [phase.as_slice(), &others];
-            Some(image_level::compare(
-                &measured, sides, formed, beside, folds, data,
-            )?)
+            Some(image_level::compare(&measured, sides, beside, folds, data)?)
         }
-        _ => None,
+        None => None,
     };
     let own = image.as_ref().zip(formed.as_ref());
     let own = own.and_then(|(image, formed)| image.level(formed));

@@ -12,7 +12,7 @@ use rand_distr::{Distribution, Exp1, StandardUniform};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use telemetry::Bundle;
 
-use scene::{Scene, WIDE, Warm, drift, ids, keep_rows, make, population, rms, run};
+use scene::{Scene, WIDE, Warm, drift, ids, keep_rows, population, rms, run};
 
 /// Out-of-fold rms over both axes, before and after, of a slot's rows at these times.
 fn rms_of(closed: &Closed, slot: i32, at: &[f64]) -> [f64; 2] {

@@ -100,7 +100,8 @@ fn between(bundle: &Bundle, from_s: f64, to_s: f64) -> Bundle {
 }
 
 /// Five guide stars on warm pixels: the declared model leaves about 0.27 arcsec, the
-/// residual without the map's contrasts is an order of magnitude smaller.
+/// residual without the map's contrasts is an order of magnitude smaller. With the pixels that switch followed it is
+/// 0.0202 and 0.0206, without 0.0213; what changes from frame to frame is 0.018.
 #[test]
 fn chandra_is_explained_by_warm_pixels() {
     let Some(bundle) = flight(CHANDRA) else {
@@ -124,7 +125,7 @@ fn chandra_is_explained_by_warm_pixels() {
     let [before, after] = star_rms(report);
     for axis in 0..2 {
         assert!((0.26..=0.29).contains(&before[axis]), "before {before:?}");
-        assert!(after[axis] <= 0.03, "after {after:?}");
+        assert!(after[axis] <= 0.021, "after {after:?}");
     }
     let map = closed.dark_map.unwrap();
     assert!(map.dn.iter().all(|d| *d >= 0.0) && map.sigma_dn.iter().all(|s| *s > 0.0));
