@@ -103,10 +103,15 @@ impl Coloured {
     /// Noise of greatest likelihood for a series about zero. With too few rows
     /// to tell a correlation, white noise.
     pub(crate) fn fit(t_s: &[f64], y: &[f64], count: &[f64]) -> Self {
+        Self::fit_above(0.0, t_s, y, count)
+    }
+
+    /// As [`fit`](Self::fit), where the white part is known to be no less than `least`.
+    pub(crate) fn fit_above(least: f64, t_s: &[f64], y: &[f64], count: &[f64]) -> Self {
         let kept: Vec<usize> = (0..y.len()).filter(|&k| count[k] > 0.0).collect();
         let variance =
             kept.iter().map(|&k| y[k] * y[k] * count[k]).sum::<f64>() / kept.len().max(1) as f64;
-        let rms = variance.sqrt().max(1e-12);
+        let rms = variance.sqrt().max(least).max(1e-12);
         let white = Self {
             white: rms,
             slow: 0.0,
@@ -127,6 +132,7 @@ impl Coloured {
             y,
             count,
             rms,
+            least,
             bounds: [0.5 * step, 3.0 * span],
         };
         // A likelihood in the correlation time has more than one hill: start on each.
@@ -145,8 +151,13 @@ impl Coloured {
 
     /// The noise of a similar series, started from this one.
     pub(crate) fn refit(&self, t_s: &[f64], y: &[f64], count: &[f64]) -> Self {
+        self.refit_above(0.0, t_s, y, count)
+    }
+
+    /// As [`refit`](Self::refit), where the white part is known to be no less than `least`.
+    pub(crate) fn refit_above(&self, least: f64, t_s: &[f64], y: &[f64], count: &[f64]) -> Self {
         if self.slow <= 0.0 {
-            return Self::fit(t_s, y, count);
+            return Self::fit_above(least, t_s, y, count);
         }
         let Some(step) = crate::star_data::median_step(t_s) else {
             return *self;
@@ -157,6 +168,7 @@ impl Coloured {
             y,
             count,
             rms: 1.0,
+            least,
             bounds: [0.5 * step, 3.0 * span],
         };
         problem
@@ -308,18 +320,91 @@ impl LogProduct {
     }
 }
 
+/// The slow part of greatest likelihood that several series have alike, each beside a white part of
+/// its own of no less than `least`, from `start`; and the log-likelihood of all, nats.
+pub(crate) fn fit_alike(
+    least: f64,
+    t_s: &[f64],
+    series: &[(&[f64], &[f64])],
+    start: &Coloured,
+) -> Option<(Coloured, f64)> {
+    let step = crate::star_data::median_step(t_s)?;
+    let span = t_s.last()? - t_s.first()?;
+    let problem = Alike {
+        t_s,
+        series,
+        least,
+        bounds: [0.5 * step, 3.0 * span],
+    };
+    let mut first = vec![start.slow.ln(), start.tau_s.ln()];
+    first.extend(series.iter().map(|_| start.white.max(1e-12).ln()));
+    let mut simplex = vec![first.clone()];
+    for (k, step) in [0.5, -0.7]
+        .into_iter()
+        .chain(series.iter().map(|_| 0.05))
+        .enumerate()
+    {
+        let mut corner = first.clone();
+        corner[k] += step;
+        simplex.push(corner);
+    }
+    let solver = NelderMead::new(simplex).with_sd_tolerance(1e-2).ok()?;
+    let result = Executor::new(&problem, solver)
+        .configure(|s| s.max_iters(160))
+        .run()
+        .ok()?;
+    let best = result.state.best_param?;
+    Some((problem.at(&best, 0), problem.height(&best)))
+}
+
+struct Alike<'a> {
+    t_s: &'a [f64],
+    /// Values and counts.
+    series: &'a [(&'a [f64], &'a [f64])],
+    least: f64,
+    bounds: [f64; 2],
+}
+
+impl Alike<'_> {
+    fn at(&self, p: &[f64], k: usize) -> Coloured {
+        Coloured {
+            white: p[2 + k].clamp(-40.0, 40.0).exp().max(self.least),
+            slow: p[0].clamp(-40.0, 40.0).exp(),
+            tau_s: p[1].exp().clamp(self.bounds[0], self.bounds[1]),
+        }
+    }
+
+    fn height(&self, p: &[f64]) -> f64 {
+        let of = |(k, (y, count)): (usize, &(&[f64], &[f64]))| {
+            self.at(p, k).log_likelihood(self.t_s, y, count)
+        };
+        self.series.iter().enumerate().map(of).sum()
+    }
+}
+
+impl CostFunction for &Alike<'_> {
+    type Param = Vec<f64>;
+    type Output = f64;
+
+    fn cost(&self, p: &Vec<f64>) -> Result<f64, argmin::core::Error> {
+        Ok(-self.height(p))
+    }
+}
+
 struct Likelihood<'a> {
     t_s: &'a [f64],
     y: &'a [f64],
     count: &'a [f64],
     rms: f64,
+    /// Least white part.
+    least: f64,
     bounds: [f64; 2],
 }
 
 impl Likelihood<'_> {
     fn at(&self, p: &[f64]) -> Coloured {
         Coloured {
-            white: self.rms * p[0].clamp(-20.0, 20.0).exp(),
+            white: (self.rms * p[0].clamp(-20.0, 20.0).exp()).max(self.least),
             slow: self.rms * p[1].clamp(-20.0, 20.0).exp(),
             tau_s: p[2].exp().clamp(self.bounds[0], self.bounds[1]),
         }

@@ -27,10 +27,7 @@ use std::ops::Range;
 
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
-use crate::coloured::Coloured;
-
-/// Whiter than this over the centroids' own noise and the reference has white noise.
-const WHITE_EXCESS: f64 = 1.03;
+use crate::coloured::{Coloured, fit_alike};
 
 /// Half the relative difference of two noises that serve a fit alike.
 const ALIKE: f64 = 0.02;
@@ -79,13 +76,16 @@ impl Rotations {
     pub(crate) fn noise(&self, near: Option<&CommonNoise>) -> CommonNoise {
         let of = |axis: usize| {
             let (y, count) = (&self.mean[axis], &self.count[axis]);
+            // rotations are no whiter than their stars: a slow part of less than a step between frames is
+            // white noise by another name
+            let least = self.centroid;
             let fitted = match near.map(|n| n.reference[axis]) {
                 Some(known) if known.slow > 0.0 => Coloured {
                     white: self.total_white(axis, known.white),
                     ..known
                 }
-                .refit(&self.t_s, y, count),
-                _ => Coloured::fit(&self.t_s, y, count),
+                .refit_above(least, &self.t_s, y, count),
+                _ => Coloured::fit_above(least, &self.t_s, y, count),
             };
             self.beside_centroids(axis, fitted)
         };
@@ -101,22 +101,43 @@ impl Rotations {
     /// without: twice the gain in log-likelihood.
     pub(crate) fn slow_ratio(&self, noise: &CommonNoise) -> [f64; 3] {
         std::array::from_fn(|axis| {
-            let (y, count) = (&self.mean[axis], &self.count[axis]);
-            let known = noise.reference[axis];
             let with = Coloured {
-                white: self.total_white(axis, known.white),
-                ..known
+                white: self.total_white(axis, noise.reference[axis].white),
+                ..noise.reference[axis]
             };
-            let kept = count.iter().filter(|c| **c > 0.0).count().max(1) as f64;
-            let variance = y.iter().zip(count).map(|(y, c)| y * y * c).sum::<f64>() / kept;
-            let without = Coloured {
-                white: variance.sqrt(),
-                slow: 0.0,
-                tau_s: 1.0,
-            };
-            let t_s = &self.t_s;
-            2.0 * (with.log_likelihood(t_s, y, count) - without.log_likelihood(t_s, y, count))
+            let likely = with.log_likelihood(&self.t_s, &self.mean[axis], &self.count[axis]);
+            2.0 * (likely - self.white_alone(axis))
         })
+    }
+
+    /// As [`slow_ratio`](Self::slow_ratio), of X and Y together with a slow error that is the same about
+    /// both: a reference knows no axis across its boresight from another.
+    pub(crate) fn alike_ratio(&self, noise: &CommonNoise) -> f64 {
+        let both = [0, 1].map(|axis| (self.mean[axis].as_slice(), self.count[axis].as_slice()));
+        let white: f64 = (0..2).map(|axis| self.white_alone(axis)).sum();
+        let starts = (0..2).filter(|&axis| noise.reference[axis].slow > 0.0);
+        let best = starts.filter_map(|axis| {
+            let start = Coloured {
+                white: self.total_white(axis, noise.reference[axis].white),
+                ..noise.reference[axis]
+            };
+            fit_alike(self.centroid, &self.t_s, &both, &start).map(|(_, likely)| likely)
+        });
+        best.map(|likely| 2.0 * (likely - white))
+            .fold(0.0, f64::max)
+    }
+
+    /// Log-likelihood of an axis's rotations under white noise.
+    fn white_alone(&self, axis: usize) -> f64 {
+        let (y, count) = (&self.mean[axis], &self.count[axis]);
+        let kept = count.iter().filter(|c| **c > 0.0).count().max(1) as f64;
+        let variance = y.iter().zip(count).map(|(y, c)| y * y * c).sum::<f64>() / kept;
+        Coloured {
+            white: variance.sqrt().max(self.centroid),
+            slow: 0.0,
+            tau_s: 1.0,
+        }
+        .log_likelihood(&self.t_s, y, count)
     }
 
     /// Standard errors of the slow part of an axis, relative: of sigma and of tau.
@@ -137,13 +158,8 @@ impl Rotations {
 
     fn beside_centroids(&self, axis: usize, fitted: Coloured) -> Coloured {
         let excess = fitted.white.powi(2) - self.centroid.powi(2);
-        let has_own = fitted.white > WHITE_EXCESS * self.centroid;
         Coloured {
-            white: if has_own {
-                (excess / self.usual_count(axis)).sqrt()
-            } else {
-                0.0
-            },
+            white: (excess.max(0.0) / self.usual_count(axis)).sqrt(),
             ..fitted
         }
     }

@@ -101,7 +101,7 @@ pub(crate) fn effect(wander: &Wander) -> Option<(FoundEffect, EffectEntry)> {
         parameters,
         delta_loglik: 0.5 * ratio - freedom,
         // three axes were looked at
-        p_value: (3.0 * p).min(1.0),
+        p_value: (3.0 * p).min(wander.p_value()),
         variance_explained: None,
         confusable_with: Vec::new(),
     };

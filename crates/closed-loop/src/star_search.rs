@@ -64,6 +64,8 @@ pub(crate) struct Wander {
     pub(crate) rotations: Rotations,
     /// Twice the gain in log-likelihood of each axis.
     pub(crate) ratio: [f64; 3],
+    /// The same of X and Y together with one size and time.
+    pub(crate) alike: f64,
 }
 
 /// What the search ends with.
@@ -352,7 +354,15 @@ impl Trial<'_> {
     /// error of an axis `slow_price`, or its absence where that costs less.
     fn worth(&self, scored: &Scored, slow_price: f64) -> f64 {
         let slow = scored.rotations.slow_ratio(&scored.noise);
-        let without: f64 = slow.iter().map(|r| (0.5 * r).clamp(0.0, slow_price)).sum();
+        let paid = slow.map(|r| (0.5 * r).clamp(0.0, slow_price));
+        let across = if slow_price.is_finite() {
+            // or one error about both axes, paid for once
+            let alike = 0.5 * scored.rotations.alike_ratio(&scored.noise) - slow_price;
+            (paid[0] + paid[1]).min(0.5 * (slow[0] + slow[1]) - alike)
+        } else {
+            paid[0] + paid[1]
+        };
+        let without = across + paid[2];
         let effects: f64 = scored
             .parts
             .iter()
@@ -501,6 +511,7 @@ fn coloured<'a>(
                 },
                 wander: Wander {
                     noise,
+                    alike: base.rotations.alike_ratio(&noise),
                     rotations: base.rotations,
                     ratio,
                 },
@@ -520,21 +531,25 @@ fn coloured<'a>(
 }
 
 impl Wander {
-    /// Axes on which the slow error is beyond doubt: two parameters each, three axes.
+    /// Axes on which the slow error is beyond doubt: by themselves, or X and Y together.
     pub(crate) fn axes(&self) -> [bool; 3] {
-        significant(&self.ratio)
+        let both = chance(self.alike) < FAMILY_ALPHA;
+        std::array::from_fn(|axis| {
+            let alone = chance(self.ratio[axis]) < FAMILY_ALPHA;
+            // of the two, those whose own slow part earns its keep (Akaike)
+            alone || both && axis < 2 && self.ratio[axis] > 4.0
+        })
+    }
+
+    /// Chance of the likeliest of these where the noise is white.
+    pub(crate) fn p_value(&self) -> f64 {
+        let all = self.ratio.iter().copied().chain([self.alike]);
+        chance(all.fold(0.0, f64::max)).min(1.0)
     }
 }
 
-/// Axes whose ratio is beyond doubt.
-fn significant(ratio: &[f64; 3]) -> [bool; 3] {
-    chances(ratio).map(|p| p < FAMILY_ALPHA)
-}
-
-/// Chance of such a ratio on any of three axes where the noise is white.
-fn chances(ratio: &[f64; 3]) -> [f64; 3] {
-    ratio.map(|ratio| {
-        let p = ChiSquared::new(2.0).map_or(1.0, |law| law.sf(ratio.max(0.0) / WIDENING));
-        3.0 * p
-    })
+/// Chance of such a ratio of two parameters where the noise is white: three axes are tried, and X and Y
+/// together.
+fn chance(ratio: f64) -> f64 {
+    4.0 * ChiSquared::new(2.0).map_or(1.0, |law| law.sf(ratio.max(0.0) / WIDENING))
 }

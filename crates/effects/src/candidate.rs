@@ -179,7 +179,7 @@ pub trait Candidate: Debug + Send + Sync {
         Vec::new()
     }
     /// How many discrete choices this candidate has made that the data has to decide (signs that the
-    /// bundle leaves open); each is to be paid for like a coefficient.
+    /// bundle leaves open, on which side of a star a pixel is); each is to be paid for like a coefficient.
     fn choices(&self) -> usize {
         0
     }

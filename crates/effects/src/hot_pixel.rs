@@ -148,6 +148,10 @@ impl Shift for HotPixel {
             [0.0; 2]
         };
     }
+    /// The direction of the pull: a star at rest has pixels on all sides.
+    fn choices(&self) -> usize {
+        1
+    }
     fn parameters(&self, values: &[f64]) -> Vec<Parameter> {
         vec![
             Parameter::new("x_px", self.at.x, "px"),

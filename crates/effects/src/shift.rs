@@ -56,6 +56,10 @@ pub(crate) trait Shift: Clone + Debug + Send + Sync + 'static {
     fn selectors(&self) -> BTreeMap<String, String> {
         BTreeMap::new()
     }
+    /// See [`Candidate::choices`].
+    fn choices(&self) -> usize {
+        0
+    }
 }
 
 /// A shift with its values.
@@ -133,6 +137,9 @@ impl<S: Shift> Candidate for ShiftCandidate<S> {
     }
     fn coefficients(&self) -> &[Coefficient] {
         &self.coefficients
+    }
+    fn choices(&self) -> usize {
+        self.shift.choices()
     }
     fn acts_on_stars(&self) -> bool {
         true
