@@ -135,10 +135,11 @@ impl Coloured {
             least,
             bounds: [0.5 * step, 3.0 * span],
         };
+        let own = if least > 0.0 { 0.3_f64 } else { 0.7 }.ln();
         // A likelihood in the correlation time has more than one hill: start on each.
         let best = [3.0 * step, (step * span).sqrt(), 0.1 * span]
             .into_par_iter()
-            .filter_map(|tau| problem.climb([0.7_f64.ln(), 0.7_f64.ln(), tau.ln()], -0.7))
+            .filter_map(|tau| problem.climb([own, 0.7_f64.ln(), tau.ln()], -0.7))
             .collect::<Vec<_>>()
             .into_iter()
             .max_by(|a, b| a.0.total_cmp(&b.0));
@@ -172,7 +173,14 @@ impl Coloured {
             bounds: [0.5 * step, 3.0 * span],
         };
         problem
-            .climb([self.white.ln(), self.slow.ln(), self.tau_s.ln()], -0.3)
+            .climb(
+                [
+                    own_white(self.white, least).ln(),
+                    self.slow.ln(),
+                    self.tau_s.ln(),
+                ],
+                -0.3,
+            )
             .map_or(*self, |(_, noise)| noise)
     }
 
@@ -320,6 +328,14 @@ impl LogProduct {
     }
 }
 
+/// What a white part has beside `least`: a start, not nothing.
+fn own_white(white: f64, least: f64) -> f64 {
+    (white * white - least * least)
+        .max(0.01 * white * white)
+        .max(1e-24)
+        .sqrt()
+}
+
 /// The slow part of greatest likelihood that several series have alike, each beside a white part of
 /// its own of no less than `least`, from `start`; and the log-likelihood of all, nats.
 pub(crate) fn fit_alike(
@@ -337,11 +353,11 @@ pub(crate) fn fit_alike(
         bounds: [0.5 * step, 3.0 * span],
     };
     let mut first = vec![start.slow.ln(), start.tau_s.ln()];
-    first.extend(series.iter().map(|_| start.white.max(1e-12).ln()));
+    first.extend(series.iter().map(|_| own_white(start.white, least).ln()));
     let mut simplex = vec![first.clone()];
     for (k, step) in [0.5, -0.7]
         .into_iter()
-        .chain(series.iter().map(|_| 0.05))
+        .chain(series.iter().map(|_| 0.5))
         .enumerate()
     {
         let mut corner = first.clone();
@@ -368,7 +384,7 @@ struct Alike<'a> {
 impl Alike<'_> {
     fn at(&self, p: &[f64], k: usize) -> Coloured {
         Coloured {
-            white: p[2 + k].clamp(-40.0, 40.0).exp().max(self.least),
+            white: p[2 + k].clamp(-40.0, 40.0).exp().hypot(self.least),
             slow: p[0].clamp(-40.0, 40.0).exp(),
             tau_s: p[1].exp().clamp(self.bounds[0], self.bounds[1]),
         }
@@ -396,7 +412,7 @@ struct Likelihood<'a> {
     y: &'a [f64],
     count: &'a [f64],
     rms: f64,
-    /// Least white part.
+    /// Least white part; the rest of it is fitted.
     least: f64,
     bounds: [f64; 2],
 }
@@ -404,7 +420,7 @@ struct Likelihood<'a> {
 impl Likelihood<'_> {
     fn at(&self, p: &[f64]) -> Coloured {
         Coloured {
-            white: (self.rms * p[0].clamp(-20.0, 20.0).exp()).max(self.least),
+            white: (self.rms * p[0].clamp(-20.0, 20.0).exp()).hypot(self.least),
             slow: self.rms * p[1].clamp(-20.0, 20.0).exp(),
             tau_s: p[2].exp().clamp(self.bounds[0], self.bounds[1]),
         }

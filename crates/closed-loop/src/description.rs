@@ -18,7 +18,7 @@ use crate::figures;
 use crate::folds::Folds;
 use crate::invariance::{Changing, Inner, Way};
 use crate::search::{Fitted, Found, borrowed, fit};
-use crate::selection::{columns_of, judged, price};
+use crate::selection::{columns_of, each, judged};
 use crate::situation::Situation;
 use crate::star_columns::star_columns_of;
 use crate::star_data::StarData;
@@ -56,7 +56,7 @@ pub(crate) struct Described {
     pub(crate) changes: Vec<Vec<(Way, Vec<usize>)>>,
     /// Ids of the chosen effects.
     pub(crate) names: Vec<&'static str>,
-    /// Prices of the chosen effects, nats.
+    /// What the columns of each chosen effect cost, nats: terms do not pay for choices either.
     pub(crate) paid: Vec<f64>,
 }
 
@@ -99,7 +99,7 @@ impl Described {
         let names = only.candidates.iter().map(|c| c.id()).collect();
         let paid = fitted.groups[..n]
             .iter()
-            .map(|g| price(g, fitted.scalars))
+            .map(|g| g.columns.len() as f64 * each(fitted.scalars))
             .collect();
         let mut first: usize = only.candidates.iter().map(|c| c.coefficients().len()).sum();
         let mut changes = vec![Vec::new(); n];

@@ -133,7 +133,12 @@ pub(crate) fn ranked(
 
 /// What a group pays for its parameters and choices, nats.
 pub(crate) fn price(group: &Group, scalars: f64) -> f64 {
-    0.5 * (group.columns.len() + group.choices) as f64 * scalars.max(2.0).ln()
+    (group.columns.len() + group.choices) as f64 * each(scalars)
+}
+
+/// What a parameter costs, nats.
+pub(crate) fn each(scalars: f64) -> f64 {
+    0.5 * scalars.max(2.0).ln()
 }
 
 /// Standing of every group beside (for a chosen one: within) `chosen`.

@@ -17,7 +17,7 @@
 //! Source: Schwarz 1978 for the price of a parameter.
 
 use crate::description::Described;
-use crate::selection::{FAMILY_ALPHA, columns_of};
+use crate::selection::{FAMILY_ALPHA, columns_of, each};
 
 /// Nats by which a description must be worth more.
 pub(crate) const BY_FAR: f64 = 8.0;
@@ -62,7 +62,7 @@ pub(crate) fn stand_ins(described: &Described) -> Option<(Vec<usize>, Vec<Part>)
 /// The best description of what `rest` leaves: its likelihood after all prices.
 pub(crate) fn describe(described: &Described, rest: &[usize]) -> Option<(f64, Vec<Part>)> {
     let fits = &described.fitted.fits;
-    let each = 0.5 * described.fitted.scalars.max(2.0).ln();
+    let each = each(described.fitted.scalars);
     let tried: usize = described.terms.iter().map(|t| t.parts.len()).sum();
     let mut with = rest.to_vec();
     let mut worth = fits.out_of_fold(&with)?.total_loglik();

@@ -5,6 +5,9 @@ use telemetry::report::Report;
 
 use crate::kit::{Case, Path, VELOCITY, closed};
 
+/// With the correlation time of the format, a minute.
+const WANDER: &str = "wander_arcsec = [0.5, 0.5, 0.5]";
+
 #[test]
 fn nothing_is_found_where_nothing_acts() {
     for path in [Path::Drift, Path::Slews, Path::Turns] {
@@ -34,7 +37,7 @@ fn a_wandering_reference_is_an_error_of_its_own() {
     for seed in 0..4 {
         let mut case = Case::new(Path::Drift, 1000 + seed);
         case.duration_s = 900.0;
-        let case = case.reference("wander_arcsec = [0.5, 0.5, 0.5]");
+        let case = case.reference(WANDER);
         let report = case.close().report;
         let ids: Vec<&str> = report.effects.iter().map(|e| e.id.as_str()).collect();
         assert_eq!(
@@ -52,6 +55,26 @@ fn a_wandering_reference_is_an_error_of_its_own() {
             );
         }
     }
+}
+
+/// The same under slews, over seven correlation times: nothing else is named, and in most runs the
+/// wander is.
+#[test]
+fn a_wandering_reference_under_slews_is_no_effect() {
+    let (mut wanders, mut others) = (0, Vec::new());
+    for seed in 0..10 {
+        let case = Case::new(Path::Slews, 2000 + seed);
+        let report = case.reference(WANDER).close().report;
+        for effect in report.effects {
+            if effect.id == "reference_error" {
+                wanders += 1;
+            } else {
+                others.push((seed, effect.id));
+            }
+        }
+    }
+    assert!(others.len() <= 1, "{others:?}");
+    assert!(wanders >= 8, "{wanders} of 10");
 }
 
 /// Attitudes alone: a tracker that drifts changes its stars, and jumps. Without counting them, 14 of
