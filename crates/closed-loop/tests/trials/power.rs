@@ -168,26 +168,3 @@ fn a_faint_step_is_a_step() {
     assert!(steps >= 6, "{steps} of 8");
     assert!(inside + 3 >= steps, "{inside} of {steps} within");
 }
-
-/// A star of a tracker nearly at rest, misplaced by six standard errors beside a reference that wanders
-/// (0.9 arcsec; 5.25 of noise, 1200 frames), is that star's, not the pull of one of the pixels around it:
-/// of these the nearest in direction does nearly as well with one size less. By chance one pulls exactly
-/// along.
-#[test]
-fn a_misplaced_star_is_no_pixel() {
-    let mut named = Vec::new();
-    for seed in 0..8 {
-        let mut case = Case::new(Path::Still, 70 + seed);
-        case.duration_s = 600.0;
-        let case = case.reference("wander_arcsec = [0.2, 0.2, 0.2]");
-        let (_, bundle) = case.make();
-        let frames = bundle.stars.expect("stars");
-        let star = frames.star_id[3];
-        let lines = format!("star_id = {star}\neast_arcsec = 0.72\nnorth_arcsec = -0.54");
-        let report = case.with("catalogue_position", &lines).close().report;
-        named.extend(report.effects.into_iter().map(|e| e.id));
-    }
-    let count = |id: &str| named.iter().filter(|n| *n == id).count();
-    assert!(count("catalogue_position") >= 7, "{named:?}");
-    assert_eq!(count("hot_pixel"), 0, "{named:?}");
-}
