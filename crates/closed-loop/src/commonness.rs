@@ -27,7 +27,7 @@ use crate::star_data::{StarData, median_step};
 /// Chance below which stars that wander are told.
 const ALPHA: f64 = 0.002;
 /// Shares of what the stars are known to follow beyond which they mostly wander.
-const MOSTLY: f64 = 20.0;
+pub(crate) const MOSTLY: f64 = 20.0;
 /// Sigmas of what is beyond doubt.
 const BEYOND_DOUBT: f64 = 3.5;
 /// Least share of the rotation's slow part.

@@ -12,9 +12,9 @@ use focal_plane::{Camera, PointsMut, VectorsMut};
 use std::sync::Arc;
 
 use crate::attitude_loop::channels_of_interest;
-use crate::empirical::{Empirical, Variable, range};
+use crate::empirical::{Empirical, Variable, flux_of, range};
 use crate::error::CloseError;
-use crate::figures;
+use crate::figures::{self, Followed};
 use crate::folds::Folds;
 use crate::invariance::{Changing, Inner, Way};
 use crate::search::{Fitted, Found, borrowed, fit};
@@ -23,7 +23,8 @@ use crate::situation::Situation;
 use crate::star_columns::star_columns_of;
 use crate::star_data::StarData;
 use crate::star_evidence::StarEvidence;
-use telemetry::report::Unattributed;
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+use telemetry::report::{Dependence, Unattributed};
 
 /// Stars beyond which none has a term of its own.
 const MOST_STARS: usize = 64;
@@ -32,6 +33,8 @@ const MOST_OF_OWN_SIZE: usize = 24;
 /// Rows beyond which blocks are this many times as long.
 const MANY_ROWS: usize = 300_000;
 const FEWER: usize = 3;
+/// Chance beyond which stars differ by more than a line through them.
+const BESIDE_A_LINE: f64 = 1e-4;
 /// Channels beyond which none is paired with another variable: all pairs are paid for.
 const MOST_CHANNELS: usize = 6;
 
@@ -157,10 +160,69 @@ impl Described {
         let terms: Vec<_> = self
             .terms
             .iter()
-            .map(|t| (t.term.name(), t.parts.clone()))
+            .map(|t| Followed {
+                variable: t.term.name(),
+                parts: t.parts.clone(),
+                of_many: t.term.is_of_many(),
+            })
             .collect();
         let tried = terms.len();
-        figures::follows(&self.fitted.fits, &set, &terms, tried, left)
+        let each = figures::price_of_one(self.fitted.scalars);
+        let mut told = figures::follows(&self.fitted.fits, &set, &terms, tried, each, left);
+        self.stars_before_their_constants(&set, &mut told.depends_on);
+        told
+    }
+
+    /// A dozen stars lie on some bent line of any number that they have: magnitude, colour and
+    /// flux stand behind `star` where the stars differ beyond what such a line explains.
+    fn stars_before_their_constants(&self, set: &[usize], list: &mut Vec<Dependence>) {
+        let fits = &self.fitted.fits;
+        let square = |term: &Term| -> Option<(f64, f64)> {
+            let own = term.parts.last()?;
+            let mut with = set.to_vec();
+            with.extend(own);
+            let which: Vec<usize> = (set.len()..with.len()).collect();
+            Some((fits.estimate(&with)?.square(&which)?, own.len() as f64))
+        };
+        let Some(stars) = self.terms.iter().find(|t| t.term.is_of_stars()) else {
+            return;
+        };
+        let Some((of_stars, columns)) = square(stars) else {
+            return;
+        };
+        let behind: Vec<String> = self
+            .terms
+            .iter()
+            .filter(|t| t.term.is_of_a_star())
+            .filter(|t| {
+                square(t).is_some_and(|(of_line, own)| {
+                    let law = ChiSquared::new((columns - own).max(1.0));
+                    let beyond = (of_stars - of_line).max(0.0);
+                    law.is_ok_and(|law| law.sf(beyond) < BESIDE_A_LINE)
+                })
+            })
+            .map(|t| t.term.name())
+            .collect();
+        let first = list.iter().position(|d| behind.contains(&d.variable));
+        let Some(first) = first else { return };
+        let name = stars.term.name();
+        let all: Vec<Vec<usize>> = stars.parts.last().into_iter().cloned().collect();
+        let tried = self.terms.len();
+        let term = Followed {
+            variable: name.clone(),
+            parts: all,
+            of_many: false,
+        };
+        let whole = figures::follows(fits, set, &[term], tried, 0.0, 1.0);
+        let Some(entry) = whole.depends_on.into_iter().find(figures::certain) else {
+            return;
+        };
+        let at = list.iter().position(|d| d.variable == name);
+        if at.is_some_and(|at| at < first) {
+            return;
+        }
+        list.retain(|d| d.variable != name);
+        list.insert(first, entry);
     }
 }
 
@@ -219,6 +281,25 @@ pub(crate) fn ways(situation: &Situation<'_>, data: &StarData) -> Vec<Way> {
     ways
 }
 
+/// What the noise level may follow.
+pub(crate) fn of_noise(situation: &Situation<'_>, data: &StarData) -> Vec<(Variable, [f64; 2])> {
+    let mut list: Vec<(Variable, [f64; 2])> = ways(situation, data)
+        .into_iter()
+        .filter_map(|way| match way {
+            // the catalogue has an effect for a slope in magnitude
+            Way::With(Variable::Magnitude, _) | Way::Star(_) => None,
+            Way::With(variable, range) => Some((variable, range)),
+        })
+        .collect();
+    let [ax, ay] = &data.acceleration;
+    let size = range(ax.iter().zip(ay).map(|(x, y)| x.hypot(*y)));
+    if size[1] > size[0] {
+        list.push((Variable::Acceleration, size));
+    }
+    list.extend((0..2).map(|axis| (Variable::Phase(axis), [0.0, 1.0])));
+    list
+}
+
 /// Every variable that the bundle gives values of, and the pairs that matter.
 pub(crate) fn terms(situation: &Situation<'_>, data: &StarData) -> Vec<Empirical> {
     let largest = |series: &[Vec<f64>; 2]| {
@@ -239,6 +320,8 @@ pub(crate) fn terms(situation: &Situation<'_>, data: &StarData) -> Vec<Empirical
     let rate = (Variable::Rate, largest(&data.velocity));
     let mag = (Variable::Magnitude, range(&data.mag));
     let colour = (Variable::Colour, range(&data.bv));
+    let flux: Vec<f64> = data.mag.iter().map(|m| flux_of(*m)).collect();
+    let flux = (Variable::Brightness, range(&flux));
     let channels: Vec<_> = channels_of_interest(&situation.channels)
         .map(|(name, series)| {
             let known = range(series.value());
@@ -262,6 +345,8 @@ pub(crate) fn terms(situation: &Situation<'_>, data: &StarData) -> Vec<Empirical
     if mag.1[0] >= mag.1[1] || !mag.1[0].is_finite() {
         // no magnitudes
         terms.extend(one(&(Variable::Flux, range(&data.log_flux))));
+    } else {
+        terms.extend(one(&flux));
     }
     terms.extend(one(&(Variable::Window, range(&off))));
     terms.extend(channels.iter().filter_map(one));
@@ -284,6 +369,8 @@ pub(crate) fn terms(situation: &Situation<'_>, data: &StarData) -> Vec<Empirical
             terms.extend(two(of, by));
         }
     }
+    // charge is held back in proportion to it, the more the farther it is moved
+    terms.extend(position.iter().filter_map(|of| two(of, &flux)));
     for by in position.iter().chain([&time, &mag, &colour]) {
         terms.extend(two(&rate, by));
     }

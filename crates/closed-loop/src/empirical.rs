@@ -10,7 +10,7 @@
 //! a shift along each axis, a roll and a scale; on an attitude it drives each
 //! axis. Motion drives the field it points along (and its square both axes), a pixel
 //! phase its own axis by its first six harmonics, the place within the window its own
-//! axis. Two variables together are what neither does alone,
+//! axis. Motion also drives by its direction alone, whatever its speed: backlash does. Two variables together are what neither does alone,
 //!
 //! ```text
 //! P_1(a) times the first columns of b
@@ -37,6 +37,8 @@ const ORDERS: usize = 3;
 pub(crate) const HARMONICS: usize = 6;
 /// Columns of a variable that another one may multiply.
 const OF_A_PAIR: usize = 2;
+/// Share of the largest rate below which a direction fades: it has none at rest.
+const AT_REST: f64 = 0.02;
 
 /// A variable that a leftover may follow.
 #[derive(Clone, Debug)]
@@ -52,8 +54,10 @@ pub(crate) enum Variable {
     Acceleration,
     Magnitude,
     Colour,
-    /// Measured flux.
+    /// Measured flux, logarithm.
     Flux,
+    /// The flux of the catalogue's magnitude: charge acts in proportion.
+    Brightness,
     /// One constant shift a star.
     Star(Vec<i64>),
     /// One constant shift a slot.
@@ -77,7 +81,7 @@ impl Variable {
             Self::Acceleration => "acceleration".into(),
             Self::Magnitude => "mag".into(),
             Self::Colour => "colour".into(),
-            Self::Flux => "flux".into(),
+            Self::Flux | Self::Brightness => "flux".into(),
             Self::Star(_) => "star".into(),
             Self::Slot(_) => "slot".into(),
             Self::Window => "window".into(),
@@ -124,7 +128,7 @@ impl Variable {
             Self::Acceleration => 6,
             Self::Magnitude => 7,
             Self::Colour => 8,
-            Self::Flux => 9,
+            Self::Flux | Self::Brightness => 9,
             Self::Star(_) => 10,
             Self::Slot(_) => 11,
             Self::Window => 12,
@@ -141,12 +145,18 @@ impl Variable {
             Self::Magnitude => rows.mag[i],
             Self::Colour => rows.bv[i],
             Self::Flux => rows.log_flux[i],
+            Self::Brightness => flux_of(rows.mag[i]),
             Self::Rate => rows.vx_px_s[i].hypot(rows.vy_px_s[i]),
             Self::Acceleration => rows.ax_px_s2[i].hypot(rows.ay_px_s2[i]),
             Self::Housekeeping(_, series) => series.at(rows.t_s[i]).unwrap_or(f64::NAN),
             Self::Phase(_) | Self::Star(_) | Self::Slot(_) | Self::Window => f64::NAN,
         }
     }
+}
+
+/// Flux over that of magnitude 5.
+pub(crate) fn flux_of(mag: f64) -> f64 {
+    10_f64.powf(-0.4 * (mag - 5.0))
 }
 
 /// One variable, or two, as columns.
@@ -187,7 +197,7 @@ impl Empirical {
             // A polynomial in time is only good outside its fold if it is straight.
             Variable::Time if stars => 4,
             Variable::Time => 3,
-            Variable::Rate => 8,
+            Variable::Rate => 10,
             Variable::Acceleration => 4,
             _ if stars => 4 * orders(&variable),
             _ => 3 * orders(&variable),
@@ -225,6 +235,20 @@ impl Empirical {
         matches!(self.variable, Variable::Star(_) | Variable::Slot(_))
     }
 
+    /// Whether it is a constant of each star that stands in a catalogue.
+    pub(crate) fn is_of_a_star(&self) -> bool {
+        let of_star = matches!(
+            self.variable,
+            Variable::Magnitude | Variable::Colour | Variable::Brightness
+        );
+        of_star && self.by.is_none()
+    }
+
+    /// Whether it is a shift of each star.
+    pub(crate) fn is_of_stars(&self) -> bool {
+        matches!(self.variable, Variable::Star(_)) && self.by.is_none()
+    }
+
     /// The name in `unattributed.depends_on`.
     pub(crate) fn name(&self) -> String {
         let mut both = vec![&self.variable];
@@ -245,8 +269,8 @@ impl Empirical {
             leading.map(|l| (0..*l).collect()).collect()
         };
         if matches!(self.variable, Variable::Rate) && self.by.is_none() {
-            // along the motion, bent; its square
-            parts.extend([vec![0, 6], vec![4, 5]]);
+            // along the motion, bent; its square; its direction alone
+            parts.extend([vec![0, 6], vec![4, 5], vec![8], vec![8, 9]]);
         }
         parts.push((0..n).collect());
         parts
@@ -372,6 +396,9 @@ impl Candidate for Empirical {
                     put(5, 0.0, square);
                     put(6, square.sqrt() * a, square.sqrt() * b);
                     put(7, -square.sqrt() * b, square.sqrt() * a);
+                    let speed = (square + AT_REST * AT_REST).sqrt();
+                    put(8, a / speed, b / speed);
+                    put(9, -b / speed, a / speed);
                 }
                 Variable::Star(ids) => {
                     if let Some(k) = ids.iter().position(|&id| id == rows.star_id[i]) {

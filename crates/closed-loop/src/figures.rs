@@ -28,6 +28,8 @@ use crate::search::Found;
 use crate::selection::{FAMILY_ALPHA, columns_of};
 use crate::star_data::StarData;
 
+/// Shares within this factor are the same.
+const SAME: f64 = 3.0;
 /// Correlations below this are not worth a reader's time.
 const CONFUSABLE: f64 = 0.3;
 
@@ -222,11 +224,15 @@ fn consider(found: &Found, id: &str, excess: f64) -> ConsideredEffect {
 /// effects. `left` is the share of the before variance that is left.
 pub(crate) fn unattributed(found: &Found, left: f64) -> Unattributed {
     let set = columns_of(&found.fitted.groups, &found.selection.chosen);
-    let terms: Vec<(String, Vec<Vec<usize>>)> = (0..found.candidates.len())
+    let terms: Vec<Followed> = (0..found.candidates.len())
         .filter(|&g| found.candidates[g].id() == EMPIRICAL && found.selection.judged[g].observable)
         .filter_map(|g| {
             let name = found.candidates[g].selectors().get("variable")?.clone();
-            Some((name, vec![found.fitted.groups[g].columns.clone()]))
+            Some(Followed {
+                variable: name,
+                parts: vec![found.fitted.groups[g].columns.clone()],
+                of_many: false,
+            })
         })
         .collect();
     follows(
@@ -234,42 +240,105 @@ pub(crate) fn unattributed(found: &Found, left: f64) -> Unattributed {
         &set,
         &terms,
         found.candidates.len(),
+        price_of_one(found.fitted.scalars),
         left,
     )
 }
 
-/// What the leftover beside columns `set` follows: of `terms`, each by the most certain of
-/// its parts. `tried` terms are paid for.
+/// How columns do.
+struct Part {
+    p_value: f64,
+    share: f64,
+    worth: f64,
+    columns: usize,
+}
+
+/// A variable that the leftover may follow.
+pub(crate) struct Followed {
+    pub(crate) variable: String,
+    /// Columns by which it is judged.
+    pub(crate) parts: Vec<Vec<usize>>,
+    /// Its parts are single stars or slots, and all.
+    pub(crate) of_many: bool,
+}
+
+/// What the leftover beside columns `set` follows: of `terms`, each by the part that is worth
+/// most after a price of `each` nats a column, or is most certain where none is worth it. `tried`
+/// terms are paid for.
 pub(crate) fn follows(
     fits: &Fits,
     set: &[usize],
-    terms: &[(String, Vec<Vec<usize>>)],
+    terms: &[Followed],
     tried: usize,
+    each: f64,
     left: f64,
 ) -> Unattributed {
-    let base = fits.out_of_fold(set).map_or(0.0, |o| o.total_sse());
-    let judge = |part: &[usize], parts: usize| -> Option<(f64, f64)> {
+    let (base, before) = fits
+        .out_of_fold(set)
+        .map_or((0.0, 0.0), |o| (o.total_sse(), o.total_loglik()));
+    let judge = |part: &[usize], parts: usize| -> Option<Part> {
         let mut with = set.to_vec();
         with.extend(part);
         let which: Vec<usize> = (set.len()..with.len()).collect();
-        let sse = fits.out_of_fold(&with)?.total_sse();
+        let fold = fits.out_of_fold(&with)?;
         let p = fits.estimate(&with)?.p_value(&which);
         let tried = parts * tried;
-        let share = if base > 0.0 { 1.0 - sse / base } else { 0.0 };
-        Some(((p * tried as f64).min(1.0), share))
+        let share = if base > 0.0 {
+            1.0 - fold.total_sse() / base
+        } else {
+            0.0
+        };
+        let worth = fold.total_loglik() - before - each * part.len() as f64;
+        Some(Part {
+            p_value: (p * tried as f64).min(1.0),
+            share,
+            worth,
+            columns: part.len(),
+        })
     };
-    let mut depends_on: Vec<Dependence> = terms
+    // whether it is one of many, too
+    let mut judged: Vec<(Dependence, f64, bool)> = terms
         .iter()
-        .filter_map(|(variable, parts)| {
-            let judged = parts.iter().filter_map(|part| judge(part, parts.len()));
-            let (p_value, variance_explained) = judged.min_by(|a, b| a.0.total_cmp(&b.0))?;
-            Some(Dependence {
-                variable: variable.clone(),
-                variance_explained,
-                p_value,
-            })
+        .filter_map(|term| {
+            let all = term.parts.iter();
+            let all: Vec<Part> = all
+                .filter_map(|part| judge(part, term.parts.len()))
+                .collect();
+            let worthy = all
+                .iter()
+                .filter(|p| p.p_value < FAMILY_ALPHA && p.worth > 0.0);
+            let best = worthy
+                .max_by(|a, b| a.worth.total_cmp(&b.worth))
+                .or_else(|| all.iter().min_by(|a, b| a.p_value.total_cmp(&b.p_value)))?;
+            let entry = Dependence {
+                variable: term.variable.clone(),
+                variance_explained: best.share,
+                p_value: best.p_value,
+            };
+            let whole = all.iter().map(|p| p.columns).max()?;
+            Some((entry, best.worth, term.of_many && best.columns < whole))
         })
         .collect();
+    // one star never wins against one slope that explains the same
+    let slopes: Vec<Dependence> = judged
+        .iter()
+        .filter(|(d, _, one)| !one && certain(d))
+        .map(|(d, ..)| d.clone())
+        .collect();
+    judged.retain(|(d, _, one)| {
+        let same = |s: &Dependence| {
+            s.p_value < d.p_value && SAME * s.variance_explained > d.variance_explained
+        };
+        !(*one && slopes.iter().any(same))
+    });
+    if judged
+        .iter()
+        .any(|(d, worth, _)| certain(d) && *worth > 0.0)
+    {
+        // a dozen columns follow anything a little
+        judged.retain(|(d, worth, _)| certain(d) && *worth > 0.0);
+    }
+    let mut depends_on: Vec<Dependence> = judged.into_iter().map(|(d, ..)| d).collect();
     depends_on.sort_by(|a, b| b.variance_explained.total_cmp(&a.variance_explained));
     if depends_on.iter().any(certain) {
         // what chance does as well is not named beside what it does not
@@ -284,9 +353,13 @@ pub(crate) fn follows(
         present: share > 0.0,
         variance_fraction: Some(share * left),
         depends_on,
-        lines_hz: Vec::new(),
-        jumps_s: Vec::new(),
+        ..Unattributed::default()
     }
+}
+
+/// Nats that a column costs where there are so many numbers.
+pub(crate) fn price_of_one(scalars: f64) -> f64 {
+    0.5 * scalars.max(2.0).ln()
 }
 
 /// Whether that is beyond chance.

@@ -1,6 +1,6 @@
 //! What remains in time: lines and jumps of what all rows of a frame share.
 //!
-//! Series of one number a frame (rotations, the scale of the image, attitude axes) are
+//! Series of one number a frame (rotations, growth and shears of the image, attitude axes) are
 //! whitened by the noise that suits them best (coloured.rs) and searched for a sinusoid,
 //!
 //! ```text
@@ -20,7 +20,7 @@
 //!
 //! Source: Scargle 1982 (periodogram), the F law of a ratio of two mean powers; Wilks 1938.
 
-use nalgebra::{DMatrix, DVector, Matrix4, Vector3, Vector4};
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3, Vector4};
 use rayon::prelude::*;
 use spectra::{LombScargle, LombScargleSettings, robust};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -28,7 +28,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 use crate::bins::{self, Bins};
 use crate::coloured::Coloured;
 use crate::folds::Folds;
-use crate::frame_rotation::{rotation_inverse, rotation_row};
+use crate::frame_rotation::rotation_row;
 use crate::selection::FAMILY_ALPHA;
 use crate::spatial_errors::SpatialErrors;
 use crate::star_data::{StarData, median_step};
@@ -56,6 +56,16 @@ const MOST: usize = 5;
 const MOST_STEPS: usize = 1200;
 /// Points that a level on each side of a jump is of.
 const MIN_SIDE: usize = 5;
+
+/// What the image can do besides turning: x and y of a shift per x and y of the place. It grows,
+/// or is sheared either way.
+const STRETCHES: [[[f64; 2]; 2]; 3] = [
+    [[1.0, 0.0], [0.0, 1.0]],
+    [[1.0, 0.0], [0.0, -1.0]],
+    [[0.0, 1.0], [1.0, 0.0]],
+];
+/// Least share of a stretch that is no rotation.
+const LEAST_INFORMATION: f64 = 1e-6;
 
 /// One number a frame.
 #[derive(Clone, Debug)]
@@ -129,10 +139,10 @@ pub(crate) fn describe(tracks: &[Track]) -> Leftover {
     out
 }
 
-/// What the stars of a frame share, of residuals (arcsec, per axis over all rows): the
-/// rotation where it is held against a reference, and the growth of the image, arcsec at
-/// the distance of the usual star.
-pub(crate) fn star_tracks(data: &StarData, residual: &[Vec<f64>]) -> Vec<Track> {
+/// What the stars of a frame share, of residuals (arcsec, per axis over all rows) of this
+/// `weight`: the rotation where it is held against a reference, and the growth and both shears
+/// of the image, arcsec at the edge.
+pub(crate) fn star_tracks(data: &StarData, residual: &[Vec<f64>], weight: &[f64]) -> Vec<Track> {
     let frames = data.frames.frames();
     let empty = || Track {
         t_s: data.frames.t_s.clone(),
@@ -140,7 +150,7 @@ pub(crate) fn star_tracks(data: &StarData, residual: &[Vec<f64>]) -> Vec<Track> 
         weight: vec![0.0; frames],
         changes: None,
     };
-    let mut tracks = vec![empty(), empty(), empty(), empty()];
+    let mut tracks = vec![empty(); 3 + STRETCHES.len()];
     let half = data.camera.half_size_px();
     for frame in 0..frames {
         let rows: Vec<usize> = data
@@ -148,32 +158,40 @@ pub(crate) fn star_tracks(data: &StarData, residual: &[Vec<f64>]) -> Vec<Track> 
             .rows_of(frame)
             .filter(|&r| !data.outlier[r] && residual.iter().all(|a| a[r].is_finite()))
             .collect();
-        let Some(inverse) = rotation_inverse(data, frame) else {
-            continue;
-        };
-        let (mut normal, mut moment) = (Matrix4::zeros(), Vector4::zeros());
+        let (mut normal, mut moment) = (Matrix3::zeros(), Vector3::zeros());
+        let mut stretch = [(Vector4::zeros(), 0.0); STRETCHES.len()];
         for &r in &rows {
-            let jacobian = rotation_row(data, r);
-            for axis in 0..2 {
-                let growth = data.modelled[axis][r] / half[axis];
-                let [x, y, z] = jacobian[axis];
-                let a = Vector4::new(x, y, z, growth);
-                moment += a * residual[axis][r];
-                normal += a * a.transpose();
+            let w = weight[r] * weight[r];
+            let at = [0, 1].map(|a| data.modelled[a][r] / half[a]);
+            for (axis, turn) in rotation_row(data, r).into_iter().enumerate() {
+                let turn = Vector3::from(turn);
+                normal += turn * turn.transpose() * w;
+                moment += turn * (w * residual[axis][r]);
+                for (sum, by) in stretch.iter_mut().zip(STRETCHES) {
+                    let g = by[axis][0] * at[0] + by[axis][1] * at[1];
+                    sum.0 += Vector4::new(turn[0], turn[1], turn[2], g) * (w * g);
+                    sum.1 += w * g * residual[axis][r];
+                }
             }
         }
-        let rotation = inverse * Vector3::new(moment[0], moment[1], moment[2]);
+        let Some(inverse) = normal.try_inverse().filter(|_| rows.len() >= 2) else {
+            continue;
+        };
+        let rotation = inverse * moment;
         if !data.free_attitude {
             for axis in 0..3 {
                 tracks[axis].value[frame] = rotation[axis];
                 tracks[axis].weight[frame] = 1.0 / inverse[(axis, axis)];
             }
         }
-        if rows.len() >= 3
-            && let Some(covariance) = normal.try_inverse()
-        {
-            tracks[3].value[frame] = (covariance * moment)[3];
-            tracks[3].weight[frame] = 1.0 / covariance[(3, 3)];
+        // each beside the rotation
+        for (track, (cross, score)) in tracks[3..].iter_mut().zip(&stretch) {
+            let turned = cross.fixed_rows::<3>(0).into_owned();
+            let information = cross[3] - turned.dot(&(inverse * turned));
+            if rows.len() >= 3 && information > LEAST_INFORMATION * cross[3] {
+                track.value[frame] = (score - turned.dot(&rotation)) / information;
+                track.weight[frame] = information;
+            }
         }
     }
     tracks.retain(|t| t.weight.iter().any(|w| *w > 0.0));

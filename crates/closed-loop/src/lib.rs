@@ -53,6 +53,7 @@ mod star_evidence;
 mod star_loop;
 mod star_moments;
 mod star_search;
+mod star_series;
 mod star_weights;
 
 pub use close::{Closed, Rival, close, close_asking};

@@ -13,6 +13,7 @@
 //!
 //! Source: effects.md of the design notes (`magnitude_noise`, `rate_noise`, `outliers`).
 
+mod follows;
 mod judge;
 mod rows;
 #[cfg(test)]
@@ -35,6 +36,7 @@ use crate::selection::columns_of;
 use crate::situation::Situation;
 use crate::star_data::StarData;
 use crate::star_evidence::StarEvidence;
+pub(crate) use follows::{NoiseFollows, noise_follows};
 use judge::{Judged, SLOPE_AS_DECLARED, judge};
 use rows::{Row, Source};
 
@@ -54,6 +56,8 @@ const STEEPEST: f64 = 20.0;
 pub(crate) struct NoiseEffects {
     pub(crate) effects: Vec<FoundEffect>,
     pub(crate) entries: Vec<EffectEntry>,
+    /// Noise of a rate that is claimed, arcsec/(deg/s).
+    rate: f64,
     considered: Vec<ConsideredEffect>,
 }
 
@@ -220,7 +224,11 @@ pub(crate) fn claim(
             verdicts.rate.stands &= verdicts.rate.agrees(&fast.rate, 0.0);
         }
     }
-    let mut out = NoiseEffects::default();
+    let rate = &verdicts.rate;
+    let mut out = NoiseEffects {
+        rate: if rate.stands { rate.values[0][0] } else { 0.0 },
+        ..NoiseEffects::default()
+    };
     out.add(MAGNITUDE, &[("slope", "")], &verdicts.magnitude);
     out.add(
         RATE,

@@ -12,6 +12,9 @@
 //! positions, and the best is refined there. The half pixels cost a part 1 - sinc^2(kx/2)
 //! sinc^2(ky/2) of the power in the first step alone.
 //!
+//! Rows count by the noise of their star ([`crate::star_weights`]): of fourteen stars alike
+//! in nothing but the wave, equal weights lose a third of its power.
+//!
 //! Every residual is less the mean of its star, so that only what changes along a star's
 //! path counts: a constant of each star is the distortion's and the catalogue's. Whole
 //! cycles per pixel along one axis are pixel phase and are taken out before; waves of the
@@ -31,13 +34,12 @@
 use std::f64::consts::PI;
 use std::ops::Range;
 
-use nalgebra::{Cholesky, Matrix2, Matrix4, Vector2, Vector3, Vector4};
+use nalgebra::{Cholesky, Matrix2, Matrix4, Vector2, Vector4};
 use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 use telemetry::report::{Dependence, Unattributed};
 
 use crate::folds::Folds;
-use crate::frame_rotation::{rotation_of, rotation_row};
 use crate::selection::FAMILY_ALPHA;
 use crate::star_data::StarData;
 
@@ -45,13 +47,16 @@ mod pixel_phase;
 #[cfg(test)]
 mod tests;
 mod transform;
+mod turn;
+
+pub(crate) use turn::less_rotation;
 
 /// Peaks of the transform that are refined.
 const REFINED: usize = 6;
 /// Chances of a top for each independent wave vector.
 const CHANCES: f64 = 8.0;
 /// Waves fewer than this times the distortion's order across the detector are its own.
-const ORDERS: f64 = 2.0;
+const ORDERS: f64 = 1.0;
 /// The order where none is declared.
 const USUAL_ORDER: u32 = 7;
 /// Cycles over the extent within which a wave is one of pixel phase.
@@ -62,7 +67,7 @@ const LEAST_MOTION: f64 = 0.1;
 const LEAST_CLUSTERS: usize = 40;
 /// Wave vectors that the mean power around the peak is of.
 const AROUND: usize = 64;
-/// From this many stars a frame on, what a rotation of the frame does is left out.
+/// From this many stars a frame on, what the reference turns a frame by is left out.
 const STARS_TO_TURN: usize = 5;
 /// Least extent, px: less holds no waves to speak of.
 const LEAST_EXTENT_PX: f64 = 16.0;
@@ -72,11 +77,12 @@ const LEAST_EXTENT_PX: f64 = 16.0;
 struct Field {
     x_px: Vec<f64>,
     y_px: Vec<f64>,
-    /// Residual of each axis, arcsec, less the mean of its star.
+    /// Weighted residual of each axis, arcsec, less the mean of its star.
     residual: [Vec<f64>; 2],
     frame: Vec<u32>,
-    /// Rows of each star.
+    /// Rows of each star, and the weight of each of them: it is in columns and residuals.
     stars: Vec<Range<usize>>,
+    weight: Vec<f64>,
     /// Whether the stars have spots of their own.
     own_spots: bool,
 }
@@ -132,10 +138,12 @@ impl Pattern {
 }
 
 /// The pattern that `residual` (arcsec, per axis over all rows) follows, if one is beyond
-/// doubt. `order` is the declared distortion's; with `own_spots` the stars' centroids were learned from windows.
+/// doubt. A star counts by the `weight` of its rows; `order` is the declared distortion's; with `own_spots`
+/// the stars' centroids were learned from windows.
 pub(crate) fn search(
     data: &StarData,
     residual: &[Vec<f64>],
+    weight: &[f64],
     folds: &Folds,
     order: Option<u32>,
     own_spots: bool,
@@ -155,38 +163,17 @@ pub(crate) fn search(
     let at = [data.modelled[0].as_slice(), &data.modelled[1]];
     let field = |residual: [&[f64]; 2]| Field {
         own_spots,
-        ..Field::new(at, residual, &frame, &of_star)
+        ..Field::new(at, residual, &frame, &of_star, weight)
     };
     let as_left = || field([rx, ry]);
     let turning = data.t_s.len() >= STARS_TO_TURN * data.frames.frames();
     let searched = if turning {
-        let [x, y] = without_rotation(data, residual);
+        let [x, y] = less_rotation(data, [rx, ry], weight);
         field([&x, &y])
     } else {
         as_left()
     };
     searched.pattern(&as_left, folds, order)
-}
-
-/// The residuals less what a rotation of their frame does.
-fn without_rotation(data: &StarData, residual: &[Vec<f64>]) -> [Vec<f64>; 2] {
-    let turn: Vec<Vector3<f64>> = (0..data.frames.frames())
-        .into_par_iter()
-        .map(|k| rotation_of(data, k, residual).unwrap_or_default())
-        .collect();
-    [0, 1].map(|axis| {
-        let of = |k: usize| {
-            let row = move |r: usize| (k, r);
-            data.frames.rows_of(k).map(row)
-        };
-        (0..turn.len())
-            .into_par_iter()
-            .flat_map_iter(of)
-            .map(|(k, r)| {
-                residual[axis][r] - Vector3::from(rotation_row(data, r)[axis]).dot(&turn[k])
-            })
-            .collect()
-    })
 }
 
 /// Sums of the columns cos and sin, less the mean of each star, with each other and with
@@ -242,16 +229,18 @@ const fn factorials(first: u32) -> [f64; 9] {
 }
 
 impl Sums {
-    /// Of the sums over a star's rows, which are `rows` many.
-    fn centred(raw: &[f64; RAW], rows: usize) -> Self {
+    /// Of the sums over a star's rows, which are `rows` many, each of this `weight`.
+    fn centred(raw: &[f64; RAW], rows: usize, weight: f64) -> Self {
         let n = rows as f64;
         let [c, s, cc, cs, ss, cx, sx, cy, sy, x, y] = *raw;
         let cs = cs - c * s / n;
+        let normal = Matrix2::new(cc - c * c / n, cs, cs, ss - s * s / n);
         Self {
-            normal: Matrix2::new(cc - c * c / n, cs, cs, ss - s * s / n),
+            normal: normal * (weight * weight),
+            // the residuals have theirs
             score: [
-                Vector2::new(cx - c * x / n, sx - s * x / n),
-                Vector2::new(cy - c * y / n, sy - s * y / n),
+                Vector2::new(cx - c * x / n, sx - s * x / n) * weight,
+                Vector2::new(cy - c * y / n, sy - s * y / n) * weight,
             ],
         }
     }
@@ -280,14 +269,23 @@ impl Sums {
 }
 
 impl Field {
-    fn new(at: [&[f64]; 2], residual: [&[f64]; 2], frame: &[u32], of_star: &[Vec<usize>]) -> Self {
+    fn new(
+        at: [&[f64]; 2],
+        residual: [&[f64]; 2],
+        frame: &[u32],
+        of_star: &[Vec<usize>],
+        weight: &[f64],
+    ) -> Self {
         let mut field = Self::default();
         for rows in of_star.iter().filter(|rows| rows.len() > 1) {
             let first = field.frame.len();
+            let w = weight[rows[0]];
             for axis in 0..2 {
                 let mean = rows.iter().map(|&r| residual[axis][r]).sum::<f64>() / rows.len() as f64;
-                field.residual[axis].extend(rows.iter().map(|&r| residual[axis][r] - mean));
+                let centred = rows.iter().map(|&r| w * (residual[axis][r] - mean));
+                field.residual[axis].extend(centred);
             }
+            field.weight.push(w);
             field.x_px.extend(rows.iter().map(|&r| at[0][r]));
             field.y_px.extend(rows.iter().map(|&r| at[1][r]));
             field.frame.extend(rows.iter().map(|&r| frame[r]));
@@ -379,8 +377,9 @@ impl Field {
         })
     }
 
-    /// Columns cos and sin of the rows of one star, less their means.
-    fn columns(&self, rows: &Range<usize>, k: [f64; 2], out: &mut Vec<[f64; 2]>) {
+    /// Weighted columns cos and sin of the rows of one star, less their means.
+    fn columns(&self, star: usize, k: [f64; 2], out: &mut Vec<[f64; 2]>) {
+        let (rows, w) = (&self.stars[star], self.weight[star]);
         out.clear();
         let (mut c, mut s) = (0.0, 0.0);
         for row in rows.clone() {
@@ -391,7 +390,7 @@ impl Field {
         }
         let n = rows.len() as f64;
         for v in out {
-            *v = [v[0] - c / n, v[1] - s / n];
+            *v = [w * (v[0] - c / n), w * (v[1] - s / n)];
         }
     }
 
@@ -399,12 +398,13 @@ impl Field {
         let pieces: Vec<Range<usize>> = self.stars.iter().flat_map(pieces).collect();
         let raw: Vec<[f64; RAW]> = pieces.par_iter().map(|p| self.raw_sums(p, k)).collect();
         let mut raw = raw.iter();
-        self.stars.iter().fold(Sums::default(), |all, rows| {
+        let stars = self.stars.iter().zip(&self.weight);
+        stars.fold(Sums::default(), |all, (rows, weight)| {
             let mut sum = [0.0; RAW];
             for piece in raw.by_ref().take(pieces_of(rows.len())) {
                 sum.iter_mut().zip(piece).for_each(|(s, p)| *s += p);
             }
-            all.add(&Sums::centred(&sum, rows.len()))
+            all.add(&Sums::centred(&sum, rows.len(), *weight))
         })
     }
 
@@ -480,8 +480,8 @@ impl Field {
         let block = block_of_frame(folds);
         frames.resize(block.len(), Vector4::zeros());
         let mut columns = Vec::new();
-        for rows in &self.stars {
-            self.columns(rows, k, &mut columns);
+        for (star, rows) in self.stars.iter().enumerate() {
+            self.columns(star, k, &mut columns);
             let mut last = usize::MAX;
             for (j, &[c, s]) in columns.iter().enumerate() {
                 let row = rows.start + j;
@@ -508,8 +508,8 @@ impl Field {
         let beta = sums.amplitudes()?;
         let mut left = self.clone();
         let mut columns = Vec::new();
-        for rows in &self.stars {
-            self.columns(rows, k, &mut columns);
+        for (star, rows) in self.stars.iter().enumerate() {
+            self.columns(star, k, &mut columns);
             for (j, &[c, s]) in columns.iter().enumerate() {
                 for (residual, b) in left.residual.iter_mut().zip(&beta) {
                     residual[rows.start + j] -= b[0] * c + b[1] * s;
@@ -536,8 +536,8 @@ impl Field {
         let fold = folds.fold_of_frame();
         let mut each = vec![Sums::default(); folds.count];
         let mut columns = Vec::new();
-        for rows in &self.stars {
-            self.columns(rows, k, &mut columns);
+        for (star, rows) in self.stars.iter().enumerate() {
+            self.columns(star, k, &mut columns);
             for (f, sums) in each.iter_mut().enumerate() {
                 let part = self.sums_of(rows.start, &columns, |row| {
                     fold[self.frame[row] as usize] == f

@@ -42,6 +42,7 @@ use crate::situation::Situation;
 use crate::star_data::{Inputs, Star, StarData, median_step};
 use crate::star_evidence::StarEvidence;
 use crate::star_search::Wander;
+use crate::star_series;
 
 /// Fewest frames: every fold needs data to be predicted from.
 const MIN_FRAMES: usize = 2;
@@ -263,7 +264,10 @@ fn explain(
     Ok(Explained::Closed(Box::new(finish(&whole, after)?)))
 }
 
-fn all_rows<'a>(data: &'a StarData, motion: Option<&'a dyn AttitudeSource>) -> StarRows<'a> {
+pub(crate) fn all_rows<'a>(
+    data: &'a StarData,
+    motion: Option<&'a dyn AttitudeSource>,
+) -> StarRows<'a> {
     StarRows {
         t_s: &data.t_s,
         x_px: &data.modelled[0],
@@ -434,19 +438,46 @@ fn finish(f: &Finish<'_>, plain: Residuals) -> Result<Closed, CloseError> {
     }
     let inside = noise_effects::in_sample(f.level, f.found);
     let residual = inside.as_deref().unwrap_or(&plain.axes);
-    let (noise, (leftover, pattern)) = rayon::join(
+    let (noise, ((leftover, own), pattern)) = rayon::join(
         || noise_effects::claim(f.situation, f.level, residual, f.folds),
         || {
             let order = f.situation.model.noise.distortion_order;
             rayon::join(
-                || leftover::describe(&leftover::star_tracks(f.data, residual)),
-                || pattern::search(f.data, residual, f.folds, order, f.level.learned()),
+                || {
+                    let weight = &f.level.weight;
+                    (
+                        leftover::describe(&leftover::star_tracks(f.data, residual, weight)),
+                        star_series::search(f.data, residual, weight),
+                    )
+                },
+                || {
+                    pattern::search(
+                        f.data,
+                        residual,
+                        &f.level.weight,
+                        f.folds,
+                        order,
+                        f.level.learned(),
+                    )
+                },
             )
         },
     );
     let mut noise = noise?;
+    let mut noise_left = noise_effects::NoiseFollows::default();
     if f.image.is_some_and(|(level, _)| level.new_noise()) {
         noise = noise.without_magnitude();
+    }
+    if f.image.is_none() && !f.data.frames_are_unrelated() {
+        let variables = description::of_noise(f.situation, f.data);
+        noise_left = noise_effects::noise_follows(
+            f.situation,
+            f.level,
+            residual,
+            f.folds,
+            &noise,
+            &variables,
+        )?;
     }
     effects.extend(noise.effects.iter().cloned());
     entries.extend(noise.entries.iter().cloned());
@@ -459,6 +490,8 @@ fn finish(f: &Finish<'_>, plain: Residuals) -> Result<Closed, CloseError> {
     if let Some(slow) = f.slow {
         slow.tell(&mut unattributed, last / whole);
     }
+    own.tell(&mut unattributed, last / whole);
+    noise_left.tell(&mut unattributed);
     let excess = excess(f, last);
     let mut considered = figures::considered(f.found, excess);
     considered.retain(|c| !effects.iter().any(|e| e.id == c.id));

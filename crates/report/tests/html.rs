@@ -172,6 +172,7 @@ fn findings(stars: bool, attitude: bool) -> Report {
             }],
             lines_hz: vec![0.0123, 0.31],
             jumps_s: vec![1234.5, 2345.5],
+            noise_depends_on: Vec::new(),
         },
     }
 }

@@ -277,6 +277,9 @@ pub struct Unattributed {
     pub lines_hz: Vec<f64>,
     /// Times of jumps, s.
     pub jumps_s: Vec<f64>,
+    /// What the noise level follows, most certain first; shares are rms changes of its variance.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub noise_depends_on: Vec<Dependence>,
 }
 
 /// A variable that the leftover follows.

@@ -35,6 +35,8 @@ pub(super) struct Row {
     pub(super) mag: f64,
     /// Squared rate across the detector, (deg/s)^2.
     pub(super) rate: f64,
+    /// Its place among all rows.
+    pub(super) at: usize,
     pub(super) star: usize,
     pub(super) block: usize,
     /// Left out of the figures.
@@ -87,6 +89,7 @@ impl Source<'_> {
                     declared: self.declared[r],
                     mag: if mag.is_finite() { mag } else { 0.0 },
                     rate,
+                    at: r,
                     star: data.star[r],
                     block,
                     marked: data.outlier[r],

@@ -54,6 +54,7 @@ fn verdicts(seed: u64, frames: usize, truth: Truth) -> Verdicts {
                 };
                 let square = one().powi(2) + one().powi(2);
                 rows.push(Row {
+                    at: 0,
                     square,
                     declared: 1.0,
                     mag: *mag,

@@ -39,11 +39,11 @@ impl Field {
         });
         let own = self.own_spots;
         let taken = if own { WAVES } else { SINGLE };
-        let design = |rows: &Range<usize>| {
+        let design = |star: usize, rows: &Range<usize>| {
             let mut out = vec![[0.0; 2 * WAVES]; rows.len()];
             let mut columns = Vec::new();
             for (h, k) in waves[..taken].iter().enumerate() {
-                self.columns(rows, *k, &mut columns);
+                self.columns(star, *k, &mut columns);
                 for (row, c) in out.iter_mut().zip(&columns) {
                     row[2 * h..2 * h + 2].copy_from_slice(c);
                 }
@@ -53,9 +53,10 @@ impl Field {
         let sums: Vec<(Normal, Score)> = self
             .stars
             .par_iter()
-            .map(|rows| {
+            .enumerate()
+            .map(|(star, rows)| {
                 let (mut normal, mut score) = (Normal::zeros(), Score::zeros());
-                for (row, a) in rows.clone().zip(design(rows)) {
+                for (row, a) in rows.clone().zip(design(star, rows)) {
                     let a = SVector::from(a);
                     normal.ger(1.0, &a, &a, 1.0);
                     let of = SVector::from([self.residual[0][row], self.residual[1][row]]);
@@ -85,8 +86,9 @@ impl Field {
             .stars
             .par_iter()
             .zip(&beta)
-            .map(|(rows, beta)| {
-                let design = design(rows);
+            .enumerate()
+            .map(|(star, (rows, beta))| {
+                let design = design(star, rows);
                 [0, 1].map(|axis| {
                     let beta = beta.column(axis);
                     let own = self.residual[axis][rows.clone()].iter().zip(&design);

@@ -54,6 +54,7 @@ fn field(
         [&residual[0], &residual[1]],
         &frame,
         &of_star,
+        &vec![1.0; frame.len()],
     )
 }
 
@@ -137,8 +138,7 @@ fn the_list_stays_sorted_and_keeps_what_explains_more() {
         present: false,
         variance_fraction: Some(0.01),
         depends_on: vec![entry("time", 0.02), entry("x_px", 0.015), entry("mag", 0.0)],
-        lines_hz: Vec::new(),
-        jumps_s: Vec::new(),
+        ..Unattributed::default()
     };
     let pattern = |explained| Pattern {
         wave: [0.1, 0.0],

@@ -1,7 +1,7 @@
 //! The strongest wave vectors of a field, by a transform of its residuals on half pixels.
 //!
 //! ```text
-//! F(k) = sum over rows (x residual + i y residual) e^(-2 pi i k p)     |X|^2 + |Y|^2 = (|F(k)|^2 + |F(-k)|^2) / 2
+//! F(k) = sum over rows weight (x residual + i y residual) e^(-2 pi i k p)     |X|^2 + |Y|^2 = (|F(k)|^2 + |F(-k)|^2) / 2
 //! ```
 //!
 //! p: the cell of the row, in half pixels; k: cycles/px. Detectors that a transform of the
@@ -121,11 +121,13 @@ impl Field {
             (j % n, if turned { -twist } else { twist })
         };
         grid.fill(Complex::new(0.0, 0.0));
-        for row in 0..self.rows() {
-            let (i, ti) = cell(0, self.x_px[row]);
-            let (j, tj) = cell(1, self.y_px[row]);
-            let r = [0, 1].map(|a| narrow(self.residual[a][row] * scale[a]));
-            grid[j * nx + i] += Complex::new(r[0], r[1]) * ti * tj;
+        for (rows, weight) in self.stars.iter().zip(&self.weight) {
+            for row in rows.clone() {
+                let (i, ti) = cell(0, self.x_px[row]);
+                let (j, tj) = cell(1, self.y_px[row]);
+                let r = [0, 1].map(|a| narrow(weight * self.residual[a][row] * scale[a]));
+                grid[j * nx + i] += Complex::new(r[0], r[1]) * ti * tj;
+            }
         }
         grid.par_chunks_mut(nx).for_each_init(
             || vec![Complex::default(); plans[0].get_inplace_scratch_len()],

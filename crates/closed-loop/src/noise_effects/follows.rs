@@ -1,0 +1,313 @@
+//! What the noise level follows, beside the effects of the catalogue on it.
+//!
+//! Squares of the residuals over what is claimed of their variance, and over the own level of
+//! every star, are 1 on average wherever one looks if the noise is the same. For a variable
+//! with columns f, less their mean over each star's rows,
+//!
+//! ```text
+//! z_i = q_i / (2 v_i L_star) - 1,   u = sum f_i z_i,   beta = N^-1 u,   N = sum f f'
+//! T^2 = u' V^-1 u,  V = sum over blocks of time,   and  u' N^-1 u / var z  ~ chi2
+//! ```
+//!
+//! of which the larger chance counts. What differs between stars alone (colour, place) is held
+//! against the scatter of their levels about a line in magnitude, as is each star. Residuals
+//! that are slow are no noise: what changes from frame to frame has to tell the same.
+//!
+//! Source: Breusch & Pagan 1979, studentised by Koenker 1981; clusters as in Liang & Zeger 1986.
+
+use nalgebra::{Cholesky, DMatrix, DVector};
+use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor, StudentsT};
+use telemetry::report::{Dependence, Unattributed};
+
+use super::rows::{Row, Source};
+use super::{NoiseEffects, declared_variance, quick};
+use crate::empirical::Variable;
+use crate::error::CloseError;
+use crate::folds::Folds;
+use crate::situation::Situation;
+use crate::star_evidence::StarEvidence;
+
+/// Chance that any variable of a bundle is told although the noise follows none.
+const ALPHA: f64 = 0.003;
+/// A square beyond this many times the usual is a spike's.
+const SPIKE: f64 = 24.0;
+/// Least rms of a column over the rows of a star, of 1: less is no change.
+const LEAST_CHANGE: f64 = 0.05;
+/// Fewest rows of a star with a level, stars that are compared, and blocks of time.
+const MIN_ROWS: usize = 50;
+const MIN_STARS: usize = 8;
+const MIN_BLOCKS: usize = 20;
+const MEDIAN: f64 = std::f64::consts::LN_2;
+
+/// What the noise follows, most certain first.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct NoiseFollows(Vec<Dependence>);
+
+impl NoiseFollows {
+    /// Writes it where it is reported; where the residuals themselves follow nothing, it is
+    /// what is left.
+    pub(crate) fn tell(self, unattributed: &mut Unattributed) {
+        if self.0.is_empty() {
+            return;
+        }
+        if !unattributed.present {
+            unattributed.depends_on.clone_from(&self.0);
+        }
+        unattributed.present = true;
+        unattributed.noise_depends_on = self.0;
+    }
+}
+
+/// Looks at the squares of `residual`, which the stars leave at `level` beside `claimed`.
+pub(crate) fn noise_follows(
+    situation: &Situation<'_>,
+    level: &StarEvidence<'_>,
+    residual: &[Vec<f64>],
+    folds: &Folds,
+    claimed: &NoiseEffects,
+    variables: &[(Variable, [f64; 2])],
+) -> Result<NoiseFollows, CloseError> {
+    let data = level.data;
+    let mut declared = declared_variance(situation, data)?;
+    let scale = data.camera.arcsec_per_px().map(|s| s / 3600.0);
+    for (r, v) in declared.iter_mut().enumerate() {
+        let more =
+            claimed.rate * (data.velocity[0][r] * scale[0]).hypot(data.velocity[1][r] * scale[1]);
+        if more.is_finite() {
+            *v += more * more;
+        }
+    }
+    let tables: Vec<Table> = [residual, &quick(data, residual)]
+        .into_iter()
+        .filter_map(|residual| {
+            Table::new(&Source {
+                data,
+                residual,
+                declared: &declared,
+                folds,
+            })
+        })
+        .collect();
+    let [all, fast] = tables.as_slice() else {
+        return Ok(NoiseFollows::default());
+    };
+    let rows = crate::star_loop::all_rows(data, None);
+    let mut found: Vec<Dependence> = Vec::new();
+    let mut tried = 0;
+    let mut told = |variable: String, judged: Option<Judged>| {
+        tried += usize::from(judged.is_some());
+        found.extend(judged.map(|[p_value, share]| Dependence {
+            variable,
+            variance_explained: share,
+            p_value,
+        }));
+    };
+    let both = |of: &dyn Fn(&Table) -> Option<Judged>| -> Option<Judged> {
+        let (all, fast) = (of(all)?, of(fast)?);
+        Some([all[0].max(fast[0]), all[1]])
+    };
+    for (variable, [low, high]) in variables {
+        let column = |row: &Row| -> Vec<f64> {
+            if let Variable::Phase(axis) = variable {
+                let at = data.modelled[*axis][row.at];
+                let (s, c) = data.camera.phase_rad(at).sin_cos();
+                return vec![s, c];
+            }
+            let z = (2.0 * variable.value(&rows, row.at) - low - high) / (high - low);
+            let z = if z.is_finite() { z } else { 0.0 };
+            vec![z, 1.5 * z * z - 0.5]
+        };
+        told(variable.name(), both(&|t| t.within(&column, 1)));
+        told(variable.name(), both(&|t| t.within(&column, 2)));
+        if matches!(variable, Variable::Position(_) | Variable::Colour) {
+            told(variable.name(), both(&|t| t.between(&column)));
+        }
+    }
+    told("star".to_owned(), both(&Table::odd_star));
+    for d in &mut found {
+        d.p_value = (d.p_value * tried as f64).min(1.0);
+    }
+    found.retain(|d| d.p_value < ALPHA);
+    found.sort_by(|a, b| a.p_value.total_cmp(&b.p_value));
+    let mut seen: Vec<String> = Vec::new();
+    found.retain(|d| {
+        let new = !seen.contains(&d.variable);
+        seen.push(d.variable.clone());
+        new
+    });
+    Ok(NoiseFollows(found))
+}
+
+/// A chance, and the rms share of the variance that changes.
+type Judged = [f64; 2];
+
+/// Squares over their usual size.
+struct Table {
+    rows: Vec<Row>,
+    /// Of each row, over the level of its star.
+    relative: Vec<f64>,
+    /// Level of each star over the declared one, its rows, and magnitude - 5.
+    stars: Vec<(f64, usize, f64)>,
+    blocks: usize,
+}
+
+impl Table {
+    fn new(source: &Source<'_>) -> Option<Self> {
+        let stars = source.data.stars.len();
+        let mut levels = vec![1.0; stars];
+        let mut rows = Vec::new();
+        for round in 0..2 {
+            let own = levels.clone();
+            rows = source.rows(&|row: &Row| [row.declared * own[row.star], 1.0]);
+            rows.retain(|r| !r.marked);
+            let mut squares = vec![Vec::new(); stars];
+            for row in &rows {
+                squares[row.star].push(0.5 * row.square / row.declared);
+            }
+            for (level, squares) in levels.iter_mut().zip(&mut squares) {
+                if squares.len() < MIN_ROWS {
+                    *level = f64::NAN;
+                } else if let Some(median) = spectra::robust::median(squares) {
+                    *level = median / MEDIAN;
+                }
+            }
+            if round == 0 {
+                let known = levels.iter().copied().filter(|l| l.is_finite());
+                let count = known.clone().count();
+                if count == 0 {
+                    return None;
+                }
+                let mean = known.sum::<f64>() / count as f64;
+                for level in levels.iter_mut().filter(|l| !l.is_finite()) {
+                    *level = mean;
+                }
+            }
+        }
+        rows.retain(|r| {
+            let level = levels[r.star];
+            level > 0.0 && r.square < SPIKE * r.declared * level
+        });
+        let mut sums = vec![(0.0, 0_usize, f64::NAN); stars];
+        for row in &rows {
+            let sum = &mut sums[row.star];
+            *sum = (sum.0 + 0.5 * row.square / row.declared, sum.1 + 1, row.mag);
+        }
+        for sum in &mut sums {
+            sum.0 /= sum.1.max(1) as f64;
+        }
+        let relative = rows
+            .iter()
+            .map(|r| 0.5 * r.square / r.declared / sums[r.star].0 - 1.0)
+            .collect();
+        Some(Self {
+            relative,
+            stars: sums,
+            blocks: rows.iter().map(|r| r.block + 1).max()?,
+            rows,
+        })
+    }
+
+    /// A variable that changes while a star is seen, by the first `count` of its columns.
+    fn within(&self, column: &dyn Fn(&Row) -> Vec<f64>, count: usize) -> Option<Judged> {
+        let columns: Vec<Vec<f64>> = self.rows.iter().map(column).collect();
+        let mut mean = vec![vec![0.0; count]; self.stars.len()];
+        for (row, f) in self.rows.iter().zip(&columns) {
+            let stars = self.stars[row.star].1 as f64;
+            (0..count).for_each(|k| mean[row.star][k] += f[k] / stars);
+        }
+        let mut normal = DMatrix::zeros(count, count);
+        let mut score = DVector::zeros(count);
+        let mut of_block = vec![DVector::zeros(count); self.blocks];
+        let mut square = 0.0;
+        for ((row, f), z) in self.rows.iter().zip(&columns).zip(&self.relative) {
+            let f = DVector::from_fn(count, |k, _| f[k] - mean[row.star][k]);
+            of_block[row.block] += &f * *z;
+            score += &f * *z;
+            normal += &f * f.transpose();
+            square += z * z;
+        }
+        let n = self.rows.len() as f64;
+        if (0..count).any(|k| normal[(k, k)] < n * LEAST_CHANGE * LEAST_CHANGE) {
+            return None;
+        }
+        let beta = Cholesky::new(normal.clone())?.solve(&score);
+        let white = beta.dot(&score) / (square / n).max(1.0);
+        let k = count as f64;
+        let p_white = ChiSquared::new(k).ok()?.sf(white);
+        of_block.retain(|u| u.norm_squared() > 0.0);
+        let blocks = of_block.len() as f64;
+        if of_block.len() < MIN_BLOCKS {
+            return None;
+        }
+        let centre = &score / blocks;
+        let spread: DMatrix<f64> = of_block
+            .iter()
+            .map(|u| (u - &centre) * (u - &centre).transpose())
+            .fold(DMatrix::zeros(count, count), |a, b| a + b);
+        let covariance = spread * (blocks / (blocks - 1.0));
+        let square = score.dot(&Cholesky::new(covariance)?.solve(&score));
+        let law = FisherSnedecor::new(k, blocks - k).ok()?;
+        let p = law.sf(square * (blocks - k) / (k * (blocks - 1.0)));
+        Some([p.max(p_white), (beta.dot(&score).max(0.0) / n).sqrt()])
+    }
+
+    /// Stars that are compared: logarithm of the level, magnitude, and the number of the star.
+    fn compared(&self) -> Vec<(f64, f64, usize)> {
+        let each = self.stars.iter().enumerate();
+        each.filter(|(_, (level, rows, _))| *rows >= MIN_ROWS && *level > 0.0)
+            .map(|(star, (level, _, mag))| (level.ln(), *mag, star))
+            .collect()
+    }
+
+    /// A variable of stars beside a line in magnitude, held against the scatter of their levels.
+    fn between(&self, column: &dyn Fn(&Row) -> Vec<f64>) -> Option<Judged> {
+        let mut mean = vec![0.0; self.stars.len()];
+        for row in &self.rows {
+            mean[row.star] += column(row)[0] / self.stars[row.star].1 as f64;
+        }
+        let stars = self.compared();
+        let y: Vec<f64> = stars.iter().map(|s| s.0).collect();
+        let f: Vec<f64> = stars.iter().map(|s| mean[s.2]).collect();
+        let mag: Vec<f64> = stars.iter().map(|s| s.1).collect();
+        let (p, left) = beside_line(&y, &f, &mag)?;
+        Some([p, left])
+    }
+
+    /// The star whose level lies farthest off the others'.
+    fn odd_star(&self) -> Option<Judged> {
+        let stars = self.compared();
+        let y: Vec<f64> = stars.iter().map(|s| s.0).collect();
+        let mag: Vec<f64> = stars.iter().map(|s| s.1).collect();
+        let each = (0..stars.len()).filter_map(|k| {
+            let alone: Vec<f64> = (0..stars.len())
+                .map(|j| f64::from(u8::from(j == k)))
+                .collect();
+            beside_line(&y, &alone, &mag)
+        });
+        let (p, share) = each.min_by(|a, b| a.0.total_cmp(&b.0))?;
+        Some([(p * stars.len() as f64).min(1.0), share])
+    }
+}
+
+/// The chance of the slope of `y` along `f` beside a constant and a line in `mag` (which 0
+/// throughout stands for unknown), and the rms of what it takes.
+fn beside_line(y: &[f64], f: &[f64], mag: &[f64]) -> Option<(f64, f64)> {
+    let n = y.len();
+    let known = mag.iter().any(|m| (m - mag[0]).abs() > 1e-6);
+    let columns = 2 + usize::from(known);
+    if n < MIN_STARS {
+        return None;
+    }
+    let design = DMatrix::from_fn(n, columns, |i, j| [f[i], 1.0, mag[i]][j]);
+    let factor = Cholesky::new(design.transpose() * &design)?;
+    let y = DVector::from_column_slice(y);
+    let beta = factor.solve(&(design.transpose() * &y));
+    let left = (&y - &design * &beta).norm_squared() / (n - columns) as f64;
+    let variance = factor.inverse()[(0, 0)] * left;
+    let law = StudentsT::new(0.0, 1.0, (n - columns) as f64).ok()?;
+    let t = beta[0] / variance.sqrt();
+    let p = 2.0 * law.sf(t.abs());
+    let mean = f.iter().sum::<f64>() / n as f64;
+    let spread = f.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n as f64;
+    t.is_finite().then(|| (p, beta[0].abs() * spread.sqrt()))
+}
