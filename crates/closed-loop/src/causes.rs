@@ -4,7 +4,8 @@
 //!
 //! - a description by variables explains the same and more ([`crate::stand_ins`]),
 //! - or an effect is not the same wherever it acts ([`crate::invariance`]),
-//! - or more stars are misplaced than a catalogue has: something moves them all.
+//! - or more stars are misplaced than a catalogue has: something moves them all,
+//! - or it is next to nothing beside what no effect explains.
 //!
 //! What refused an effect is kept in every fit from then on, described but not named, and
 //! the search is made anew: what is named has to stand beside it.
@@ -38,6 +39,8 @@ const DOUBT: f64 = 1e-4;
 /// wrong motions are one in some hundred, so that three among a dozen share another cause.
 const MISPLACED: &str = "catalogue_position";
 const MOST_MISPLACED: usize = 2;
+/// Share of what a description gains below which an effect beside it is what it leaves.
+const REMAINDER: f64 = 0.05;
 /// Slow: over this share of the span.
 const SLOW_SHARE: f64 = 0.2;
 
@@ -185,6 +188,11 @@ pub(crate) fn run<'a>(
             kept.extend(keep(&mut found, g, change));
             continue;
         }
+        let small = remainders(&described, &found);
+        if !small.is_empty() && !last {
+            refused.extend(small);
+            continue;
+        }
         let searched = Searched {
             found,
             evidence: evidence.clone(),
@@ -197,6 +205,20 @@ pub(crate) fn run<'a>(
         });
     }
     Err(CloseError::Singular)
+}
+
+/// Families of chosen effects that gain next to nothing beside a description of what no effect
+/// explains: what such a description leaves is fitted by anything.
+fn remainders(described: &Described, found: &Found) -> Vec<String> {
+    let set = columns_of(&described.fitted.groups, &described.chosen);
+    let alone = described.fitted.fits.out_of_fold(&set);
+    let gain = describe(described, &set).zip(alone);
+    let gain = gain.map_or(0.0, |((worth, _), alone)| worth - alone.total_loglik());
+    let chosen = found.selection.chosen.iter();
+    chosen
+        .filter(|&&g| found.selection.judged[g].delta_loglik < REMAINDER * gain)
+        .map(|&g| family(found.candidates[g].as_ref()))
+        .collect()
 }
 
 /// Families of misplaced stars, if more of `stars` are than a catalogue has.

@@ -28,6 +28,8 @@ use crate::star_data::{StarData, median_step};
 const ALPHA: f64 = 0.002;
 /// Shares of what the stars are known to follow beyond which they mostly wander.
 pub(crate) const MOSTLY: f64 = 20.0;
+/// The same where it is more certain than any of that.
+const SURER: f64 = 5.0;
 /// Sigmas of what is beyond doubt.
 const BEYOND_DOUBT: f64 = 3.5;
 /// Least share of the rotation's slow part.
@@ -66,7 +68,9 @@ impl Slow {
         let share = (self.stars / (1.0 + self.stars)).max(0.0);
         let first = unattributed.depends_on.first();
         let known = first.map_or(0.0, |d| d.variance_explained);
-        if self.chance() >= ALPHA || unattributed.present && share < MOSTLY * known {
+        let surer = first.is_some_and(|d| self.chance() < d.p_value) && share > SURER * known;
+        let little = share < MOSTLY * known && !surer;
+        if self.chance() >= ALPHA || unattributed.present && little {
             return;
         }
         if !unattributed.present {
@@ -272,8 +276,13 @@ mod tests {
         // one star is enough
         assert!(told(slow(0.0, 0.0, 8.0), &[]).0);
         assert!(!told(slow(0.0, 0.002, 3.0), &[]).0);
-        assert_eq!(told(slow(0.0, 0.1, 1.0), &[0.005]).1, ["mag"]);
-        assert_eq!(told(slow(0.0, 0.1, 1.0), &[0.004]).1, ["time*star", "mag"]);
+        // 0.005 is four sigmas, and less certain than what is known
+        assert_eq!(told(slow(0.0, 0.005, 1.0), &[0.000_3]).1, ["mag"]);
+        let both = ["time*star", "mag"];
+        assert_eq!(told(slow(0.0, 0.005, 1.0), &[0.000_2]).1, both);
+        // 0.1 is beyond doubt
+        assert_eq!(told(slow(0.0, 0.1, 1.0), &[0.019]).1, ["mag"]);
+        assert_eq!(told(slow(0.0, 0.1, 1.0), &[0.018]).1, both);
     }
 
     #[test]

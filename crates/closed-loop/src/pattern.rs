@@ -489,8 +489,9 @@ impl Field {
                 let u = Vector4::new(c * x, s * x, c * y, s * y);
                 let frame = self.frame[row] as usize;
                 frames[frame] += u;
-                if block[frame] != last {
-                    last = block[frame];
+                let cell = block[frame];
+                if cell != last {
+                    last = cell;
                     cells.push(Vector4::zeros());
                 }
                 if let Some(cell) = cells.last_mut() {

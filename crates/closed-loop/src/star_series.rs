@@ -23,7 +23,7 @@ use crate::pattern::less_rotation;
 use crate::star_data::StarData;
 
 /// Chance that either is told although there is none.
-const ALPHA: f64 = 0.002;
+const ALPHA: f64 = 0.001;
 /// Points of a star's series, and fewest.
 const MOST_POINTS: usize = 1200;
 const MIN_POINTS: usize = 60;

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use closed_loop::Closed;
-use telemetry::report::{Errors, FoundEffect, Report, Selector, Verdict};
+use telemetry::report::{Dependence, Errors, FoundEffect, Report, Selector, Verdict};
 
 use crate::number::number;
 
@@ -294,20 +294,26 @@ fn considered(out: &mut String, report: &Report) {
 }
 
 fn leftover(out: &mut String, report: &Report) {
-    if !report.unattributed.present {
+    let left = &report.unattributed;
+    if !left.present {
         return;
     }
-    line!(
-        out,
-        "What is left follows (share of its variance, out of fold):"
-    );
-    for d in report
-        .unattributed
-        .depends_on
-        .iter()
-        .filter(|d| d.variance_explained > 0.0)
-        .take(5)
-    {
+    let noise = &left.noise_depends_on;
+    if left.depends_on != *noise {
+        line!(
+            out,
+            "What is left follows (share of its variance, out of fold):"
+        );
+        follows(out, &left.depends_on);
+    }
+    if !noise.is_empty() {
+        line!(out, "The noise level follows (rms change of its variance):");
+        follows(out, noise);
+    }
+}
+
+fn follows(out: &mut String, list: &[Dependence]) {
+    for d in list.iter().filter(|d| d.variance_explained > 0.0).take(5) {
         line!(
             out,
             "  {:<34}{:>7.1} %   p = {:.1e}",

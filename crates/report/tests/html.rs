@@ -172,7 +172,11 @@ fn findings(stars: bool, attitude: bool) -> Report {
             }],
             lines_hz: vec![0.0123, 0.31],
             jumps_s: vec![1234.5, 2345.5],
-            noise_depends_on: Vec::new(),
+            noise_depends_on: vec![Dependence {
+                variable: "time".to_owned(),
+                variance_explained: 0.33,
+                p_value: 2e-7,
+            }],
         },
     }
 }

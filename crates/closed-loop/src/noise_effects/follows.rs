@@ -28,7 +28,7 @@ use crate::situation::Situation;
 use crate::star_evidence::StarEvidence;
 
 /// Chance that any variable of a bundle is told although the noise follows none.
-const ALPHA: f64 = 0.003;
+const ALPHA: f64 = 0.001;
 /// A square beyond this many times the usual is a spike's.
 const SPIKE: f64 = 24.0;
 /// Least rms of a column over the rows of a star, of 1: less is no change.

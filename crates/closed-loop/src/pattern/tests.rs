@@ -94,6 +94,40 @@ fn a_fringe_is_found_with_its_wave_vector() {
     }
 }
 
+/// Four of twelve stars are four times as quiet. With weights the wave has 1600 * 0.9^2 / 2 / 2.5^2 = 104 of T^2 in
+/// them and 13 in the rest; without, 4800 * 0.9^2 / 2 over a mean variance of 69: 28, where 2 ln(trials / 0.01) is 36.
+#[test]
+fn quiet_stars_count_for_more() {
+    let k = [1.0 / 7.3, 0.7 / 7.3];
+    let signal = wave(k, 0.9);
+    let loud = field(4, 60.0, [10.0, 0.0], &signal);
+    let quiet = field(4, 60.0, [2.5, 0.0], &signal);
+    let mixed = |weigh: bool| {
+        let mut mixed = loud.clone();
+        for (star, rows) in loud.stars.iter().enumerate() {
+            let (from, weight) = if star < 4 {
+                (&quiet, 4.0)
+            } else {
+                (&loud, 1.0)
+            };
+            let weight = if weigh { weight } else { 1.0 };
+            for row in rows.clone() {
+                for axis in 0..2 {
+                    mixed.residual[axis][row] = weight * from.residual[axis][row];
+                }
+            }
+            mixed.weight[star] = weight;
+        }
+        search(&mixed)
+    };
+    let found = mixed(true).expect("beyond doubt");
+    assert!(
+        (0..2).all(|a| (found.wave[a] - k[a]).abs() < 1e-3),
+        "{found:?}"
+    );
+    assert_eq!(mixed(false), None);
+}
+
 /// 1 % of nulls may raise an alarm: of 20, two or more one time in 60, none with these seeds.
 /// `BORESIGHT_SEEDS` takes more; then 5 sigma of a Poisson count are allowed.
 #[test]

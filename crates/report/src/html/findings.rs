@@ -1,7 +1,7 @@
 //! The report in tables: errors, effects, rivals, what was not added, what is left.
 
 use closed_loop::Closed;
-use telemetry::report::{ConsideredEffect, Errors, Estimate, FoundEffect, Report};
+use telemetry::report::{ConsideredEffect, Dependence, Errors, Estimate, FoundEffect, Report};
 
 use super::Page;
 use super::write::{Cell, datum, escaped, step};
@@ -380,6 +380,20 @@ fn why_not(c: &ConsideredEffect, report: &Report) -> String {
     }
 }
 
+/// Rows of a list of variables, which stands under `list`.
+fn dependences(list: &str, all: &[Dependence]) -> Vec<Vec<Cell>> {
+    let row = |(k, d): (usize, &Dependence)| {
+        let key = |name: &str| format!("/unattributed/{list}/{k}/{name}");
+        let v = d.variance_explained;
+        vec![
+            Cell::text(&d.variable),
+            Cell::html(datum(&key("variance_explained"), v, &percent(v))),
+            Cell::html(datum(&key("p_value"), d.p_value, &probability(d.p_value))),
+        ]
+    };
+    all.iter().enumerate().map(row).collect()
+}
+
 /// What no effect explains.
 pub(super) fn leftover(page: &mut Page, report: &Report) {
     let left = &report.unattributed;
@@ -399,24 +413,18 @@ pub(super) fn leftover(page: &mut Page, report: &Report) {
         if left.depends_on.is_empty() {
             page.paragraph("No variable was there to be tried.");
         } else {
-            let rows = left
-                .depends_on
-                .iter()
-                .enumerate()
-                .map(|(k, d)| {
-                    let key = |name: &str| format!("/unattributed/depends_on/{k}/{name}");
-                    let v = d.variance_explained;
-                    vec![
-                        Cell::text(&d.variable),
-                        Cell::html(datum(&key("variance_explained"), v, &percent(v))),
-                        Cell::html(datum(&key("p_value"), d.p_value, &probability(d.p_value))),
-                    ]
-                })
-                .collect();
+            let rows = dependences("depends_on", &left.depends_on);
             page.table(
                 "Smooth functions of one variable, judged out of fold beside what was added. A share below zero predicts worse than nothing.",
                 &["follows", "share of what is left, %", "p"],
                 rows,
+            );
+        }
+        if !left.noise_depends_on.is_empty() {
+            page.table(
+                "What the noise level follows: squares of what is left, beside the effects on the noise.",
+                &["follows", "rms change of the variance, %", "p"],
+                dependences("noise_depends_on", &left.noise_depends_on),
             );
         }
         let list = |name: &str, values: &[f64], shown: fn(f64) -> String| {
