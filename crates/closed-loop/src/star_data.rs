@@ -21,7 +21,7 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use centroid::CentroidError;
-use effects::Effect;
+use effects::{Effect, StarRows};
 use focal_plane::{
     ARCSEC_PER_RAD, AttitudeSeries, AttitudeSource, Camera, Pixel, Points, PointsMut, StarFrames,
     Vectors,
@@ -582,4 +582,28 @@ impl StarData {
 pub(crate) fn median_step(t_s: &[f64]) -> Option<f64> {
     let mut steps: Vec<f64> = t_s.windows(2).map(|w| w[1] - w[0]).collect();
     robust::median(&mut steps)
+}
+
+/// All rows, as candidates see them.
+pub(crate) fn all_rows<'a>(
+    data: &'a StarData,
+    motion: Option<&'a dyn AttitudeSource>,
+) -> StarRows<'a> {
+    StarRows {
+        t_s: &data.t_s,
+        x_px: &data.modelled[0],
+        y_px: &data.modelled[1],
+        landed_px: data.landed(),
+        vx_px_s: &data.velocity[0],
+        vy_px_s: &data.velocity[1],
+        ax_px_s2: &data.acceleration[0],
+        ay_px_s2: &data.acceleration[1],
+        mag: &data.mag,
+        bv: &data.bv,
+        log_flux: &data.log_flux,
+        window_px: data.window_px.each_ref().map(Vec::as_slice),
+        slot: &data.frames.slot,
+        star_id: &data.frames.star_id,
+        attitude: motion,
+    }
 }

@@ -39,7 +39,7 @@ use crate::search::{Found, amplitudes_as, fit};
 use crate::selection::columns_of;
 use crate::settling::{Settled, settle};
 use crate::situation::Situation;
-use crate::star_data::{Inputs, Star, StarData, median_step};
+use crate::star_data::{Inputs, Star, StarData, all_rows, median_step};
 use crate::star_evidence::StarEvidence;
 use crate::star_search::Wander;
 use crate::star_series;
@@ -264,29 +264,6 @@ fn explain(
     Ok(Explained::Closed(Box::new(finish(&whole, after)?)))
 }
 
-pub(crate) fn all_rows<'a>(
-    data: &'a StarData,
-    motion: Option<&'a dyn AttitudeSource>,
-) -> StarRows<'a> {
-    StarRows {
-        t_s: &data.t_s,
-        x_px: &data.modelled[0],
-        y_px: &data.modelled[1],
-        landed_px: data.landed(),
-        vx_px_s: &data.velocity[0],
-        vy_px_s: &data.velocity[1],
-        ax_px_s2: &data.acceleration[0],
-        ay_px_s2: &data.acceleration[1],
-        mag: &data.mag,
-        bv: &data.bv,
-        log_flux: &data.log_flux,
-        window_px: data.window_px.each_ref().map(Vec::as_slice),
-        slot: &data.frames.slot,
-        star_id: &data.frames.star_id,
-        attitude: motion,
-    }
-}
-
 fn scene<'a>(
     situation: &'a Situation<'_>,
     data: &StarData,
@@ -469,15 +446,10 @@ fn finish(f: &Finish<'_>, plain: Residuals) -> Result<Closed, CloseError> {
         noise = noise.without_magnitude();
     }
     if f.image.is_none() && !f.data.frames_are_unrelated() {
-        let variables = description::of_noise(f.situation, f.data);
-        noise_left = noise_effects::noise_follows(
-            f.situation,
-            f.level,
-            residual,
-            f.folds,
-            &noise,
-            &variables,
-        )?;
+        let of = description::of_noise(f.situation, f.data);
+        let claimed = &noise;
+        noise_left =
+            noise_effects::noise_follows(f.situation, f.level, residual, f.folds, claimed, &of)?;
     }
     effects.extend(noise.effects.iter().cloned());
     entries.extend(noise.entries.iter().cloned());

@@ -91,7 +91,7 @@ pub(crate) fn noise_follows(
     let [all, fast] = tables.as_slice() else {
         return Ok(NoiseFollows::default());
     };
-    let rows = crate::star_loop::all_rows(data, None);
+    let rows = crate::star_data::all_rows(data, None);
     let mut found: Vec<Dependence> = Vec::new();
     let mut tried = 0;
     let mut told = |variable: String, judged: Option<Judged>| {
@@ -109,7 +109,7 @@ pub(crate) fn noise_follows(
     for (variable, [low, high]) in variables {
         let column = |row: &Row| -> Vec<f64> {
             if let Variable::Phase(axis) = variable {
-                let at = data.modelled[*axis][row.at];
+                let at = data.landed()[*axis][row.at];
                 let (s, c) = data.camera.phase_rad(at).sin_cos();
                 return vec![s, c];
             }
