@@ -202,7 +202,8 @@ fn line(series: &[Own], span: f64) -> Option<(f64, f64, f64)> {
     let grid = 1.0 / (FINER as f64 * span);
     let first = MIN_CYCLES / span;
     let bins = ((0.5 / step - first) / grid).floor();
-    if bins.is_nan() || bins < (4 * FINER * (AROUND + GUARD)) as f64 {
+    // no series, or no time between points
+    if !bins.is_finite() || bins < (4 * FINER * (AROUND + GUARD)) as f64 {
         return None;
     }
     #[expect(
@@ -213,11 +214,7 @@ fn line(series: &[Own], span: f64) -> Option<(f64, f64, f64)> {
     let bins = bins as usize;
     let power: Vec<Vec<f64>> = series
         .par_iter()
-        .map(|s| {
-            (0..bins)
-                .map(|k| s.power(first + k as f64 * grid))
-                .collect()
-        })
+        .map(|s| s.powers(first, grid, bins))
         .collect();
     // power over what is usual around, and how many it is the mean of
     let relative = |p: &[f64], k: usize| -> (f64, f64) {
@@ -332,23 +329,42 @@ fn is_no_wander(data: &StarData, own: &[Vec<f64>; 2], t: f64) -> bool {
 }
 
 impl Own {
-    /// Squares that a sinusoid at `f` takes of both axes, in units of the noise.
-    fn power(&self, f: f64) -> f64 {
-        let omega = std::f64::consts::TAU * f;
-        let (mut cc, mut cs, mut ss) = (0.0, 0.0, 0.0);
-        let mut score = [[0.0; 2]; 2];
-        for (i, (t, n)) in self.t_s.iter().zip(&self.count).enumerate() {
-            let (s, c) = (omega * (t - self.t_s[0])).sin_cos();
-            cc += n * c * c;
-            cs += n * c * s;
-            ss += n * s * s;
-            for (score, value) in score.iter_mut().zip(&self.value) {
-                score[0] += n * c * value[i];
-                score[1] += n * s * value[i];
+    /// Squares that a sinusoid takes of both axes, in units of the noise, at `bins` frequencies from
+    /// `first` on. Phasors of all points are turned from one frequency to the next.
+    fn powers(&self, first: f64, grid: f64, bins: usize) -> Vec<f64> {
+        let phasor = |f: f64| -> Vec<[f64; 2]> {
+            let omega = std::f64::consts::TAU * f;
+            let each = self.t_s.iter().map(|t| omega * (t - self.t_s[0]));
+            each.map(|phase| [phase.cos(), phase.sin()]).collect()
+        };
+        let (mut at, by) = (phasor(first), phasor(grid));
+        let [x, y] = &self.value;
+        let power = |at: &[[f64; 2]]| {
+            let (mut cc, mut cs, mut ss) = (0.0, 0.0, 0.0);
+            let mut score = [[0.0; 2]; 2];
+            for (i, (&[c, s], n)) in at.iter().zip(&self.count).enumerate() {
+                let (c, s, nc, ns) = (c, s, n * c, n * s);
+                cc += nc * c;
+                cs += nc * s;
+                ss += ns * s;
+                score[0][0] += nc * x[i];
+                score[0][1] += ns * x[i];
+                score[1][0] += nc * y[i];
+                score[1][1] += ns * y[i];
             }
-        }
-        let determinant = cc * ss - cs * cs;
-        let square = |[c, s]: [f64; 2]| (ss * c * c - 2.0 * cs * c * s + cc * s * s) / determinant;
-        score.into_iter().map(square).sum()
+            let determinant = cc * ss - cs * cs;
+            let square =
+                |[c, s]: [f64; 2]| (ss * c * c - 2.0 * cs * c * s + cc * s * s) / determinant;
+            score.into_iter().map(square).sum()
+        };
+        (0..bins)
+            .map(|_| {
+                let squares = power(&at);
+                for ([c, s], [bc, bs]) in at.iter_mut().zip(&by) {
+                    (*c, *s) = (*c * bc - *s * bs, *s * bc + *c * bs);
+                }
+                squares
+            })
+            .collect()
     }
 }
