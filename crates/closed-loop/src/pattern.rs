@@ -49,7 +49,7 @@ mod tests;
 mod transform;
 mod turn;
 
-pub(crate) use turn::less_rotation;
+pub(crate) use turn::{Rotation, less_rotation};
 
 /// Peaks of the transform that are refined.
 const REFINED: usize = 6;
@@ -61,6 +61,9 @@ const ORDERS: f64 = 1.0;
 const USUAL_ORDER: u32 = 7;
 /// Cycles over the extent within which a wave is one of pixel phase.
 const PHASE_GUARD: f64 = 3.0;
+/// Share of a wave's power that rotations of whole frames must leave: they take a half of a wave at
+/// most, but all of what a slow error of the reference leaves along the stars' paths.
+const LEAST_OWN: f64 = 0.4;
 /// Share of a wave's power that must change along the stars' paths.
 const LEAST_MOTION: f64 = 0.1;
 /// Fewest clusters of a covariance.
@@ -93,6 +96,8 @@ pub(crate) struct Pattern {
     /// Cycles per pixel.
     pub(crate) wave: [f64; 2],
     pub(crate) p_value: f64,
+    /// Squares that the wave takes, in units of each axis' variance.
+    power: f64,
     /// Out-of-fold share of the residual's variance.
     pub(crate) explained: f64,
     /// Extent that the rows cover, px.
@@ -167,13 +172,16 @@ pub(crate) fn search(
     };
     let as_left = || field([rx, ry]);
     let turning = data.t_s.len() >= STARS_TO_TURN * data.frames.frames();
-    let searched = if turning {
-        let [x, y] = less_rotation(data, [rx, ry], weight);
+    if !turning {
+        return as_left().pattern(&as_left, folds, order);
+    }
+    let less = |rotation: Rotation| {
+        let [x, y] = less_rotation(data, [rx, ry], weight, rotation);
         field([&x, &y])
-    } else {
-        as_left()
     };
-    searched.pattern(&as_left, folds, order)
+    let found = less(Rotation::Known).pattern(&as_left, folds, order)?;
+    let own = less(Rotation::Whole).power_at(found.wave)?;
+    (own > LEAST_OWN * found.power).then_some(found)
 }
 
 /// Sums of the columns cos and sin, less the mean of each star, with each other and with
@@ -311,6 +319,12 @@ impl Field {
             .map(|r| r.iter().map(|v| v * v).sum::<f64>() / r.len() as f64)
     }
 
+    /// The power at a wave vector, without a search.
+    fn power_at(mut self, k: [f64; 2]) -> Option<f64> {
+        self.take_out_pixel_phase()?;
+        Some(self.sums(k).power(self.variance()))
+    }
+
     /// The whole search; amplitudes and the share they explain are those of the field `as_left`.
     fn pattern(
         mut self,
@@ -371,6 +385,7 @@ impl Field {
         let explained = as_left().share_out_of_fold(wave, folds)?;
         (p_value < FAMILY_ALPHA && explained > 0.0).then_some(Pattern {
             wave,
+            power: best.0,
             p_value,
             explained,
             extent,

@@ -19,7 +19,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
 use telemetry::report::{Dependence, Unattributed};
 
 use crate::commonness::{self, MOSTLY};
-use crate::pattern::less_rotation;
+use crate::pattern::{Rotation, less_rotation};
 use crate::star_data::StarData;
 
 /// Chance that either is told although there is none.
@@ -109,7 +109,7 @@ pub(crate) fn search(data: &StarData, residual: &[Vec<f64>], weight: &[f64]) -> 
     let own = if data.free_attitude {
         [x.clone(), y.clone()]
     } else {
-        less_rotation(data, [x, y], weight)
+        less_rotation(data, [x, y], weight, Rotation::Known)
     };
     let series = series(data, &own, weight);
     let rows: f64 = series.iter().map(|s| s.count.iter().sum::<f64>()).sum();

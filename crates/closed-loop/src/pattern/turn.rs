@@ -29,11 +29,21 @@ struct Turn {
     freedom: f64,
 }
 
+/// What is taken off.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Rotation {
+    /// As much as a reference with white noise turns a frame by.
+    Known,
+    /// All that the stars of a frame share.
+    Whole,
+}
+
 /// See the module.
 pub(crate) fn less_rotation(
     data: &StarData,
     residual: [&[f64]; 2],
     weight: &[f64],
+    rotation: Rotation,
 ) -> [Vec<f64>; 2] {
     let turns: Vec<Option<Turn>> = (0..data.frames.frames())
         .into_par_iter()
@@ -54,7 +64,10 @@ pub(crate) fn less_rotation(
         let Some(turn) = turn else { continue };
         let share = |a: usize| of_reference[a] / (of_reference[a] + noise * turn.variance[a]);
         let theta = Vector3::from_fn(|a, _| {
-            let share = share(a);
+            let share = match rotation {
+                Rotation::Known => share(a),
+                Rotation::Whole => 1.0,
+            };
             turn.theta[a] * if share.is_finite() { share } else { 0.0 }
         });
         for row in data.frames.rows_of(k) {
