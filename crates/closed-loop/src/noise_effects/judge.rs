@@ -38,7 +38,7 @@ pub(super) const SLOPE_AS_DECLARED: f64 = 0.1;
 const MIN_SPREAD_RATE: f64 = 0.2;
 /// Largest slope, and noise of a rate in arcsec/(deg/s), that nature makes.
 const CREDIBLE_SLOPE: f64 = 4.0;
-const CREDIBLE_RATE: f64 = 1000.0;
+const CREDIBLE_RATE: f64 = 300.0;
 /// Rows of a star from which it has a level of its own.
 const MIN_ROWS: usize = 50;
 /// Fewest spikes that are a rate.
