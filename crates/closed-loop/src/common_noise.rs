@@ -80,11 +80,9 @@ impl Rotations {
             // white noise by another name
             let least = self.centroid;
             let fitted = match near.map(|n| n.reference[axis]) {
-                Some(known) if known.slow > 0.0 => Coloured {
-                    white: self.total_white(axis, known.white),
-                    ..known
-                }
-                .refit_above(least, &self.t_s, y, count),
+                Some(known) if known.slow > 0.0 => self
+                    .with_centroids(axis, known)
+                    .refit_above(least, &self.t_s, y, count),
                 _ => Coloured::fit_above(least, &self.t_s, y, count),
             };
             self.beside_centroids(axis, fitted)
@@ -101,10 +99,7 @@ impl Rotations {
     /// without: twice the gain in log-likelihood.
     pub(crate) fn slow_ratio(&self, noise: &CommonNoise) -> [f64; 3] {
         std::array::from_fn(|axis| {
-            let with = Coloured {
-                white: self.total_white(axis, noise.reference[axis].white),
-                ..noise.reference[axis]
-            };
+            let with = self.with_centroids(axis, noise.reference[axis]);
             let likely = with.log_likelihood(&self.t_s, &self.mean[axis], &self.count[axis]);
             2.0 * (likely - self.white_alone(axis))
         })
@@ -117,10 +112,7 @@ impl Rotations {
         let white: f64 = (0..2).map(|axis| self.white_alone(axis)).sum();
         let starts = (0..2).filter(|&axis| noise.reference[axis].slow > 0.0);
         let best = starts.filter_map(|axis| {
-            let start = Coloured {
-                white: self.total_white(axis, noise.reference[axis].white),
-                ..noise.reference[axis]
-            };
+            let start = self.with_centroids(axis, noise.reference[axis]);
             fit_alike(self.centroid, &self.t_s, &both, &start).map(|(_, likely)| likely)
         });
         best.map(|likely| 2.0 * (likely - white))
@@ -142,20 +134,21 @@ impl Rotations {
 
     /// Standard errors of the slow part of an axis, relative: of sigma and of tau.
     pub(crate) fn slow_sigma(&self, noise: &CommonNoise, axis: usize) -> Option<[f64; 2]> {
-        let known = noise.reference[axis];
+        self.with_centroids(axis, noise.reference[axis])
+            .relative_sigma(&self.t_s, &self.mean[axis], &self.count[axis])
+    }
+
+    /// Noise of a rotation with that of its centroids, in the unit of a centroid.
+    fn with_centroids(&self, axis: usize, reference: Coloured) -> Coloured {
         Coloured {
-            white: self.total_white(axis, known.white),
-            ..known
+            white: self
+                .centroid
+                .hypot(reference.white * self.usual_count(axis).sqrt()),
+            ..reference
         }
-        .relative_sigma(&self.t_s, &self.mean[axis], &self.count[axis])
     }
 
-    /// White noise of a rotation in the unit of a centroid.
-    fn total_white(&self, axis: usize, reference: f64) -> f64 {
-        self.centroid
-            .hypot(reference * self.usual_count(axis).sqrt())
-    }
-
+    /// Takes the centroids' noise out again.
     fn beside_centroids(&self, axis: usize, fitted: Coloured) -> Coloured {
         let excess = fitted.white.powi(2) - self.centroid.powi(2);
         Coloured {

@@ -57,6 +57,18 @@ pub(crate) struct Slow {
     count: usize,
 }
 
+/// Puts it first that every star does something of its own in time.
+pub(crate) fn stars_first(list: &mut Vec<Dependence>, variance_explained: f64, p_value: f64) {
+    const VARIABLE: &str = "time*star";
+    list.retain(|d| d.variable != VARIABLE);
+    let entry = Dependence {
+        variable: VARIABLE.to_owned(),
+        variance_explained,
+        p_value,
+    };
+    list.insert(0, entry);
+}
+
 impl Slow {
     /// Each star wanders by itself.
     pub(crate) fn is_of_the_stars(&self) -> bool {
@@ -80,14 +92,7 @@ impl Slow {
         }
         unattributed.present = true;
         unattributed.variance_fraction = Some(share * left);
-        let variable = "time*star".to_owned();
-        unattributed.depends_on.retain(|d| d.variable != variable);
-        let entry = Dependence {
-            variable,
-            variance_explained: share,
-            p_value: self.chance(),
-        };
-        unattributed.depends_on.insert(0, entry);
+        stars_first(&mut unattributed.depends_on, share, self.chance());
     }
 
     /// The chance of as much slow noise of the stars, or of one of them, where there is none.

@@ -167,7 +167,7 @@ impl Described {
             })
             .collect();
         let tried = terms.len();
-        let each = figures::price_of_one(self.fitted.scalars);
+        let each = each(self.fitted.scalars);
         let mut told = figures::follows(&self.fitted.fits, &set, &terms, tried, each, left);
         self.stars_before_their_constants(&set, &mut told.depends_on);
         told

@@ -25,7 +25,7 @@ use crate::evidence::Residuals;
 use crate::fit::Fits;
 use crate::hypothesis::Questions;
 use crate::search::Found;
-use crate::selection::{FAMILY_ALPHA, columns_of};
+use crate::selection::{FAMILY_ALPHA, columns_of, each};
 use crate::star_data::StarData;
 
 /// Shares within this factor are the same.
@@ -242,7 +242,7 @@ pub(crate) fn unattributed(found: &Found, left: f64) -> Unattributed {
         &set,
         &terms,
         found.candidates.len(),
-        price_of_one(found.fitted.scalars),
+        each(found.fitted.scalars),
         left,
     )
 }
@@ -368,11 +368,6 @@ pub(crate) fn follows(
         depends_on,
         ..Unattributed::default()
     }
-}
-
-/// Nats that a column costs where there are so many numbers.
-pub(crate) fn price_of_one(scalars: f64) -> f64 {
-    0.5 * scalars.max(2.0).ln()
 }
 
 /// Whether that is beyond chance.

@@ -34,7 +34,7 @@ use crate::figures;
 use crate::fit::OutOfFold;
 use crate::folds::Folds;
 use crate::images::{DARK_MAP, DARK_MAP_FILE, EFFECTIVE_PSF, Formed, Variants};
-use crate::search::{amplitudes, borrowed, fit};
+use crate::search::{Fitted, amplitudes, borrowed, fit};
 use crate::selection::{FAMILY_ALPHA, columns_of};
 use crate::star_data::StarData;
 use crate::star_evidence::StarEvidence;
@@ -307,6 +307,21 @@ impl Score {
     }
 }
 
+/// The score with some columns.
+fn scored(fitted: &Fitted, set: &[usize], folds: &Folds) -> Option<Score> {
+    let scored = fitted.fits.out_of_fold_by_block(set)?;
+    Some(Score::new(&scored, folds))
+}
+
+/// The score with each candidate that is observable, and its number.
+fn with_one(fitted: &Fitted, folds: &Folds) -> impl Iterator<Item = (usize, Score)> {
+    let observable = (0..fitted.groups.len()).filter(|&g| !fitted.groups[g].columns.is_empty());
+    observable.filter_map(move |g| {
+        let set = columns_of(&fitted.groups, &[g]);
+        Some((g, scored(fitted, &set, folds)?))
+    })
+}
+
 /// A level by itself and with the best phase term.
 fn score(
     name: &str,
@@ -317,17 +332,8 @@ fn score(
     rivals: &mut Vec<Rival>,
 ) -> Result<Scored, CloseError> {
     let fitted = fit(evidence, folds, &borrowed(phase))?;
-    let scored = |set: &[usize]| {
-        fitted
-            .fits
-            .out_of_fold_by_block(set)
-            .map(|o| Score::new(&o, folds))
-    };
-    let alone = scored(&[]).ok_or(CloseError::Singular)?;
-    let best = (0..phase.len())
-        .filter(|&g| !fitted.groups[g].columns.is_empty())
-        .filter_map(|g| Some((g, scored(&columns_of(&fitted.groups, &[g]))?)))
-        .max_by(|a, b| a.1.total().total_cmp(&b.1.total()));
+    let alone = scored(&fitted, &[], folds).ok_or(CloseError::Singular)?;
+    let best = with_one(&fitted, folds).max_by(|a, b| a.1.total().total_cmp(&b.1.total()));
     let columns = phase.iter().map(|c| c.coefficients().len()).sum();
     let mut tell = |what: String, set: &[usize], loglik: f64| -> Result<(), CloseError> {
         let amplitudes = amplitudes(&fitted, folds, set, columns).ok_or(CloseError::Singular)?;
@@ -361,16 +367,9 @@ fn beside_others(
     folds: &Folds,
 ) -> Result<Score, CloseError> {
     let fitted = fit(evidence, folds, &borrowed(others))?;
-    let scored = |set: &[usize]| {
-        fitted
-            .fits
-            .out_of_fold_by_block(set)
-            .map(|o| Score::new(&o, folds))
-    };
-    (0..others.len())
-        .filter(|&g| !fitted.groups[g].columns.is_empty())
-        .filter_map(|g| scored(&columns_of(&fitted.groups, &[g])))
-        .chain(scored(&[]))
+    with_one(&fitted, folds)
+        .map(|(_, score)| score)
+        .chain(scored(&fitted, &[], folds))
         .max_by(|a, b| a.total().total_cmp(&b.total()))
         .ok_or(CloseError::Singular)
 }

@@ -143,11 +143,12 @@ impl Pattern {
 }
 
 /// The pattern that `residual` (arcsec, per axis over all rows) follows, if one is beyond
-/// doubt. A star counts by the `weight` of its rows; `order` is the declared distortion's; with `own_spots`
+/// doubt. `own` is it less what is known of its frames' rotations. A star counts by the `weight` of its rows; `order` is the declared distortion's; with `own_spots`
 /// the stars' centroids were learned from windows.
 pub(crate) fn search(
     data: &StarData,
     residual: &[Vec<f64>],
+    own: [&[f64]; 2],
     weight: &[f64],
     folds: &Folds,
     order: Option<u32>,
@@ -175,13 +176,10 @@ pub(crate) fn search(
     if !turning {
         return as_left().pattern(&as_left, folds, order);
     }
-    let less = |rotation: Rotation| {
-        let [x, y] = less_rotation(data, [rx, ry], weight, rotation);
-        field([&x, &y])
-    };
-    let found = less(Rotation::Known).pattern(&as_left, folds, order)?;
-    let own = less(Rotation::Whole).power_at(found.wave)?;
-    (own > LEAST_OWN * found.power).then_some(found)
+    let found = field(own).pattern(&as_left, folds, order)?;
+    let [x, y] = less_rotation(data, [rx, ry], weight, Rotation::Whole);
+    let power = field([&x, &y]).power_at(found.wave)?;
+    (power > LEAST_OWN * found.power).then_some(found)
 }
 
 /// Sums of the columns cos and sin, less the mean of each star, with each other and with

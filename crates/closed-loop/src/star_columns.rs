@@ -24,8 +24,8 @@ use crate::frame_rotation::rotation_row;
 use crate::nuisance::StarNuisance;
 use crate::star_data::StarData;
 
-/// Frames whose columns are compared at once.
-const CHUNK_FRAMES: usize = 64;
+/// Frames whose columns are gone through at once where no products are formed.
+pub(crate) const CHUNK_FRAMES: usize = 64;
 
 /// The columns of one bundle's star rows.
 pub(crate) struct StarColumns<'a> {
@@ -140,28 +140,6 @@ impl StarColumns<'_> {
         layout
     }
 
-    /// The rows of `frames` as effects see them.
-    fn rows(&self, rows: Range<usize>) -> StarRows<'_> {
-        let d = self.data;
-        StarRows {
-            t_s: &d.t_s[rows.clone()],
-            x_px: &d.modelled[0][rows.clone()],
-            y_px: &d.modelled[1][rows.clone()],
-            landed_px: d.landed().map(|p| &p[rows.clone()]),
-            vx_px_s: &d.velocity[0][rows.clone()],
-            vy_px_s: &d.velocity[1][rows.clone()],
-            ax_px_s2: &d.acceleration[0][rows.clone()],
-            ay_px_s2: &d.acceleration[1][rows.clone()],
-            mag: &d.mag[rows.clone()],
-            bv: &d.bv[rows.clone()],
-            log_flux: &d.log_flux[rows.clone()],
-            window_px: d.window_px.each_ref().map(|w| &w[rows.clone()]),
-            slot: &d.frames.slot[rows.clone()],
-            star_id: &d.frames.star_id[rows],
-            attitude: self.motion,
-        }
-    }
-
     /// Fills the rows of `frames`, outliers too.
     pub(crate) fn fill(&self, frames: Range<usize>, layout: &Layout, out: &mut Filled) {
         let data = self.data;
@@ -172,7 +150,7 @@ impl StarColumns<'_> {
         out.reset(n, frames.len(), layout, column);
         self.nuisance.fill(data, frames.clone(), out);
         self.fill_turns(&data.frames.t_s[frames], &mut out.turn);
-        let seen = self.rows(rows.clone());
+        let seen = data.rows(rows.clone(), self.motion);
         let scale = data.camera.arcsec_per_px();
         let [x, y] = &mut out.own;
         for candidate in self.candidates.iter().filter(|c| !c.turns_camera()) {
@@ -278,7 +256,7 @@ impl StarColumns<'_> {
                 let end = ((chunk + 1) * CHUNK_FRAMES).min(frames);
                 let first_row = &data.frames.first_row;
                 let rows = first_row[chunk * CHUNK_FRAMES]..first_row[end];
-                let seen = self.rows(rows.clone());
+                let seen = data.rows(rows.clone(), self.motion);
                 let both = [0, 1].map(|k| star_columns_of(self.candidates[k], &data.camera, &seen));
                 let [Some(one), Some(other)] = &both else {
                     return f64::INFINITY;

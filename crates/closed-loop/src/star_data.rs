@@ -18,6 +18,7 @@
 //! Source: [M23] Fig. 4 for the order of the terms.
 
 use std::collections::HashMap;
+use std::ops::Range;
 use std::sync::Arc;
 
 use centroid::CentroidError;
@@ -482,8 +483,7 @@ impl StarData {
         let known = self.phase_error.clone();
         for axis in 0..2 {
             for row in 0..self.t_s.len() {
-                self.modelled[axis][row] =
-                    self.projected[axis][row] + residual.modelled[axis][row] / scale[axis];
+                self.modelled[axis][row] = self.shifted(axis, row, &residual.modelled);
             }
         }
         self.update_phase(phase);
@@ -500,10 +500,40 @@ impl StarData {
         squares
     }
 
+    /// Where this takes a row from its projection, px.
+    fn shifted(&self, axis: usize, row: usize, shift_arcsec: &[Vec<f64>]) -> f64 {
+        self.projected[axis][row] + shift_arcsec[axis][row] / self.camera.arcsec_per_px()[axis]
+    }
+
     /// Where the light falls, as far as is known, px.
     pub(crate) fn landed(&self) -> [&[f64]; 2] {
         let at = self.landed.as_ref().unwrap_or(&self.modelled);
         at.each_ref().map(Vec::as_slice)
+    }
+
+    /// Some rows, as candidates see them.
+    pub(crate) fn rows<'a>(
+        &'a self,
+        rows: Range<usize>,
+        motion: Option<&'a dyn AttitudeSource>,
+    ) -> StarRows<'a> {
+        StarRows {
+            t_s: &self.t_s[rows.clone()],
+            x_px: &self.modelled[0][rows.clone()],
+            y_px: &self.modelled[1][rows.clone()],
+            landed_px: self.landed().map(|p| &p[rows.clone()]),
+            vx_px_s: &self.velocity[0][rows.clone()],
+            vy_px_s: &self.velocity[1][rows.clone()],
+            ax_px_s2: &self.acceleration[0][rows.clone()],
+            ay_px_s2: &self.acceleration[1][rows.clone()],
+            mag: &self.mag[rows.clone()],
+            bv: &self.bv[rows.clone()],
+            log_flux: &self.log_flux[rows.clone()],
+            window_px: self.window_px.each_ref().map(|w| &w[rows.clone()]),
+            slot: &self.frames.slot[rows.clone()],
+            star_id: &self.frames.star_id[rows],
+            attitude: motion,
+        }
     }
 
     /// Takes the light to fall where it is modelled.
@@ -514,12 +544,11 @@ impl StarData {
     /// Whether `shift_arcsec`, with the effects that were found, takes the light off from where it was
     /// taken to fall by enough for its pixel phase to be another one.
     pub(crate) fn lands_elsewhere(&self, shift_arcsec: &[Vec<f64>]) -> bool {
-        let scale = self.camera.arcsec_per_px();
         let known = self.landed();
         let (mut squares, mut count) = (0.0, 0.0);
         for row in (0..self.t_s.len()).filter(|&r| !self.outlier[r]) {
             for axis in 0..2 {
-                let at = self.projected[axis][row] + shift_arcsec[axis][row] / scale[axis];
+                let at = self.shifted(axis, row, shift_arcsec);
                 squares += (at - known[axis][row]).powi(2);
             }
             count += 2.0;
@@ -538,13 +567,17 @@ impl StarData {
         if self.free_attitude {
             self.turn_frames(shift_arcsec);
         }
-        let scale = self.camera.arcsec_per_px();
-        let moved = |axis: usize, by: &[Vec<f64>]| -> Vec<f64> {
-            let each = self.projected[axis].iter().zip(&by[axis]);
-            each.map(|(from, by)| from + by / scale[axis]).collect()
+        let rows = 0..self.t_s.len();
+        let moved = |by: &[Vec<f64>]| {
+            [0, 1].map(|axis| {
+                rows.clone()
+                    .map(|row| self.shifted(axis, row, by))
+                    .collect()
+            })
         };
-        self.modelled = [0, 1].map(|axis| moved(axis, fitted_arcsec));
-        self.landed = Some([0, 1].map(|axis| moved(axis, shift_arcsec)));
+        let (modelled, landed) = (moved(fitted_arcsec), moved(shift_arcsec));
+        self.modelled = modelled;
+        self.landed = Some(landed);
         self.update_phase(phase);
     }
 
@@ -582,28 +615,4 @@ impl StarData {
 pub(crate) fn median_step(t_s: &[f64]) -> Option<f64> {
     let mut steps: Vec<f64> = t_s.windows(2).map(|w| w[1] - w[0]).collect();
     robust::median(&mut steps)
-}
-
-/// All rows, as candidates see them.
-pub(crate) fn all_rows<'a>(
-    data: &'a StarData,
-    motion: Option<&'a dyn AttitudeSource>,
-) -> StarRows<'a> {
-    StarRows {
-        t_s: &data.t_s,
-        x_px: &data.modelled[0],
-        y_px: &data.modelled[1],
-        landed_px: data.landed(),
-        vx_px_s: &data.velocity[0],
-        vy_px_s: &data.velocity[1],
-        ax_px_s2: &data.acceleration[0],
-        ay_px_s2: &data.acceleration[1],
-        mag: &data.mag,
-        bv: &data.bv,
-        log_flux: &data.log_flux,
-        window_px: data.window_px.each_ref().map(Vec::as_slice),
-        slot: &data.frames.slot,
-        star_id: &data.frames.star_id,
-        attitude: motion,
-    }
 }

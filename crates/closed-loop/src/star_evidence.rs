@@ -21,13 +21,10 @@ use crate::frame_rotation::{rotation_of, rotation_row};
 use crate::gram::BlockGrams;
 use crate::nuisance::StarNuisance;
 use crate::situation::Situation;
-use crate::star_columns::{Filled, StarColumns};
+use crate::star_columns::{CHUNK_FRAMES, Filled, StarColumns};
 use crate::star_data::StarData;
 use crate::star_moments::{Keep, MOST_BINS, StarMoments};
 use crate::star_weights;
-
-/// Frames whose residuals are formed at once.
-const CHUNK_FRAMES: usize = 64;
 
 /// Star measurements as evidence.
 #[derive(Clone)]

@@ -33,13 +33,13 @@ use crate::manoeuvre::stars::Sky;
 use crate::motion::{self, Around};
 use crate::noise_effects;
 use crate::own_attitude;
-use crate::pattern;
+use crate::pattern::{self, Rotation, less_rotation};
 use crate::reference_wander::{self, REFERENCE_ERROR};
 use crate::search::{Found, amplitudes_as, fit};
 use crate::selection::columns_of;
 use crate::settling::{Settled, settle};
 use crate::situation::Situation;
-use crate::star_data::{Inputs, Star, StarData, all_rows, median_step};
+use crate::star_data::{Inputs, Star, StarData, median_step};
 use crate::star_evidence::StarEvidence;
 use crate::star_search::Wander;
 use crate::star_series;
@@ -113,21 +113,19 @@ fn trace(
     progress("residuals of the declared model");
     data.lands_as_modelled();
     let mut settled = settle(data, situation, phase, folds)?;
-    for _ in 0..LANDINGS {
-        let moved = match explain(data, situation, folds, &settled, false, progress)? {
+    let mut landings = LANDINGS;
+    loop {
+        let last = landings == 0;
+        let [fitted, whole] = match explain(data, situation, folds, &settled, last, progress)? {
             Explained::Closed(closed) => return Ok(*closed),
             Explained::Elsewhere(moved) => moved,
         };
-        let [fitted, whole] = moved;
+        landings -= 1;
         // the declared model knows nothing of where the light falls
         settled
             .phase_error
             .get_or_insert_with(|| data.phase_error.clone());
         data.land(&fitted, &whole, phase);
-    }
-    match explain(data, situation, folds, &settled, true, progress)? {
-        Explained::Closed(closed) => Ok(*closed),
-        Explained::Elsewhere(_) => Err(CloseError::Singular),
     }
 }
 
@@ -198,7 +196,7 @@ fn explain(
             bv: s.bv,
         })
         .collect();
-    let rows = all_rows(data, motion);
+    let rows = data.rows(0..data.t_s.len(), motion);
     let scene = scene(situation, data, &facts, &rows);
     let image = match &sides {
         Some(sides) => {
@@ -415,27 +413,30 @@ fn finish(f: &Finish<'_>, plain: Residuals) -> Result<Closed, CloseError> {
     }
     let inside = noise_effects::in_sample(f.level, f.found);
     let residual = inside.as_deref().unwrap_or(&plain.axes);
+    let weight = &f.level.weight;
+    let both = [residual[0].as_slice(), &residual[1]];
+    let turned = less_rotation(f.data, both, weight, Rotation::Known);
     let (noise, ((leftover, own), pattern)) = rayon::join(
         || noise_effects::claim(f.situation, f.level, residual, f.folds),
         || {
             let order = f.situation.model.noise.distortion_order;
             rayon::join(
                 || {
-                    let weight = &f.level.weight;
+                    // frames whose attitudes are free have turned already
+                    let own = if f.data.free_attitude {
+                        residual
+                    } else {
+                        &turned
+                    };
                     (
                         leftover::describe(&leftover::star_tracks(f.data, residual, weight)),
-                        star_series::search(f.data, residual, weight),
+                        star_series::search(f.data, own, weight),
                     )
                 },
                 || {
-                    pattern::search(
-                        f.data,
-                        residual,
-                        &f.level.weight,
-                        f.folds,
-                        order,
-                        f.level.learned(),
-                    )
+                    let own = turned.each_ref().map(Vec::as_slice);
+                    let learned = f.level.learned();
+                    pattern::search(f.data, residual, own, weight, f.folds, order, learned)
                 },
             )
         },

@@ -16,11 +16,10 @@
 
 use rayon::prelude::*;
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
-use telemetry::report::{Dependence, Unattributed};
+use telemetry::report::Unattributed;
 
-use crate::commonness::{self, MOSTLY};
-use crate::pattern::{Rotation, less_rotation};
-use crate::star_data::StarData;
+use crate::commonness::{self, MOSTLY, stars_first};
+use crate::star_data::{StarData, median_step};
 
 /// Chance that either is told although there is none.
 const ALPHA: f64 = 0.001;
@@ -72,18 +71,10 @@ impl OwnSeries {
         let share = unattributed.variance_fraction.unwrap_or(0.0);
         unattributed.variance_fraction = Some(share.max(self.explained * left));
         let list = &mut unattributed.depends_on;
-        let variable = "time*star";
         let known = list.first().map_or(0.0, |d| d.variance_explained);
-        if self.explained < MOSTLY * known {
-            return;
+        if self.explained >= MOSTLY * known {
+            stars_first(list, self.explained, self.p_value);
         }
-        list.retain(|d| d.variable != variable);
-        let entry = Dependence {
-            variable: variable.to_owned(),
-            variance_explained: self.explained,
-            p_value: self.p_value,
-        };
-        list.insert(0, entry);
     }
 }
 
@@ -98,20 +89,13 @@ struct Own {
     running: [Vec<f64>; 2],
 }
 
-/// Searches what `residual` (arcsec, per axis over all rows) leaves of every star.
-pub(crate) fn search(data: &StarData, residual: &[Vec<f64>], weight: &[f64]) -> OwnSeries {
-    let [x, y] = residual else {
-        return OwnSeries::default();
-    };
+/// Searches what every star has of its `own`: residuals (arcsec, per axis over all rows) less what
+/// its frames turned by.
+pub(crate) fn search(data: &StarData, own: &[Vec<f64>], weight: &[f64]) -> OwnSeries {
     if data.frames_are_unrelated() || data.stars.len() > MOST_STARS {
         return OwnSeries::default();
     }
-    let own = if data.free_attitude {
-        [x.clone(), y.clone()]
-    } else {
-        less_rotation(data, [x, y], weight, Rotation::Known)
-    };
-    let series = series(data, &own, weight);
+    let series = series(data, own, weight);
     let rows: f64 = series.iter().map(|s| s.count.iter().sum::<f64>()).sum();
     let mut out = OwnSeries {
         p_value: 1.0,
@@ -126,7 +110,7 @@ pub(crate) fn search(data: &StarData, residual: &[Vec<f64>], weight: &[f64]) -> 
         out.explained = squares / (2.0 * rows);
     }
     if let Some((t, p, square)) = step(&series, &data.frames.t_s)
-        && is_no_wander(data, &own, t)
+        && is_no_wander(data, own, t)
     {
         out.jump_s = Some(t);
         out.p_value = out.p_value.min(p);
@@ -135,7 +119,7 @@ pub(crate) fn search(data: &StarData, residual: &[Vec<f64>], weight: &[f64]) -> 
     out
 }
 
-fn series(data: &StarData, own: &[Vec<f64>; 2], weight: &[f64]) -> Vec<Own> {
+fn series(data: &StarData, own: &[Vec<f64>], weight: &[f64]) -> Vec<Own> {
     let mut rows_of: Vec<Vec<usize>> = vec![Vec::new(); data.stars.len()];
     for r in 0..data.t_s.len() {
         if !data.outlier[r] && own.iter().all(|a| a[r].is_finite()) {
@@ -194,10 +178,7 @@ fn series(data: &StarData, own: &[Vec<f64>; 2], weight: &[f64]) -> Vec<Own> {
 
 /// The line that is most certain: its frequency, chance, and the squares that it takes.
 fn line(series: &[Own], span: f64) -> Option<(f64, f64, f64)> {
-    let median = |s: &Own| -> f64 {
-        let mut steps: Vec<f64> = s.t_s.windows(2).map(|w| w[1] - w[0]).collect();
-        spectra::robust::median(&mut steps).unwrap_or(f64::INFINITY)
-    };
+    let median = |s: &Own| median_step(&s.t_s).unwrap_or(f64::INFINITY);
     let step = series.iter().map(median).fold(0.0, f64::max);
     let grid = 1.0 / (FINER as f64 * span);
     let first = MIN_CYCLES / span;
@@ -306,8 +287,8 @@ fn step(series: &[Own], t_s: &[f64]) -> Option<(f64, f64, f64)> {
 }
 
 /// Whether the stars are less slow beside a step of each at `t`.
-fn is_no_wander(data: &StarData, own: &[Vec<f64>; 2], t: f64) -> bool {
-    let mut beside = own.clone();
+fn is_no_wander(data: &StarData, own: &[Vec<f64>], t: f64) -> bool {
+    let mut beside = own.to_vec();
     for axis in &mut beside {
         let mut mean = vec![[(0.0, 0.0); 2]; data.stars.len()];
         let side = |r: usize| usize::from(data.t_s[r] > t);

@@ -93,7 +93,7 @@ pub(crate) fn noise_follows(
     let [all, fast] = tables.as_slice() else {
         return Ok(NoiseFollows::default());
     };
-    let rows = crate::star_data::all_rows(data, None);
+    let rows = data.rows(0..data.t_s.len(), None);
     let mut found: Vec<Dependence> = Vec::new();
     let mut tried = 0;
     let mut told = |variable: String, judged: Option<Judged>| {
