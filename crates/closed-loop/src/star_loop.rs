@@ -402,10 +402,10 @@ fn finish(f: &Finish<'_>, plain: Residuals) -> Result<Closed, CloseError> {
         }
     }
     let mut model = f.situation.model.clone();
-    let known = model.effects.iter().any(|e| e.id == REFERENCE_ERROR);
+    let declared = model.effects.iter().any(|e| e.id == REFERENCE_ERROR);
     let wander = f
         .wander
-        .filter(|_| !known)
+        .filter(|_| !declared)
         .and_then(reference_wander::effect);
     if let Some((effect, entry)) = wander {
         effects.push(effect);
@@ -415,7 +415,8 @@ fn finish(f: &Finish<'_>, plain: Residuals) -> Result<Closed, CloseError> {
     let residual = inside.as_deref().unwrap_or(&plain.axes);
     let weight = &f.level.weight;
     let both = [residual[0].as_slice(), &residual[1]];
-    let turned = less_rotation(f.data, both, weight, Rotation::Known);
+    let turned = |rotation| less_rotation(f.data, both, weight, rotation);
+    let known = turned(Rotation::Known);
     let (noise, ((leftover, own), pattern)) = rayon::join(
         || noise_effects::claim(f.situation, f.level, residual, f.folds),
         || {
@@ -423,18 +424,18 @@ fn finish(f: &Finish<'_>, plain: Residuals) -> Result<Closed, CloseError> {
             rayon::join(
                 || {
                     // frames whose attitudes are free have turned already
-                    let own = if f.data.free_attitude {
-                        residual
-                    } else {
-                        &turned
+                    let alone = (!f.data.free_attitude).then(|| turned(Rotation::Whole));
+                    let [own, alone] = match &alone {
+                        Some(alone) => [known.as_slice(), alone],
+                        None => [residual, residual],
                     };
                     (
                         leftover::describe(&leftover::star_tracks(f.data, residual, weight)),
-                        star_series::search(f.data, own, weight),
+                        star_series::search(f.data, own, alone, weight),
                     )
                 },
                 || {
-                    let own = turned.each_ref().map(Vec::as_slice);
+                    let own = known.each_ref().map(Vec::as_slice);
                     let learned = f.level.learned();
                     pattern::search(f.data, residual, own, weight, f.folds, order, learned)
                 },

@@ -10,7 +10,9 @@
 //! ```
 //!
 //! Times the frequencies, and stars, or the instants. A step has to stay one: where the stars are
-//! as slow without it as with it, they wander.
+//! as slow without it as with it, they wander. And it has to be the stars': what a frame turned by
+//! is known but for its noise, and a reference that wanders leaves a step in all stars alike, so
+//! that one has to be beyond chance at its instant without all that the stars of a frame share, too.
 //!
 //! Source: Scargle 1982 (periodogram); Wilks 1938.
 
@@ -23,6 +25,8 @@ use crate::star_data::{StarData, median_step};
 
 /// Chance that either is told although there is none.
 const ALPHA: f64 = 0.001;
+/// The same of a step that was found, at its instant, without what the stars of a frame share.
+const ALPHA_ALONE: f64 = 0.01;
 /// Points of a star's series, and fewest.
 const MOST_POINTS: usize = 1200;
 const MIN_POINTS: usize = 60;
@@ -90,11 +94,17 @@ struct Own {
 }
 
 /// Searches what every star has of its `own`: residuals (arcsec, per axis over all rows) less what
-/// its frames turned by.
-pub(crate) fn search(data: &StarData, own: &[Vec<f64>], weight: &[f64]) -> OwnSeries {
+/// its frames are known to have turned by; `alone`: less all that the stars of a frame share.
+pub(crate) fn search(
+    data: &StarData,
+    own: &[Vec<f64>],
+    alone: &[Vec<f64>],
+    weight: &[f64],
+) -> OwnSeries {
     if data.frames_are_unrelated() || data.stars.len() > MOST_STARS {
         return OwnSeries::default();
     }
+    let by_itself = series(data, alone, weight);
     let series = series(data, own, weight);
     let rows: f64 = series.iter().map(|s| s.count.iter().sum::<f64>()).sum();
     let mut out = OwnSeries {
@@ -110,6 +120,7 @@ pub(crate) fn search(data: &StarData, own: &[Vec<f64>], weight: &[f64]) -> OwnSe
         out.explained = squares / (2.0 * rows);
     }
     if let Some((t, p, square)) = step(&series, &data.frames.t_s)
+        && step_at(&by_itself, t).is_some_and(|(p, _)| p < ALPHA_ALONE)
         && is_no_wander(data, own, t)
     {
         out.jump_s = Some(t);
@@ -248,42 +259,23 @@ fn step(series: &[Own], t_s: &[f64]) -> Option<(f64, f64, f64)> {
         .step_by(stride)
         .map(|w| 0.5 * (w[0] + w[1]))
         .collect();
-    let each: Vec<Vec<Option<f64>>> = series
+    let (t, (p, squares)) = instants
         .par_iter()
-        .map(|s| {
-            let total: f64 = s.count.iter().sum();
-            let whole = [0, 1].map(|a: usize| s.running[a][s.t_s.len()]);
-            instants
-                .iter()
-                .map(|t| {
-                    let at = s.t_s.partition_point(|v| v < t);
-                    if at < MIN_SIDE || at + MIN_SIDE > s.t_s.len() {
-                        return None;
-                    }
-                    let n: f64 = s.before[at];
-                    let weight = n * (total - n) / total;
-                    let square = |a: usize| {
-                        let low = s.running[a][at];
-                        let change = (whole[a] - low) / (total - n) - low / n;
-                        weight * change * change
-                    };
-                    Some(square(0) + square(1))
-                })
-                .collect()
-        })
-        .collect();
-    let best = (0..instants.len())
-        .filter_map(|k| {
-            let known: Vec<f64> = each.iter().filter_map(|e| e[k]).collect();
-            let square: f64 = known.iter().sum();
-            let freedom = 2.0 * known.len() as f64;
-            let law = ChiSquared::new(freedom).ok()?;
-            let all = law.sf(square / WIDER);
-            Some((instants[k], all, square - freedom))
-        })
-        .min_by(|a, b| a.1.total_cmp(&b.1))?;
-    let p = best.1 * instants.len() as f64;
-    (p < ALPHA).then_some((best.0, p, best.2))
+        .filter_map(|&t| Some((t, step_at(series, t)?)))
+        .min_by(|a, b| a.1.0.total_cmp(&b.1.0))?;
+    let p = p * instants.len() as f64;
+    (p < ALPHA).then_some((t, p, squares))
+}
+
+/// A step of every star at `t`: its chance there, and the squares that it takes.
+fn step_at(series: &[Own], t: f64) -> Option<(f64, f64)> {
+    let (mut square, mut freedom) = (0.0, 0.0);
+    for one in series.iter().filter_map(|s| s.step_square(t)) {
+        square += one;
+        freedom += 2.0;
+    }
+    let law = ChiSquared::new(freedom).ok()?;
+    Some((law.sf(square / WIDER), square - freedom))
 }
 
 /// Whether the stars are less slow beside a step of each at `t`.
@@ -310,6 +302,21 @@ fn is_no_wander(data: &StarData, own: &[Vec<f64>], t: f64) -> bool {
 }
 
 impl Own {
+    /// Squares that a step at `t` takes of both axes, in units of the noise.
+    fn step_square(&self, t: f64) -> Option<f64> {
+        let at = self.t_s.partition_point(|v| *v < t);
+        if at < MIN_SIDE || at + MIN_SIDE > self.t_s.len() {
+            return None;
+        }
+        let (n, total) = (self.before[at], self.before[self.t_s.len()]);
+        let square = |running: &Vec<f64>| {
+            let low = running[at];
+            let change = (running[self.t_s.len()] - low) / (total - n) - low / n;
+            n * (total - n) / total * change * change
+        };
+        Some(self.running.iter().map(square).sum())
+    }
+
     /// Squares that a sinusoid takes of both axes, in units of the noise, at `bins` frequencies from
     /// `first` on. Phasors of all points are turned from one frequency to the next.
     fn powers(&self, first: f64, grid: f64, bins: usize) -> Vec<f64> {
