@@ -70,7 +70,7 @@ const TASKS: &[Task] = &[
     },
     Task {
         name: "blind",
-        what: "worlds through the closed loop, scored: docs/blind.md; [--seeds N] [--jobs J] [--only NAME]... [--each] [--check]",
+        what: "worlds through the closed loop, scored: docs/blind.md; [--seeds N] [--jobs J] [--only NAME]... [--each] [--keep FOLDER] [--check]",
         run: Run::With(blind),
     },
 ];

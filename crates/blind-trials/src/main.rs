@@ -1,4 +1,4 @@
-//! `blind-trials [--seeds N] [--jobs J] [--only NAME]... [--each] [--check] WORLDS PAGE`: closes the loop on every world
+//! `blind-trials [--seeds N] [--jobs J] [--only NAME]... [--each] [--keep FOLDER] [--check] WORLDS PAGE`: closes the loop on every world
 //! and writes the page; with `--only` it prints the page of these worlds instead.
 //!
 //! Exit status 1 if, with `--check`, a first seed is not what the page says.
@@ -20,11 +20,12 @@ use blind_trials::{
 
 /// Seeds of a trial where nobody says.
 const SEEDS: u64 = 12;
-const USAGE: &str = "usage: blind-trials [--seeds N] [--jobs J] [--only NAME]... [--each] [--check] WORLDS PAGE\n\n  \
+const USAGE: &str = "usage: blind-trials [--seeds N] [--jobs J] [--only NAME]... [--each] [--keep FOLDER] [--check] WORLDS PAGE\n\n  \
     --seeds N    bundles of each world, 12 where left out; a quarter of them where windows are sent\n  \
     --jobs J     threads; all that there are where left out\n  \
     --only NAME  this world alone; its page is printed, none is written\n  \
     --each       prints what every single report says, too\n  \
+    --keep FOLDER  every bundle, with its model, as FOLDER/NAME.SEED\n  \
     --check      the first seed of each world alone, against the page";
 
 #[derive(Debug, Default)]
@@ -34,6 +35,7 @@ struct Arguments {
     only: Vec<String>,
     check: bool,
     each: bool,
+    keep: Option<String>,
     places: Vec<String>,
 }
 
@@ -47,6 +49,7 @@ impl Arguments {
                 "--jobs" => out.jobs = Some(words.next()?.parse().ok().filter(|n| *n > 0)?),
                 "--only" => out.only.push(words.next()?),
                 "--each" => out.each = true,
+                "--keep" => out.keep = Some(words.next()?),
                 "--check" => out.check = true,
                 _ if word.starts_with('-') => return None,
                 _ => out.places.push(word),
@@ -86,6 +89,7 @@ fn go(arguments: &Arguments) -> Result<bool, String> {
     let plan = Plan {
         seeds,
         jobs: arguments.jobs.unwrap_or_else(threads),
+        keep: arguments.keep.as_deref().map(Path::new),
     };
     let terminal = std::io::stderr().is_terminal();
     let progress = |done: usize, of: usize| {

@@ -5,8 +5,12 @@
 //!
 //! Not physics: the order of the work.
 
+use std::io::Write as _;
+use std::path::Path;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
+
+use telemetry::{Output, TableFormat};
 
 use crate::residual::Residuals;
 use crate::settings::silent;
@@ -14,14 +18,16 @@ use crate::{BlindError, Floor, Score, Trial, score};
 
 /// How much is done.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Plan {
+pub struct Plan<'a> {
     /// Seeds of a trial; one with windows has a quarter, at least one.
     pub seeds: u64,
     /// Threads.
     pub jobs: usize,
+    /// Folder that every bundle is kept in, with the model that its loop is closed with, if any.
+    pub keep: Option<&'a Path>,
 }
 
-impl Plan {
+impl Plan<'_> {
     /// Seeds of one trial.
     #[must_use]
     pub fn seeds_of(&self, trial: &Trial) -> u64 {
@@ -41,10 +47,10 @@ pub type Done = Vec<Score>;
 ///
 /// # Errors
 ///
-/// The first, in the order of trials and seeds, that a rendering or the loop gives.
+/// The first, in the order of trials and seeds, that a rendering, the loop or a bundle's file gives.
 pub fn run(
     trials: &[Trial],
-    plan: Plan,
+    plan: Plan<'_>,
     progress: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<Vec<Done>, BlindError> {
     let mut tasks: Vec<(usize, u64)> = Vec::new();
@@ -66,7 +72,7 @@ pub fn run(
                 return Ok(());
             };
             let (k, seed) = tasks[at];
-            let result = pool.install(|| one(&trials[k], seed));
+            let result = pool.install(|| one(&trials[k], seed, plan.keep));
             if let Ok(mut results) = results.lock() {
                 results[at] = Some(result);
             }
@@ -88,8 +94,16 @@ pub fn run(
     Ok(out)
 }
 
-fn one(trial: &Trial, seed: u64) -> Result<Score, BlindError> {
+fn one(trial: &Trial, seed: u64, keep: Option<&Path>) -> Result<Score, BlindError> {
     let bundle = trial.bundle(seed)?;
+    if let Some(folder) = keep {
+        let folder = folder.join(format!("{}.{seed}", trial.name));
+        let output = Output::new(&folder)?;
+        bundle.write_to(&output, TableFormat::Parquet)?;
+        let model = trial.model.to_toml();
+        output.write("model.toml", |to| to.write_all(model.as_bytes()))?;
+        output.commit()?;
+    }
     // all that the loop is given
     let closed = closed_loop::close(&trial.model, &bundle, &|_| ());
     let closed = closed.map_err(|source| BlindError::Close {

@@ -47,9 +47,19 @@ fn world() -> Result<Trial, BlindError> {
 #[test]
 fn a_late_clock_is_found_and_scored() -> Result<(), BlindError> {
     let trials = [world()?];
-    let plan = |jobs| Plan { seeds: 2, jobs };
-    let done = run(&trials, plan(2), &|_, _| ())?;
-    assert_eq!(done, run(&trials, plan(1), &|_, _| ())?);
+    let kept = Path::new(env!("CARGO_TARGET_TMPDIR")).join("kept");
+    let plan = |jobs, keep| Plan {
+        seeds: 2,
+        jobs,
+        keep,
+    };
+    let done = run(&trials, plan(2, Some(&kept)), &|_, _| ())?;
+    assert_eq!(done, run(&trials, plan(1, None), &|_, _| ())?);
+    // what was kept is what was closed on
+    let bundle = telemetry::Bundle::read(&kept.join("late.1"))?;
+    assert_eq!(bundle.stars, trials[0].bundle(1)?.stars);
+    let model = telemetry::Model::read(&kept.join("late.1/model.toml"))?;
+    assert_eq!(model.to_toml(), trials[0].model.to_toml());
     assert_ne!(done[0][0], done[0][1]);
     let tally = Tally::of(&trials[0], &done[0], &bounds(&trials[0])?);
     assert_eq!(

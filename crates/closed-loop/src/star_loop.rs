@@ -464,7 +464,10 @@ fn finish(f: &Finish<'_>, plain: Residuals) -> Result<Closed, CloseError> {
     if let Some(slow) = f.slow {
         slow.tell(&mut unattributed, last / whole);
     }
-    own.tell(&mut unattributed, last / whole);
+    // a learned spot errs by where the star lies, and so slowly
+    if !f.level.learned() {
+        own.tell(&mut unattributed, last / whole);
+    }
     noise_left.tell(&mut unattributed);
     let excess = excess(f, last);
     let mut considered = figures::considered(f.found, excess);
