@@ -31,7 +31,7 @@ use crate::evidence::{Amplitudes, Evidence};
 use crate::figures;
 use crate::folds::Folds;
 use crate::search::{Fitted, Found, amplitudes, borrowed, fit, fit_design, polish};
-use crate::selection::{Judgement, Selection, columns_of, price};
+use crate::selection::{Judgement, Selection, columns_of, costs, price};
 use crate::spatial_errors::SpatialErrors;
 
 /// The effect that a change of stars looks like.
@@ -90,6 +90,7 @@ pub(crate) fn search<'d>(
             binned,
             changes,
             noise,
+            cost: cost(&fitted, &candidates),
         };
         let base = trial.score(&chosen).ok_or(CloseError::Singular)?;
         let judged: Vec<Judgement> = (0..candidates.len())
@@ -150,6 +151,7 @@ pub(crate) fn rivals(
         binned,
         changes: None,
         noise,
+        cost: cost(&found.fitted, candidates),
     };
     let mut sets: Vec<Vec<usize>> = vec![Vec::new()];
     sets.extend(found.selection.chosen.first().map(|&g| vec![g]));
@@ -185,6 +187,12 @@ pub(crate) fn rivals(
     scored
 }
 
+/// What the p-value of each candidate is multiplied by: descriptions are not tried.
+fn cost(fitted: &Fitted, candidates: &[Box<dyn Candidate>]) -> Vec<f64> {
+    let may: Vec<bool> = candidates.iter().map(|c| c.id() != EMPIRICAL).collect();
+    costs(&fitted.groups, &may)
+}
+
 /// One list of candidates, ready to be tried in any combination.
 struct Trial<'a, 'd> {
     with_noise: &'a WithNoise<'d>,
@@ -197,6 +205,8 @@ struct Trial<'a, 'd> {
     /// Jumps that are no step.
     changes: Option<SpatialErrors>,
     noise: [Coloured; 3],
+    /// What the p-value of each candidate is multiplied by.
+    cost: Vec<f64>,
 }
 
 impl Trial<'_, '_> {
@@ -259,15 +269,10 @@ impl Trial<'_, '_> {
         let Some((with, without)) = scores else {
             return Judgement::UNSEEN;
         };
-        let tried = self
-            .candidates
-            .iter()
-            .filter(|c| c.id() != EMPIRICAL)
-            .count();
         let ratio = 2.0 * (with.loglik - without.loglik) / WIDENING;
         let freedom = (group.columns.len() + group.choices) as f64;
         let p = ChiSquared::new(freedom).map_or(1.0, |law| law.sf(ratio.max(0.0)));
-        let p = (p * tried.max(1) as f64).min(1.0);
+        let p = (p * self.cost[g]).min(1.0);
         Judgement {
             delta_loglik: with.out_of_fold - without.out_of_fold,
             p_value: p.max(self.a_change(&set, g, &with)),

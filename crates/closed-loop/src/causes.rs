@@ -26,7 +26,7 @@ use crate::folds::Folds;
 use crate::invariance::{Change, Changing, Inner, Way, changing};
 use crate::noise_effects;
 use crate::search::{Found, borrowed, family, fit};
-use crate::selection::columns_of;
+use crate::selection::{columns_of, costs};
 use crate::stand_ins::{BY_FAR, Part, describe, stand_ins};
 use crate::star_evidence::StarEvidence;
 use crate::star_search::{Searched, attempt, declared_noise};
@@ -139,7 +139,7 @@ pub(crate) fn run<'a>(
                 kept.extend(whole(&described, instead));
                 continue;
             }
-            if let Some(change) = changing(&described) {
+            if let Some(change) = changing(&described, best_beside(&searched.found, &may)) {
                 let g = searched.found.selection.chosen[change.chosen];
                 refused.insert(family(searched.found.candidates[g].as_ref()));
                 kept.extend(keep(&mut searched.found, g, change));
@@ -157,7 +157,8 @@ pub(crate) fn run<'a>(
             // nothing that is still spoken against is named
             let chosen = searched.found.selection.chosen.clone();
             let spoken = stand_ins(&described).map(|(set, _)| set);
-            let changes = changing(&described).map(|c| vec![c.chosen]);
+            let beside = best_beside(&searched.found, &may);
+            let changes = changing(&described, beside).map(|c| vec![c.chosen]);
             for k in spoken.or(changes).unwrap_or_default() {
                 searched.found.selection.chosen.retain(|g| *g != chosen[k]);
             }
@@ -181,7 +182,8 @@ pub(crate) fn run<'a>(
         let found = Found { fitted, ..found };
         let described = Described::new(level, folds, &found, (quest.terms)(), quest.ways)?;
         // how an effect changes may be among what is described
-        if let Some(change) = changing(&described).filter(|_| !last) {
+        let beside = best_beside(&found, &may);
+        if let Some(change) = changing(&described, beside).filter(|_| !last) {
             let mut found = found;
             let g = found.selection.chosen[change.chosen];
             refused.insert(family(found.candidates[g].as_ref()));
@@ -205,6 +207,16 @@ pub(crate) fn run<'a>(
         });
     }
     Err(CloseError::Singular)
+}
+
+/// What the best effect that `may` be named would gain out of fold beside the chosen.
+fn best_beside(found: &Found, may: &[bool]) -> f64 {
+    let groups = &found.fitted.groups;
+    let chosen = &found.selection.chosen;
+    let new = |g: usize| chosen.iter().all(|&c| groups[c].family != groups[g].family);
+    let judged = found.selection.judged.iter().zip(may).enumerate();
+    let open = judged.filter(|(g, (j, may))| **may && j.credible && j.observable && new(*g));
+    open.map(|(_, (j, _))| j.delta_loglik).fold(0.0, f64::max)
 }
 
 /// Families of chosen effects that gain next to nothing beside a description of what no effect
@@ -270,7 +282,7 @@ fn doubtful(described: &Described, found: &Found, inflation: f64, may: &[bool]) 
     let Some(estimate) = described.fitted.fits.estimate(&set) else {
         return Vec::new();
     };
-    let tried = may.iter().filter(|m| **m).count() as f64;
+    let cost = costs(&found.fitted.groups, may);
     let mut first = 0;
     let mut doubtful = Vec::new();
     for (&g, &k) in found.selection.chosen.iter().zip(&described.chosen) {
@@ -278,7 +290,7 @@ fn doubtful(described: &Described, found: &Found, inflation: f64, may: &[bool]) 
         first += own.len();
         let square = estimate.square(&own).unwrap_or(0.0) / inflation;
         let law = ChiSquared::new(own.len().max(1) as f64);
-        let p = law.map_or(1.0, |law| law.sf(square)) * tried;
+        let p = law.map_or(1.0, |law| law.sf(square)) * cost[g];
         if inflation > 1.0 && p > DOUBT {
             doubtful.push(family(found.candidates[g].as_ref()));
         }

@@ -246,7 +246,12 @@ pub(crate) fn offer(
     found.candidates.push(Box::new(term.clone()));
     found.fitted = fit(evidence, folds, &borrowed(&found.candidates))?;
     let (fitted, chosen) = (&found.fitted, &found.selection.chosen);
-    let mut all = judged(&fitted.fits, &fitted.groups, chosen, terms.len());
+    let mut all = judged(
+        &fitted.fits,
+        &fitted.groups,
+        chosen,
+        &vec![terms.len() as f64; fitted.groups.len()],
+    );
     found.selection.judged.extend(all.pop());
     Ok(())
 }

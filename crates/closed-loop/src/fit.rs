@@ -15,8 +15,12 @@
 //! on times shorter than a block and whatever the true noise level is:
 //!
 //! ```text
-//! V = S^-1 (sum_b s_b s_b^T + v (S - sum_b S_b)) S^-1,   s_b = the score of block b at beta
+//! V = S^-1 (g sum_b s_b s_b^T + v (S - sum_b S_b)) S^-1,   s_b = the score of block b at beta
+//! B = 1 / sum_b t_b^2,   t_b = mean over the diagonal of S_b / S, less its sum,   g = B / (B - 1)
 //! ```
+//!
+//! with B the number of blocks that hold the information: not all do where the motion
+//! comes in slews.
 //!
 //! How much wider than under white noise, m = eigenvalues of V over v S^-1, is known far
 //! better on average over p parameters than for each alone: p (B - 1) squares tell it
@@ -35,17 +39,20 @@
 //! neither the standard error nor the p-value is let below that of white noise,
 //! v S^-1 and chi-squared of Q.
 //!
-//! Frames that share nothing in time have independent noise but for what the data
-//! says otherwise: there v S^-1 enters V as a prior that counts for `d` blocks,
+//! What all columns say of m ([`moderation`]) enters V as a prior that counts for `d` blocks,
 //!
 //! ```text
-//! V' = (d v S^-1 + (B - 1) V) / (d + B - 1)      and B + d takes the place of B in F
+//! V' = (d m_0 v S^-1 + (B - 1) V) / (d + B - 1)      and B + d takes the place of B in F
 //! ```
+//!
+//! Frames that share nothing in time have independent noise but for what the data
+//! says otherwise: there d is given, with 1 for `m_0`.
 //!
 //! Source: Liang & Zeger 1986 (cluster-robust variance); Smyth 2004 (moderated variance);
 //! Box 1954 and Greenhouse & Geisser 1959 (F of unequal variances).
 
 use std::ops::Range;
+use std::sync::OnceLock;
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, SymmetricEigen};
 use rayon::prelude::*;
@@ -54,8 +61,14 @@ use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
 use crate::folds::Folds;
 use crate::gram::{BlockGrams, FoldSums, Gram};
 
+mod moderation;
 #[cfg(test)]
 mod tests;
+
+use moderation::Usual;
+
+/// Share of a column's squared length that has to be left: near zero, it is unobservable.
+const OBSERVABLE_SHARE: f64 = 1e-7;
 
 /// The columns of a Gram matrix, in their order.
 #[derive(Clone, Debug, Default)]
@@ -361,6 +374,18 @@ pub(crate) struct Fits {
     inner: Vec<DMatrix<f64>>,
     /// [`Folds::prior_blocks`].
     prior: f64,
+    /// What all columns say of the noise, once it is asked for.
+    usual: OnceLock<Usual>,
+}
+
+/// Amplitudes and how they scatter from block to block.
+struct Scatter {
+    value: DVector<f64>,
+    /// V of the module's header.
+    robust: DMatrix<f64>,
+    white: DMatrix<f64>,
+    /// Blocks that hold the information.
+    blocks: f64,
 }
 
 impl Fits {
@@ -412,6 +437,7 @@ impl Fits {
             fold_of_block: folds.fold_of_block.clone(),
             inner,
             prior: folds.prior_blocks,
+            usual: OnceLock::new(),
         })
     }
 
@@ -446,6 +472,7 @@ impl Fits {
             fold_of_block: Vec::new(),
             inner: Vec::new(),
             prior: 0.0,
+            usual: OnceLock::new(),
         })
     }
 
@@ -524,6 +551,46 @@ impl Fits {
 
     /// Joint estimate of `set` on all data.
     pub(crate) fn estimate(&self, set: &[usize]) -> Option<Estimate> {
+        let own = self.scatter(set)?;
+        let Usual { wider, blocks: d } = if self.prior > 0.0 {
+            Usual {
+                wider: 1.0,
+                blocks: self.prior,
+            }
+        } else {
+            *self.usual.get_or_init(|| self.usual())
+        };
+        let freedom = (own.blocks - 1.0).max(0.0);
+        let covariance = if d > 0.0 {
+            (&own.white * (d * wider) + own.robust * freedom) / (d + freedom)
+        } else {
+            own.robust
+        };
+        Some(Estimate {
+            value: own.value,
+            covariance,
+            white: own.white,
+            blocks: own.blocks + d,
+        })
+    }
+
+    /// Takes what `all` says of the noise for its own: more columns say more.
+    pub(crate) fn scatter_as(&mut self, all: &Self) {
+        self.usual = OnceLock::from(*all.usual.get_or_init(|| all.usual()));
+    }
+
+    /// What all columns, each alone, say of the noise.
+    fn usual(&self) -> Usual {
+        let columns: Vec<(f64, f64)> = (0..self.layout.candidates)
+            .into_par_iter()
+            .filter(|&c| self.shows(c))
+            .filter_map(|c| self.scatter(&[c]))
+            .map(|own| (own.robust[(0, 0)] / own.white[(0, 0)], own.blocks - 1.0))
+            .collect();
+        Usual::of(&columns, self.grams.gram.len() as f64)
+    }
+
+    fn scatter(&self, set: &[usize]) -> Option<Scatter> {
         let (value, factor) = self.all.amplitudes(set)?;
         let n = self.layout.nuisance_precision.len();
         let residual = self.layout.residual(None);
@@ -532,6 +599,7 @@ impl Fits {
         let w = &self.all.nuisance;
         let left = self.all.left(set, &value);
         let mut spread = DMatrix::zeros(p, p);
+        let (mut shares, mut squares) = (0.0, 0.0);
         for (gram, inner) in self.grams.gram.iter().zip(&self.inner) {
             let within = less(inner, set, &value);
             let score = DVector::from_fn(p, |i, _| {
@@ -543,10 +611,20 @@ impl Fits {
                 gram.at(row, residual) - own + 0.5 * cross
             });
             spread.ger(1.0, &score, &score, 1.0);
+            let share: f64 = set
+                .iter()
+                .map(|&c| {
+                    let own = gram.at(n + c, n + c) + w.column(c).dot(&inner.column(c));
+                    own.max(0.0) / self.all.train[(c, c)]
+                })
+                .sum();
+            shares += share;
+            squares += share * share;
         }
-        let b = self.grams.gram.len() as f64;
-        // Small-sample factor of the cluster-robust variance.
-        spread *= b / (b - 1.0).max(1.0);
+        // as many equal blocks would hold as much
+        let blocks = shares * shares / f64::max(squares, f64::MIN_POSITIVE);
+        // the amplitudes take their part of every block's score
+        spread *= blocks / (blocks - 1.0).max(1.0);
         let variance = self.variance(set)?;
         // S less the sum of M is what the prior adds
         for i in 0..p {
@@ -558,20 +636,19 @@ impl Fits {
             }
         }
         let inverse = factor.inverse();
-        let robust = &inverse * spread * &inverse;
-        let white = inverse * variance;
-        let (d, freedom) = (self.prior, (b - 1.0).max(0.0));
-        let covariance = if d > 0.0 {
-            (&white * d + robust * freedom) / (d + freedom)
-        } else {
-            robust
-        };
-        Some(Estimate {
+        Some(Scatter {
+            robust: &inverse * spread * &inverse,
+            white: inverse * variance,
             value,
-            covariance,
-            white,
-            blocks: b + d,
+            blocks,
         })
+    }
+
+    /// Whether anything is left of a column once the nuisance is out.
+    pub(crate) fn shows(&self, c: usize) -> bool {
+        let n = self.layout.nuisance_precision.len();
+        let raw: f64 = self.grams.gram.iter().map(|g| g.at(n + c, n + c)).sum();
+        raw > 0.0 && self.information(c) > OBSERVABLE_SHARE * raw
     }
 
     /// Correlation between two columns once the nuisance is out: how alike two

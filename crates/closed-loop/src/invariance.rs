@@ -12,7 +12,9 @@
 //!
 //! and beside it also a part g of its own for every star. An effect is not constant if g is
 //! beyond chance (all tests of one bundle are paid for) and the part that changes holds at
-//! least a tenth of the effect's own square: a third of its size.
+//! least a tenth of the effect's own square: a third of its size. What a second effect of the
+//! catalogue does beside it changes it, too: where one would gain as much as the change, it
+//! is not the catalogue that lacks something.
 //!
 //! Source: Hausman 1978 (an estimate that differs between parts of the data has the wrong
 //! model behind it), as a test of an added variable.
@@ -174,12 +176,14 @@ pub(crate) struct Change {
     pub(crate) p_value: f64,
 }
 
-/// The chosen effect that changes most certainly, if one does.
-pub(crate) fn changing(described: &Described) -> Option<Change> {
+/// The chosen effect that changes most certainly, if one does. No change counts that gains no more
+/// than `instead` does out of fold, what the best effect of the catalogue beside the chosen would.
+pub(crate) fn changing(described: &Described, instead: f64) -> Option<Change> {
     let groups = &described.fitted.groups;
     let fits = &described.fitted.fits;
     let set = columns_of(groups, &described.chosen);
     let alone = fits.estimate(&set)?;
+    let before = fits.out_of_fold(&set)?.total_loglik();
     let tried: usize = described.changes.iter().map(Vec::len).sum();
     let mut worst: Option<Change> = None;
     let mut first = 0;
@@ -203,6 +207,9 @@ pub(crate) fn changing(described: &Described) -> Option<Change> {
             let share = (estimate.square(&which).unwrap_or(0.0) - free as f64) / whole;
             if p_value < ALPHA
                 && share > LEAST_SHARE
+                && fits
+                    .out_of_fold(&with)
+                    .is_some_and(|o| o.total_loglik() - before > instead)
                 && worst.as_ref().is_none_or(|w| p_value < w.p_value)
             {
                 worst = Some(Change {

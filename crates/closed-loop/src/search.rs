@@ -19,9 +19,6 @@ use crate::folds::Folds;
 use crate::gram::{BlockGrams, Design};
 use crate::selection::{Group, Selection, columns_of, select};
 
-/// Share of a column's squared length that must survive the nuisance for its
-/// amplitude to be called observable.
-const OBSERVABLE_SHARE: f64 = 1e-7;
 /// Amplitudes beyond this many plausible sigmas are not credible.
 const CREDIBLE: f64 = 20.0;
 /// Values of a non-linear parameter tried at once, and how often the scan shrinks.
@@ -89,18 +86,12 @@ pub(crate) fn fit_grams(
         .unwrap_or(guess)
         .max(f64::MIN_POSITIVE);
     let fits = Fits::of(grams, &sums, folds, &layout, variance).ok_or(CloseError::Singular)?;
-    let (whole, scalars) = sums.all;
-    let first = layout.nuisance_precision.len();
+    let (_, scalars) = sums.all;
     let mut groups = Vec::new();
     let mut column = 0;
     for candidate in candidates {
         let p = candidate.coefficients().len();
-        let columns: Vec<usize> = (column..column + p)
-            .filter(|&c| {
-                let raw = whole[(first + c, first + c)];
-                raw > 0.0 && fits.information(c) > OBSERVABLE_SHARE * raw
-            })
-            .collect();
+        let columns: Vec<usize> = (column..column + p).filter(|&c| fits.shows(c)).collect();
         let bounds = columns
             .iter()
             .map(|c| credible(&candidate.coefficients()[c - column]))
@@ -111,6 +102,7 @@ pub(crate) fn fit_grams(
             choices: candidate.choices(),
             shapes: candidate.nonlinear().len(),
             family: family(*candidate),
+            kind: candidate.id(),
         });
         column += p;
     }

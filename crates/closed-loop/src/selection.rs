@@ -1,9 +1,17 @@
 //! Which effects the data supports: forward selection out of fold.
 //!
 //! Every candidate group is tried beside those already chosen. It is eligible
-//! if its out-of-fold log-likelihood gain is positive and its p-value,
-//! times the number of groups that were tried (Bonferroni: the whole search is
-//! paid for), is below [`FAMILY_ALPHA`]. Of the eligible ones the largest gain
+//! if its out-of-fold log-likelihood gain is positive and its p-value, times what
+//! the search costs it, is below [`FAMILY_ALPHA`]. The whole search is paid for:
+//! of `n_k` groups of each kind k one pays
+//!
+//! ```text
+//! sqrt(n_k) sum over kinds j of sqrt(n_j)
+//! ```
+//!
+//! whose inverses add up to 1 (weighted Bonferroni). That is between paying by
+//! groups, with which a scale of one column would pay for hundreds of warm
+//! pixels, and by kinds, with which these would pay alone. Of the eligible ones the largest gain
 //! after a price per parameter wins, so that a flexible wrong effect does not
 //! beat a stiff right one:
 //!
@@ -17,7 +25,10 @@
 //! After each addition all chosen groups are judged again beside the others and
 //! those that no longer stand are dropped.
 //!
-//! Source: Schwarz 1978 for the price of a parameter.
+//! Source: Schwarz 1978 for the price of a parameter; Genovese, Roeder & Wasserman 2006
+//! for weights of p-values.
+
+use std::collections::BTreeMap;
 
 use crate::fit::{Fits, OutOfFold};
 
@@ -39,6 +50,8 @@ pub(crate) struct Group {
     pub(crate) shapes: usize,
     /// Groups of one family are forms of one cause: at most one is chosen.
     pub(crate) family: String,
+    /// Groups of one kind are one effect, whatever it acts on.
+    pub(crate) kind: &'static str,
 }
 
 /// One group's standing beside the chosen ones.
@@ -46,7 +59,7 @@ pub(crate) struct Group {
 pub(crate) struct Judgement {
     /// Gain in out-of-fold log-likelihood, nats.
     pub(crate) delta_loglik: f64,
-    /// Corrected for the number of groups tried, at most 1.
+    /// Times what the search costs the group, at most 1.
     pub(crate) p_value: f64,
     /// The amplitudes are of a size that nature makes.
     pub(crate) credible: bool,
@@ -89,20 +102,32 @@ pub(crate) fn columns_of(groups: &[Group], chosen: &[usize]) -> Vec<usize> {
 /// Runs the search. `scalars` is the number of independent scalars in the data;
 /// only groups that `may` be chosen are, and only they are paid for.
 pub(crate) fn select(fits: &Fits, groups: &[Group], may: &[bool], scalars: f64) -> Selection {
-    let tried = may.iter().filter(|m| **m).count().max(1);
+    let cost = costs(groups, may);
     let mut chosen: Vec<usize> = Vec::new();
     // Each round adds one or stops; a group dropped by the backward check may
     // not return, so the search ends.
     let mut banned = vec![false; groups.len()];
     loop {
         let may: Vec<bool> = (0..groups.len()).map(|g| may[g] && !banned[g]).collect();
-        let ranked = ranked(fits, groups, &may, &chosen, scalars, tried);
+        let ranked = ranked(fits, groups, &may, &chosen, scalars, &cost);
         let Some(&added) = ranked.first() else { break };
         chosen.push(added);
-        prune(fits, groups, &mut chosen, &mut banned, tried);
+        prune(fits, groups, &mut chosen, &mut banned, &cost);
     }
-    let judged = judged(fits, groups, &chosen, tried);
+    let judged = judged(fits, groups, &chosen, &cost);
     Selection { chosen, judged }
+}
+
+/// What the p-value of each group is multiplied by where those that `may` be chosen are tried.
+pub(crate) fn costs(groups: &[Group], may: &[bool]) -> Vec<f64> {
+    let mut of_kind: BTreeMap<&str, f64> = BTreeMap::new();
+    let tried = groups.iter().zip(may);
+    for (group, _) in tried.filter(|(g, may)| **may && !g.columns.is_empty()) {
+        *of_kind.entry(group.kind).or_default() += 1.0;
+    }
+    let all: f64 = of_kind.values().map(|n| n.sqrt()).sum();
+    let root = |g: &Group| of_kind.get(g.kind).map_or(1.0, |n| n.sqrt());
+    groups.iter().map(|g| root(g) * all.max(1.0)).collect()
 }
 
 /// Groups that may be added to `chosen`, best first: by the gain out of fold after
@@ -113,7 +138,7 @@ pub(crate) fn ranked(
     may: &[bool],
     chosen: &[usize],
     scalars: f64,
-    tried: usize,
+    cost: &[f64],
 ) -> Vec<usize> {
     let Some(base) = out_of_fold(fits, groups, chosen) else {
         return Vec::new();
@@ -122,7 +147,7 @@ pub(crate) fn ranked(
         .filter(|&g| may[g] && !chosen.contains(&g))
         .filter(|&g| chosen.iter().all(|&c| groups[c].family != groups[g].family))
         .filter_map(|g| {
-            let judgement = judge(fits, groups, chosen, g, &base, tried);
+            let judgement = judge(fits, groups, chosen, g, &base, cost);
             let rank = judgement.delta_loglik - price(&groups[g], scalars);
             judgement.stands().then_some((g, rank))
         })
@@ -146,13 +171,13 @@ pub(crate) fn judged(
     fits: &Fits,
     groups: &[Group],
     chosen: &[usize],
-    tried: usize,
+    cost: &[f64],
 ) -> Vec<Judgement> {
     (0..groups.len())
         .map(|g| {
             let others: Vec<usize> = chosen.iter().copied().filter(|&c| c != g).collect();
             match out_of_fold(fits, groups, &others) {
-                Some(base) => judge(fits, groups, &others, g, &base, tried),
+                Some(base) => judge(fits, groups, &others, g, &base, cost),
                 None => Judgement::UNSEEN,
             }
         })
@@ -165,13 +190,13 @@ fn prune(
     groups: &[Group],
     chosen: &mut Vec<usize>,
     banned: &mut [bool],
-    tried: usize,
+    cost: &[f64],
 ) {
     loop {
         let fallen = chosen.iter().copied().find(|&g| {
             let others: Vec<usize> = chosen.iter().copied().filter(|&c| c != g).collect();
             out_of_fold(fits, groups, &others).is_some_and(|base| {
-                let judgement = judge(fits, groups, &others, g, &base, tried);
+                let judgement = judge(fits, groups, &others, g, &base, cost);
                 !judgement.stands()
             })
         });
@@ -191,7 +216,7 @@ fn judge(
     others: &[usize],
     g: usize,
     base: &OutOfFold,
-    tried: usize,
+    cost: &[f64],
 ) -> Judgement {
     let mut set = columns_of(groups, others);
     let first = set.len();
@@ -210,7 +235,7 @@ fn judge(
             .iter()
             .zip(&which)
             .all(|([low, high], &i)| (*low..=*high).contains(&estimate.value[i])),
-        p_value: (estimate.p_value(&which) * tried as f64).min(1.0),
+        p_value: (estimate.p_value(&which) * cost[g]).min(1.0),
         observable: true,
     }
 }

@@ -14,7 +14,7 @@
 //! with its own noise and all that its freedom costs,
 //!
 //! ```text
-//! worth = L - sum over effects ( ln tried + k/2 (1 + ln(q/k)) ) - 4 a slow axis
+//! worth = L - sum over effects ( ln cost + k/2 (1 + ln(q/k)) ) - 4 a slow axis
 //! ```
 //!
 //! k parameters (instant, frequency and lag too), q the square of the amplitudes over
@@ -39,7 +39,7 @@ use crate::fit::{Estimate, Fits, Layout};
 use crate::folds::Folds;
 use crate::search::{Fitted, Found, borrowed, fit_grams, polish, search};
 use crate::selection::{
-    FAMILY_ALPHA, Group, Judgement, Selection, columns_of, judged, price, ranked,
+    FAMILY_ALPHA, Group, Judgement, Selection, columns_of, costs, judged, price, ranked,
 };
 use crate::star_evidence::StarEvidence;
 use crate::star_moments::StarMoments;
@@ -161,7 +161,8 @@ impl Instead {
             precision: white.precision(),
             variance: found.fitted.fits.variance(&[]).unwrap_or(1.0),
             groups: &found.fitted.groups,
-            tried: tried(may),
+            cost: costs(&found.fitted.groups, may),
+            all: None,
         };
         let score = |set: &[usize]| trial.score(set, noise).ok_or(CloseError::Singular);
         let whole = score(chosen)?;
@@ -193,11 +194,6 @@ impl Instead {
     }
 }
 
-/// Groups that are paid for.
-fn tried(may: &[bool]) -> usize {
-    may.iter().filter(|m| **m).count().max(1)
-}
-
 /// Noise of the declared model's residual, where it may hold a slow error. How much
 /// of one shows only later: what is fitted here (a distortion under drifting stars)
 /// takes some of it along.
@@ -212,7 +208,8 @@ pub(crate) fn declared_noise(
         precision: white.precision(),
         variance: white.variance_guess(),
         groups: &[],
-        tried: 1,
+        cost: Vec::new(),
+        all: None,
     };
     let noise = trial.taken_out(&trial.columns(&[]));
     Ok(noise.filter(|n| n.reference.iter().any(|r| r.slow > 0.0)))
@@ -235,6 +232,8 @@ struct Part {
     columns: std::ops::Range<usize>,
     /// Parameters that its columns follow non-linearly.
     shapes: usize,
+    /// What its p-value is multiplied by.
+    cost: f64,
     /// Its sizes are such as nature makes.
     credible: bool,
 }
@@ -248,8 +247,10 @@ struct Trial<'a> {
     /// Of a scalar of white evidence.
     variance: f64,
     groups: &'a [Group],
-    /// Groups that are paid for.
-    tried: usize,
+    /// What the p-value of each group is multiplied by.
+    cost: Vec<f64>,
+    /// Fits of all groups: what their scatter says of the noise.
+    all: Option<&'a Fits>,
 }
 
 impl Trial<'_> {
@@ -294,7 +295,10 @@ impl Trial<'_> {
             .max_by(|a, b| a.2.total_cmp(&b.2))?;
         let layout = self.layout(&columns);
         let grams = self.moments.under(&columns, &noise);
-        let fits = Fits::new(&grams, self.folds, &layout, 1.0)?;
+        let mut fits = Fits::new(&grams, self.folds, &layout, 1.0)?;
+        if let Some(all) = self.all {
+            fits.scatter_as(all);
+        }
         let all: Vec<usize> = (0..layout.candidates).collect();
         let estimate = fits.estimate(&all)?;
         let mut first = 0;
@@ -311,6 +315,7 @@ impl Trial<'_> {
                 Part {
                     columns: own,
                     shapes: group.shapes,
+                    cost: self.cost[g],
                     credible,
                 }
             })
@@ -372,7 +377,7 @@ impl Trial<'_> {
                 let square = scored.estimate.square(&which).unwrap_or(0.0);
                 // what is scanned is fitted too
                 let k = (which.len() + shapes) as f64;
-                (self.tried as f64).ln() + 0.5 * k * (1.0 + (square / k.max(1.0)).max(1.0).ln())
+                part.cost.ln() + 0.5 * k * (1.0 + (square / k.max(1.0)).max(1.0).ln())
             })
             .sum();
         scored.loglik - without - effects
@@ -390,7 +395,7 @@ impl Trial<'_> {
         let p = likely.max(with.estimate.p_value(&which));
         Judgement {
             delta_loglik: with.out_of_fold - without.out_of_fold,
-            p_value: (p * self.tried as f64).min(1.0),
+            p_value: (p * with.parts[at].cost).min(1.0),
             credible: *credible,
             observable: !columns.is_empty(),
         }
@@ -413,7 +418,6 @@ fn coloured<'a>(
     may: &[bool],
     start: CommonNoise,
 ) -> Result<Coloured<'a>, CloseError> {
-    let tried = tried(may);
     let mut banned = vec![false; candidates.len()];
     let mut polished = false;
     let mut chosen: Vec<usize> = Vec::new();
@@ -438,7 +442,8 @@ fn coloured<'a>(
             precision: white.precision(),
             variance: plain.fits.variance(&[]).unwrap_or(1.0),
             groups: &plain.groups,
-            tried,
+            cost: costs(&plain.groups, may),
+            all: Some(&filtered.fits),
         };
         let base = trial.score(&chosen, &noise).ok_or(CloseError::Singular)?;
         noise = base.noise;
@@ -470,7 +475,7 @@ fn coloured<'a>(
                     &open,
                     &chosen,
                     fitted.scalars,
-                    tried,
+                    &trial.cost,
                 );
                 shortlist.extend(list.into_iter().take(SHORTLIST));
             }
@@ -493,7 +498,7 @@ fn coloured<'a>(
             .max_by(|a, b| a.1.total_cmp(&b.1));
         let Some((added, _, its_noise)) = best else {
             let fitted = under(&noise)?;
-            let mut judged = judged(&fitted.fits, &fitted.groups, &chosen, tried);
+            let mut judged = judged(&fitted.fits, &fitted.groups, &chosen, &trial.cost);
             for (&g, judgement) in chosen.iter().zip(stands) {
                 judged[g] = judgement;
             }
