@@ -11,7 +11,7 @@
 use std::ops::Range;
 
 use crate::folds::Folds;
-use crate::star_data::median_step;
+use crate::star::data::median_step;
 
 /// About as many bins as an attitude series is cut into at most.
 pub(crate) const MOST: usize = 2400;

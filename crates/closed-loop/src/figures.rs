@@ -19,14 +19,14 @@ use telemetry::report::{
 };
 use telemetry::{EffectEntry, EffectValue};
 
-use crate::empirical::EMPIRICAL;
 use crate::error::CloseError;
 use crate::evidence::Residuals;
 use crate::fit::Fits;
-use crate::hypothesis::Questions;
+use crate::questions::hypothesis::Questions;
 use crate::search::Found;
-use crate::selection::{FAMILY_ALPHA, columns_of, each};
-use crate::star_data::StarData;
+use crate::search::empirical::EMPIRICAL;
+use crate::search::selection::{FAMILY_ALPHA, columns_of, each};
+use crate::star::data::StarData;
 
 /// Shares within this factor are the same.
 const SAME: f64 = 3.0;

@@ -34,10 +34,10 @@ use crate::figures;
 use crate::fit::OutOfFold;
 use crate::folds::Folds;
 use crate::images::{DARK_MAP, DARK_MAP_FILE, EFFECTIVE_PSF, Formed, Variants};
+use crate::search::selection::{FAMILY_ALPHA, columns_of};
 use crate::search::{Fitted, amplitudes, borrowed, fit};
-use crate::selection::{FAMILY_ALPHA, columns_of};
-use crate::star_data::StarData;
-use crate::star_evidence::StarEvidence;
+use crate::star::data::StarData;
+use crate::star::evidence::StarEvidence;
 
 /// Centroids formed with or without a map.
 pub(crate) struct Side<'a> {

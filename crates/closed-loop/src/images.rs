@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use telemetry::WindowTable;
 
 use crate::folds::Folds;
-use crate::star_data::StarData;
+use crate::star::data::StarData;
 
 use learn::Learned;
 use sample::{Entry, Sample};

@@ -7,58 +7,32 @@
 //! after on data that took no part in the fit.
 #![forbid(unsafe_code)]
 
-mod attitude_data;
-mod attitude_loop;
-mod attitude_search;
+mod attitude;
 mod bins;
 mod causes;
 mod close;
 mod coloured;
 mod common_noise;
-mod commonness;
-mod confusion;
 mod declared;
-mod description;
-mod directions;
-mod empirical;
 mod error;
 mod evidence;
 mod figures;
 mod fit;
 mod folds;
-mod frame_rotation;
 mod gram;
-mod hypothesis;
 mod image_level;
 mod images;
-mod instants;
-mod invariance;
-mod leftover;
-mod manoeuvre;
 mod motion;
 mod noise_effects;
-mod nuisance;
-mod own_attitude;
-mod pattern;
-mod reference_wander;
+mod questions;
 mod search;
-mod selection;
-mod settling;
 mod situation;
-mod spatial_errors;
-mod stand_ins;
-mod star_columns;
-mod star_data;
-mod star_evidence;
-mod star_loop;
-mod star_moments;
-mod star_search;
-mod star_series;
-mod star_weights;
+mod star;
+mod unexplained;
 
 pub use close::{Closed, Rival, close, close_asking};
 pub use error::CloseError;
-pub use hypothesis::Questions;
+pub use questions::hypothesis::Questions;
 
 /// Seeds of a trial of alarms and the most of them that may raise one: `seeds` and
 /// `most`, or as many as `BORESIGHT_SEEDS` says and 5 sigma above one in `rarity`.

@@ -17,7 +17,11 @@ use crate::evidence::{Amplitudes, Evidence};
 use crate::fit::{Fits, Layout};
 use crate::folds::Folds;
 use crate::gram::{BlockGrams, Design};
-use crate::selection::{Group, Selection, columns_of, select};
+use selection::{Group, Selection, columns_of, select};
+
+pub(crate) mod empirical;
+pub(crate) mod instants;
+pub(crate) mod selection;
 
 /// Share of a column's squared length that must survive the nuisance for its
 /// amplitude to be called observable.

@@ -13,7 +13,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use telemetry::WindowTable;
 
 use super::sample::{Entry, Sample};
-use crate::star_data::{Inputs, StarData};
+use crate::star::data::{Inputs, StarData};
 
 /// What to make.
 pub(crate) struct Scenario<'a> {

@@ -476,7 +476,7 @@ mod measured {
 
     use super::super::geometry::Geometry;
     use super::*;
-    use crate::star_data::Inputs;
+    use crate::star::data::Inputs;
     use spectra::robust;
 
     fn chandra() -> Option<(StarData, WindowTable)> {

@@ -21,11 +21,11 @@ use telemetry::report::{Dependence, Unattributed};
 
 use super::rows::{Row, Source};
 use super::{NoiseEffects, declared_variance, quick};
-use crate::empirical::Variable;
 use crate::error::CloseError;
 use crate::folds::Folds;
+use crate::search::empirical::Variable;
 use crate::situation::Situation;
-use crate::star_evidence::StarEvidence;
+use crate::star::evidence::StarEvidence;
 
 /// Chance that any variable of a bundle is told although the noise follows none.
 const ALPHA: f64 = 0.001;

@@ -24,7 +24,7 @@ use super::variance::{
     Fit, LEVEL, MAGNITUDE, Model, PARAMETERS, RATE, SHARE, SIZE, Vector, logit, sigmoid,
 };
 use crate::folds::Folds;
-use crate::selection::FAMILY_ALPHA;
+use crate::search::selection::FAMILY_ALPHA;
 
 /// Effects that are tried.
 const TRIED: f64 = 3.0;

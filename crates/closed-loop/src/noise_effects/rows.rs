@@ -14,8 +14,8 @@
 use nalgebra::{Matrix3, Vector3};
 
 use crate::folds::Folds;
-use crate::frame_rotation::rotation_row;
-use crate::star_data::StarData;
+use crate::star::data::StarData;
+use crate::star::frame_rotation::rotation_row;
 
 /// Fewest stars of a frame that leave something beside its rotation.
 const MIN_STARS: usize = 3;
