@@ -10,7 +10,8 @@
 
 use std::ops::Range;
 
-use crate::folds::Folds;
+use block_regression::Folds;
+
 use crate::star::data::median_step;
 
 /// About as many bins as an attitude series is cut into at most.

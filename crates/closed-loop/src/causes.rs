@@ -15,11 +15,11 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
+use block_regression::Folds;
 use effects::Candidate;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use crate::error::CloseError;
-use crate::folds::Folds;
 use crate::noise_effects;
 use crate::search::empirical::Empirical;
 use crate::search::selection::columns_of;

@@ -11,6 +11,7 @@
 
 use std::collections::BTreeMap;
 
+use block_regression::Fits;
 use effects::Surroundings;
 use nalgebra::DMatrix;
 use telemetry::report::{
@@ -21,7 +22,6 @@ use telemetry::{EffectEntry, EffectValue};
 
 use crate::error::CloseError;
 use crate::evidence::Residuals;
-use crate::fit::Fits;
 use crate::questions::hypothesis::Questions;
 use crate::search::Found;
 use crate::search::empirical::EMPIRICAL;
@@ -109,7 +109,7 @@ pub(crate) fn amplitudes_of(
     found: &Found,
     g: usize,
     set: &[usize],
-    estimate: &crate::fit::Estimate,
+    estimate: &block_regression::Estimate,
 ) -> (Vec<f64>, DMatrix<f64>) {
     let first: usize = found.candidates[..g]
         .iter()

@@ -22,6 +22,7 @@
 
 use std::collections::BTreeMap;
 
+use block_regression::{Folds, OutOfFold};
 use effects::Candidate;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 use telemetry::report::{Estimate, FoundEffect, Selector};
@@ -31,8 +32,6 @@ use crate::close::Rival;
 use crate::error::CloseError;
 use crate::evidence::Evidence;
 use crate::figures;
-use crate::fit::OutOfFold;
-use crate::folds::Folds;
 use crate::images::{DARK_MAP, DARK_MAP_FILE, EFFECTIVE_PSF, Formed, Variants};
 use crate::search::selection::{FAMILY_ALPHA, columns_of};
 use crate::search::{Fitted, amplitudes, borrowed, fit};

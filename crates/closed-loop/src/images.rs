@@ -4,11 +4,11 @@
 
 use std::collections::HashMap;
 
+use block_regression::Folds;
 use focal_plane::Pixel;
 use rayon::prelude::*;
 use telemetry::WindowTable;
 
-use crate::folds::Folds;
 use crate::star::data::StarData;
 
 use learn::Learned;

@@ -22,6 +22,7 @@ mod variance;
 
 use std::collections::BTreeMap;
 
+use block_regression::Folds;
 use focal_plane::Pixel;
 use star_tracker::StarView;
 use telemetry::report::{ConsideredEffect, Estimate, FoundEffect};
@@ -30,7 +31,6 @@ use telemetry::{EffectEntry, EffectValue};
 use crate::declared;
 use crate::error::CloseError;
 use crate::evidence::{Amplitudes, Evidence, Residuals};
-use crate::folds::Folds;
 use crate::search::Found;
 use crate::search::selection::columns_of;
 use crate::situation::Situation;

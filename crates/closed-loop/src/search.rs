@@ -9,14 +9,12 @@
 //! Source: variable projection (Golub & Pereyra 1973): linear amplitudes are
 //! solved for at every trial value of the non-linear ones.
 
+use block_regression::{BlockGrams, Design, Fits, Folds, Layout};
 use effects::{Candidate, Coefficient};
 use nalgebra::DVector;
 
 use crate::error::CloseError;
 use crate::evidence::{Amplitudes, Evidence};
-use crate::fit::{Fits, Layout};
-use crate::folds::Folds;
-use crate::gram::{BlockGrams, Design};
 use selection::{Group, Selection, columns_of, select};
 
 pub(crate) mod empirical;

@@ -11,6 +11,7 @@
 
 use std::ops::Range;
 
+use block_regression::{BlockGrams, Design, Folds};
 use effects::{AttitudeRows, Candidate};
 use focal_plane::{ARCSEC_PER_RAD, AttitudeResidual, AttitudeSeries, AttitudeSource, VectorsMut};
 use nalgebra::{DMatrix, UnitQuaternion};
@@ -19,8 +20,6 @@ use star_tracker::Disturbance;
 use crate::bins::{Bins, MOST};
 use crate::coloured::Coloured;
 use crate::evidence::{Amplitudes, Evidence, Residuals};
-use crate::folds::Folds;
-use crate::gram::{BlockGrams, Design};
 
 /// Rows of attitude residuals, structure of arrays.
 #[derive(Clone, Debug)]

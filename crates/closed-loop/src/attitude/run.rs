@@ -2,6 +2,7 @@
 //!
 //! Not physics: the order of the steps.
 
+use block_regression::Folds;
 use effects::{Candidate, Scene};
 
 use crate::attitude::data::{AttitudeData, AttitudeEvidence};
@@ -13,7 +14,6 @@ use crate::declared;
 use crate::error::CloseError;
 use crate::evidence::{Amplitudes, Evidence, Residuals};
 use crate::figures;
-use crate::folds::Folds;
 use crate::motion::resolved_motion;
 use crate::questions::confusion;
 use crate::questions::hypothesis::{self, Grounds};

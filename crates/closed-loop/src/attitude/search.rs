@@ -18,6 +18,7 @@
 //!
 //! Source: Wilks 1938 (likelihood ratio); Cochrane & Orcutt 1949 (the alternation).
 
+use block_regression::Folds;
 use effects::Candidate;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -29,7 +30,6 @@ use crate::coloured::Coloured;
 use crate::error::CloseError;
 use crate::evidence::{Amplitudes, Evidence};
 use crate::figures;
-use crate::folds::Folds;
 use crate::search::empirical::EMPIRICAL;
 use crate::search::selection::{Judgement, Selection, columns_of, price};
 use crate::search::{Fitted, Found, amplitudes, borrowed, fit, fit_design, polish};

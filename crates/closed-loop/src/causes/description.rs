@@ -7,6 +7,7 @@
 //!
 //! Not physics: which columns stand beside which.
 
+use block_regression::Folds;
 use effects::{AttitudeRows, Candidate, Coefficient, Effect, EffectError, StarRows, Surroundings};
 use focal_plane::{Camera, PointsMut, VectorsMut};
 use std::sync::Arc;
@@ -14,7 +15,6 @@ use std::sync::Arc;
 use crate::causes::invariance::{Changing, Inner, Way};
 use crate::error::CloseError;
 use crate::figures::{self, Followed};
-use crate::folds::Folds;
 use crate::search::empirical::{Empirical, Variable, flux_of, range};
 use crate::search::selection::{columns_of, each, judged};
 use crate::search::{Fitted, Found, borrowed, fit};

@@ -15,6 +15,7 @@
 //!
 //! Source: Breusch & Pagan 1979, studentised by Koenker 1981; clusters as in Liang & Zeger 1986.
 
+use block_regression::Folds;
 use nalgebra::{Cholesky, DMatrix, DVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor, StudentsT};
 use telemetry::report::{Dependence, Unattributed};
@@ -22,7 +23,6 @@ use telemetry::report::{Dependence, Unattributed};
 use super::rows::{Row, Source};
 use super::{NoiseEffects, declared_variance, quick};
 use crate::error::CloseError;
-use crate::folds::Folds;
 use crate::search::empirical::Variable;
 use crate::situation::Situation;
 use crate::star::evidence::StarEvidence;

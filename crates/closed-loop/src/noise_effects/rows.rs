@@ -11,9 +11,9 @@
 //!
 //! Source: leverage in linear regression (Hoaglin & Welsch 1978).
 
+use block_regression::Folds;
 use nalgebra::{Matrix3, Vector3};
 
-use crate::folds::Folds;
 use crate::star::data::StarData;
 use crate::star::frame_rotation::rotation_row;
 

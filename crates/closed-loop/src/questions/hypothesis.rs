@@ -15,12 +15,12 @@
 //!
 //! Source: Scheffe 1953 (the largest of all combinations within a confidence ellipsoid).
 
+use block_regression::Estimate;
 use effects::{Candidate, EffectKind, Surroundings};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use telemetry::report::{ConsideredEffect, FoundEffect, Hypothesis, HypothesisSize, Selector};
 
 use crate::error::CloseError;
-use crate::fit::Estimate;
 use crate::search::Found;
 use crate::search::selection::columns_of;
 

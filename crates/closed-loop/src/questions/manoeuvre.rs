@@ -27,6 +27,7 @@
 pub(crate) mod attitudes;
 pub(crate) mod stars;
 
+use block_regression::Folds;
 use effects::Candidate;
 use focal_plane::{ARCSEC_PER_RAD, AttitudeSeries, AttitudeSource, rotation_from_vector};
 use nalgebra::{Cholesky, DMatrix, DVector, SymmetricEigen, UnitQuaternion, Vector3};
@@ -34,7 +35,6 @@ use rayon::prelude::*;
 use telemetry::report::Manoeuvre;
 
 use crate::evidence::Evidence;
-use crate::folds::Folds;
 use crate::questions::hypothesis::short;
 
 /// Sigmas that are wanted.

@@ -28,14 +28,13 @@
 //!
 //! Source: Gauss-Newton linearisation; Siegmund 1988 (confidence sets in change-point problems).
 
+use block_regression::{Estimate, Folds};
 use effects::{AttitudeRows, Candidate, Coefficient, Effect, EffectError, StarRows, Surroundings};
 use focal_plane::{Camera, PointsMut, VectorsMut};
 use telemetry::report::FoundEffect;
 
 use crate::error::CloseError;
 use crate::evidence::Evidence;
-use crate::fit::Estimate;
-use crate::folds::Folds;
 use crate::search::selection::{Group, columns_of};
 use crate::search::{Found, fit};
 

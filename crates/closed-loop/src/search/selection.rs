@@ -19,7 +19,7 @@
 //!
 //! Source: Schwarz 1978 for the price of a parameter.
 
-use crate::fit::{Fits, OutOfFold};
+use block_regression::{Fits, OutOfFold};
 
 /// Chance that a bundle which follows its model gets any effect at all.
 pub(crate) const FAMILY_ALPHA: f64 = 0.01;

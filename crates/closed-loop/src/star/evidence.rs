@@ -8,6 +8,7 @@
 
 use std::sync::Arc;
 
+use block_regression::{BlockGrams, Folds};
 use effects::Candidate;
 use focal_plane::AttitudeSource;
 use nalgebra::{DVector, Vector3};
@@ -16,8 +17,6 @@ use rayon::prelude::*;
 use crate::bins::Bins;
 use crate::common_noise::CommonNoise;
 use crate::evidence::{Amplitudes, Evidence, Residuals};
-use crate::folds::Folds;
-use crate::gram::BlockGrams;
 use crate::situation::Situation;
 use crate::star::columns::{CHUNK_FRAMES, Filled, StarColumns};
 use crate::star::data::StarData;

@@ -23,14 +23,13 @@ mod tests;
 use std::ops::Range;
 use std::sync::{Arc, OnceLock};
 
+use block_regression::{BlockGrams, Folds, Gram, add_products};
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use rayon::prelude::*;
 
 use self::sums::Sums;
 use crate::bins::Bins;
 use crate::common_noise::{CommonNoise, Filter, Rotations};
-use crate::folds::Folds;
-use crate::gram::{BlockGrams, Gram, add_products};
 use crate::star::columns::StarColumns;
 
 /// About as many bins as the rotations are averaged over at most.

@@ -8,12 +8,12 @@
 
 use std::collections::BTreeMap;
 
+use block_regression::Folds;
 use focal_plane::rotation_vector;
 use spectra::robust;
 use telemetry::AttitudeResiduals;
 
 use crate::evidence::Residuals;
-use crate::folds::Folds;
 use crate::situation::Situation;
 use crate::star::data::StarData;
 use crate::star::frame_rotation::rotation_of;

@@ -7,6 +7,7 @@
 //!
 //! Not physics: the order of the steps.
 
+use block_regression::Folds;
 use effects::{Scene, StarFacts, StarRows};
 use focal_plane::{AttitudeSource, Points};
 use nalgebra::DVector;
@@ -21,7 +22,6 @@ use crate::declared;
 use crate::error::CloseError;
 use crate::evidence::{Evidence, Residuals};
 use crate::figures;
-use crate::folds::Folds;
 use crate::image_level::{self, ImageLevel, Side};
 use crate::images::{self, Formed};
 use crate::motion::resolved_motion;

@@ -28,6 +28,7 @@
 //!
 //! Source: Wilks 1938 (likelihood ratio); George & Foster 2000 (empirical Bayes selection).
 
+use block_regression::{Estimate, Fits, Folds, Layout};
 use effects::Candidate;
 use rayon::prelude::*;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -35,8 +36,6 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 use crate::common_noise::{CommonNoise, Rotations};
 use crate::error::CloseError;
 use crate::evidence::Evidence;
-use crate::fit::{Estimate, Fits, Layout};
-use crate::folds::Folds;
 use crate::search::selection::{
     FAMILY_ALPHA, Group, Judgement, Selection, columns_of, judged, price, ranked,
 };

@@ -5,9 +5,10 @@
 //!
 //! Not physics: fits until positions and outliers stand still.
 
+use block_regression::Folds;
+
 use crate::error::CloseError;
 use crate::evidence::{Evidence, Residuals};
-use crate::folds::Folds;
 use crate::search::{amplitudes, fit};
 use crate::situation::Situation;
 use crate::star::data::StarData;

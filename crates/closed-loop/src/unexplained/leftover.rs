@@ -20,6 +20,7 @@
 //!
 //! Source: Scargle 1982 (periodogram), the F law of a ratio of two mean powers; Wilks 1938.
 
+use block_regression::Folds;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3, Vector4};
 use rayon::prelude::*;
 use spectra::{LombScargle, LombScargleSettings, robust};
@@ -28,7 +29,6 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 use crate::attitude::spatial_errors::SpatialErrors;
 use crate::bins::{self, Bins};
 use crate::coloured::Coloured;
-use crate::folds::Folds;
 use crate::search::selection::FAMILY_ALPHA;
 use crate::star::data::{StarData, median_step};
 use crate::star::frame_rotation::rotation_row;

@@ -34,12 +34,12 @@
 use std::f64::consts::PI;
 use std::ops::Range;
 
+use block_regression::Folds;
 use nalgebra::{Cholesky, Matrix2, Matrix4, Vector2, Vector4};
 use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 use telemetry::report::{Dependence, Unattributed};
 
-use crate::folds::Folds;
 use crate::search::selection::FAMILY_ALPHA;
 use crate::star::data::StarData;
 

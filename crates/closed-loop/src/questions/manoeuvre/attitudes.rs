@@ -2,13 +2,13 @@
 //!
 //! Not physics: rows of attitudes along a motion.
 
+use block_regression::Folds;
 use effects::Candidate;
 use nalgebra::DMatrix;
 
 use super::{Flown, information};
 use crate::attitude::data::{AttitudeData, AttitudeEvidence};
 use crate::coloured::Coloured;
-use crate::folds::Folds;
 
 /// Information on the candidates' columns along a manoeuvre, with frames every `step_s`.
 pub(crate) fn fly(

@@ -1,12 +1,12 @@
 use std::f64::consts::TAU;
 
+use block_regression::Folds;
 use rand_core::{Rng, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use telemetry::report::{Dependence, Unattributed};
 
 use super::{Field, Pattern};
-use crate::folds::Folds;
 
 const STARS: usize = 12;
 const FRAMES: usize = 400;

@@ -182,6 +182,22 @@ fn a_set_that_cannot_be_told_apart_is_refused() {
     assert!(fits.estimate(&[0, 1]).is_none());
 }
 
+/// On all data alone there are amplitudes and errors, but no blocks to scatter and no folds to predict.
+#[test]
+fn all_data_alone_tells_no_scatter() {
+    let table = table(400, 0.0, 1.0, 1);
+    let (fits, folds) = fits(&table, [0.0; 2]);
+    let layout = fits.layout.clone();
+    let alone = Fits::whole(&BlockGrams::accumulate(&table, &folds), &layout, 1.0).unwrap();
+    let (a, b) = (
+        alone.solution(&[0, 2]).unwrap(),
+        fits.solution(&[0, 2]).unwrap(),
+    );
+    // the order of the sums is another
+    assert!((&a - &b).norm() < 1e-9 * b.norm(), "{a} {b}");
+    assert!(fits.estimate(&[0]).is_some() && alone.estimate(&[0]).is_none());
+}
+
 /// The same numbers where a block's Gram is a shared matrix and rows on top, and where the sums over
 /// folds are known before: rounding alone. Covariance and errors by block against whole products.
 #[test]

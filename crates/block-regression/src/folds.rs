@@ -11,7 +11,7 @@
 use std::ops::Range;
 
 /// Folds of a data set with enough frames ([`Folds::cut`]).
-pub(crate) const FOLDS: usize = 5;
+const FOLDS: usize = 5;
 /// Below this number of frames one frame is left out at a time.
 const LEAVE_ONE_OUT_BELOW: usize = 10;
 /// Blocks wanted over the whole span. A variance of p parameters
@@ -26,27 +26,30 @@ const MIN_BLOCK_FRAMES: usize = 8;
 const UNRELATED_PRIOR: f64 = 20.0;
 
 /// A partition of the frames `0..n` into folds of blocks, all contiguous.
+///
+/// A frame is what is measured at one instant: any number of scalars.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Folds {
+pub struct Folds {
     /// Frames of each block, in time order.
-    pub(crate) blocks: Vec<Range<usize>>,
+    pub blocks: Vec<Range<usize>>,
     /// The fold of each block.
-    pub(crate) fold_of_block: Vec<usize>,
+    pub fold_of_block: Vec<usize>,
     /// How many folds there are.
-    pub(crate) count: usize,
-    /// Blocks that the prior of independent noise counts for ([`crate::fit`]).
-    pub(crate) prior_blocks: f64,
+    pub count: usize,
+    /// Blocks that the prior of independent noise counts for ([`Estimate`](crate::Estimate)): 0 where
+    /// neighbours may share something.
+    pub prior_blocks: f64,
 }
 
 impl Folds {
     /// Cuts `frames` frames into folds of (nearly) equal numbers of frames.
-    pub(crate) fn cut(frames: usize) -> Self {
+    pub fn cut(frames: usize) -> Self {
         Self::in_blocks(frames, MIN_BLOCK_FRAMES, 0.0)
     }
 
-    /// The same for frames that share nothing with their neighbours in time: a frame
+    /// As [`cut`](Self::cut) for frames that share nothing with their neighbours in time: a frame
     /// may be a block of its own.
-    pub(crate) fn unrelated(frames: usize) -> Self {
+    pub fn unrelated(frames: usize) -> Self {
         Self::in_blocks(frames, 1, UNRELATED_PRIOR)
     }
 
@@ -67,8 +70,8 @@ impl Folds {
         }
     }
 
-    /// The same folds in blocks `times` as long.
-    pub(crate) fn coarser(&self, times: usize) -> Self {
+    /// The same folds in blocks `times` as long; the last of a fold may be shorter.
+    pub fn coarser(&self, times: usize) -> Self {
         let mut out = Self {
             blocks: Vec::new(),
             fold_of_block: Vec::new(),
@@ -92,7 +95,7 @@ impl Folds {
     }
 
     /// The frames of each fold.
-    pub(crate) fn fold_ranges(&self) -> Vec<Range<usize>> {
+    pub fn fold_ranges(&self) -> Vec<Range<usize>> {
         (0..self.count)
             .map(|f| {
                 let mut of = self
@@ -107,7 +110,7 @@ impl Folds {
     }
 
     /// One fold of everything, for what is not predicted.
-    pub(crate) fn whole(frames: usize) -> Self {
+    pub fn whole(frames: usize) -> Self {
         Self {
             blocks: std::iter::once(0..frames).collect(),
             fold_of_block: vec![0],
@@ -117,13 +120,13 @@ impl Folds {
     }
 
     /// The fold of each frame as tables have it.
-    pub(crate) fn column(&self) -> Vec<u32> {
+    pub fn column(&self) -> Vec<u32> {
         let narrow = |f| u32::try_from(f).unwrap_or(u32::MAX);
         self.fold_of_frame().into_iter().map(narrow).collect()
     }
 
-    /// The fold of each frame.
-    pub(crate) fn fold_of_frame(&self) -> Vec<usize> {
+    /// The fold of each frame, one entry a frame.
+    pub fn fold_of_frame(&self) -> Vec<usize> {
         let mut fold = Vec::new();
         for (block, &f) in self.blocks.iter().zip(&self.fold_of_block) {
             fold.extend(std::iter::repeat_n(f, block.len()));

@@ -25,7 +25,7 @@ use crate::folds::Folds;
 const CHUNK_FRAMES: usize = 32;
 
 /// A source of design rows: scalars (one per axis of a measurement) by columns.
-pub(crate) trait Design: Sync {
+pub trait Design: Sync {
     /// Columns of each row: nuisance, then candidates, then residuals.
     fn width(&self) -> usize;
     /// Writes the scalars of `frames` into `out`, resized by the callee to
@@ -42,14 +42,15 @@ pub(crate) trait Design: Sync {
 ///
 /// with a matrix M that fits at several noises share, and a few rows E that are one noise's own.
 #[derive(Clone, Debug)]
-pub(crate) struct Gram {
+pub struct Gram {
     weight: f64,
     shared: Arc<DMatrix<f64>>,
     rows: Arc<DMatrix<f64>>,
 }
 
 impl Gram {
-    pub(crate) fn new(weight: f64, shared: Arc<DMatrix<f64>>, rows: DMatrix<f64>) -> Self {
+    /// `weight * shared + rows^T rows`; `shared` is symmetric, width x width, and `rows` any number x width.
+    pub fn new(weight: f64, shared: Arc<DMatrix<f64>>, rows: DMatrix<f64>) -> Self {
         Self {
             weight,
             shared,
@@ -57,7 +58,8 @@ impl Gram {
         }
     }
 
-    pub(crate) fn whole(shared: impl Into<Arc<DMatrix<f64>>>) -> Self {
+    /// A matrix as it is: symmetric, width x width.
+    pub fn whole(shared: impl Into<Arc<DMatrix<f64>>>) -> Self {
         let shared = shared.into();
         let rows = DMatrix::zeros(0, shared.ncols());
         Self::new(1.0, shared, rows)
@@ -110,8 +112,9 @@ impl Gram {
 /// Columns of a product that are formed at once.
 const PANEL: usize = 96;
 
-/// Adds what lies below the diagonal of `factor E^T E`.
-pub(crate) fn add_products(factor: f64, rows: &DMatrix<f64>, sum: &mut DMatrix<f64>) {
+/// Adds `factor E^T E` to `sum`, where it lies on the diagonal and below; above, `sum` may change too and means
+/// nothing. `rows` is E, any number x n; `sum` is n x n.
+pub fn add_products(factor: f64, rows: &DMatrix<f64>, sum: &mut DMatrix<f64>) {
     let (flipped, n) = (rows.transpose(), rows.ncols());
     for start in (0..n).step_by(PANEL) {
         let panel = PANEL.min(n - start);
@@ -127,23 +130,25 @@ pub(crate) fn add_products(factor: f64, rows: &DMatrix<f64>, sum: &mut DMatrix<f
 
 /// Gram matrices per block.
 #[derive(Clone, Debug)]
-pub(crate) struct BlockGrams {
-    /// One of width x width a block.
-    pub(crate) gram: Vec<Gram>,
+pub struct BlockGrams {
+    /// One a block, width x width.
+    pub gram: Vec<Gram>,
     /// How many scalars each block holds.
-    pub(crate) scalars: Vec<f64>,
-    /// What the log-likelihood of the scalars lacks to that of the measurements in
-    /// arcsec, nats.
-    pub(crate) log_scale: f64,
-    /// Where it is known, the sum of M over the blocks of each fold.
-    pub(crate) known: Option<Arc<Vec<DMatrix<f64>>>>,
+    pub scalars: Vec<f64>,
+    /// What the log-likelihood of the scalars lacks to that of the measurements in their own unit, nats: scalars
+    /// may have been whitened. No fit uses it.
+    pub log_scale: f64,
+    /// Where it is known, the sum of M over the blocks of each fold; the weight is then the same in all blocks.
+    pub known: Option<Arc<Vec<DMatrix<f64>>>>,
 }
 
 /// Sums of Gram matrices and scalars over the blocks of each fold, and over all.
 #[derive(Clone, Debug)]
-pub(crate) struct FoldSums {
-    pub(crate) fold: Vec<(DMatrix<f64>, f64)>,
-    pub(crate) all: (DMatrix<f64>, f64),
+pub struct FoldSums {
+    /// Gram matrix and number of scalars of each fold.
+    pub fold: Vec<(DMatrix<f64>, f64)>,
+    /// The same of all folds.
+    pub all: (DMatrix<f64>, f64),
 }
 
 impl FoldSums {
@@ -168,8 +173,8 @@ fn sum<'a>(
 }
 
 impl BlockGrams {
-    /// One pass over `design`.
-    pub(crate) fn accumulate(design: &dyn Design, folds: &Folds) -> Self {
+    /// One pass over `design`, blocks in parallel.
+    pub fn accumulate(design: &dyn Design, folds: &Folds) -> Self {
         let width = design.width();
         let blocks = folds.blocks.par_iter().map(|block| {
             let mut gram = DMatrix::zeros(width, width);
@@ -198,7 +203,7 @@ impl BlockGrams {
     }
 
     /// The sums over the folds.
-    pub(crate) fn by_fold(&self, folds: &Folds) -> FoldSums {
+    pub fn by_fold(&self, folds: &Folds) -> FoldSums {
         let of = &folds.fold_of_block;
         let fold: Vec<_> = (0..folds.count)
             .into_par_iter()
@@ -214,7 +219,7 @@ impl BlockGrams {
     }
 
     /// The sum over all blocks.
-    pub(crate) fn total(&self) -> (DMatrix<f64>, f64) {
+    pub fn total(&self) -> (DMatrix<f64>, f64) {
         self.sum(|_| true, None)
     }
 

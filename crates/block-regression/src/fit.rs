@@ -57,17 +57,16 @@ use crate::gram::{BlockGrams, FoldSums, Gram};
 #[cfg(test)]
 mod tests;
 
-/// The columns of a Gram matrix, in their order.
+/// The columns of a Gram matrix, in their order: nuisance, candidates, residuals.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Layout {
-    /// Prior precision of each nuisance column, 1/variance in the unit of the
-    /// column's amplitude; zero leaves it free.
-    pub(crate) nuisance_precision: Vec<f64>,
+pub struct Layout {
+    /// Prior precision of each nuisance column, 1/variance of the column's amplitude; zero leaves it free.
+    pub nuisance_precision: Vec<f64>,
     /// How many candidate columns follow the nuisance.
-    pub(crate) candidates: usize,
+    pub candidates: usize,
     /// Residual columns: one, or one per fold and a last one for all data, where
-    /// the centroids themselves depend on what was learned outside the fold.
-    pub(crate) residuals: usize,
+    /// what was measured depends on what was learned outside the fold.
+    pub residuals: usize,
 }
 
 impl Layout {
@@ -80,7 +79,7 @@ impl Layout {
     }
 
     /// The residual column that belongs to `fold` (`None`: all data).
-    pub(crate) fn residual(&self, fold: Option<usize>) -> usize {
+    pub fn residual(&self, fold: Option<usize>) -> usize {
         let first = self.nuisance_precision.len() + self.candidates;
         match fold {
             _ if self.residuals == 1 => first,
@@ -241,13 +240,13 @@ fn both(gram: &DMatrix<f64>, pick: &[usize]) -> DMatrix<f64> {
 
 /// What a set of candidate columns does outside the folds it was fitted on.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct OutOfFold {
+pub struct OutOfFold {
     /// Squared error of each fold, or block, predicted from the other folds.
-    pub(crate) sse: Vec<f64>,
+    pub sse: Vec<f64>,
     /// Log-likelihood of each, nats, noise variance from the other folds.
-    pub(crate) loglik: Vec<f64>,
+    pub loglik: Vec<f64>,
     /// Scalars of each.
-    pub(crate) scalars: Vec<f64>,
+    pub scalars: Vec<f64>,
 }
 
 impl OutOfFold {
@@ -259,32 +258,36 @@ impl OutOfFold {
         self.scalars.push(scalars);
     }
 
-    pub(crate) fn total_loglik(&self) -> f64 {
+    /// Sum of the log-likelihoods, nats.
+    pub fn total_loglik(&self) -> f64 {
         self.loglik.iter().sum()
     }
 
-    pub(crate) fn total_sse(&self) -> f64 {
+    /// Sum of the squared errors.
+    pub fn total_sse(&self) -> f64 {
         self.sse.iter().sum()
     }
 }
 
 /// A set of amplitudes from all data with their cluster-robust covariance.
+///
+/// An amplitude is in the unit of the residual over that of its column.
 #[derive(Clone, Debug)]
-pub(crate) struct Estimate {
+pub struct Estimate {
     /// One amplitude a column of the set.
-    pub(crate) value: DVector<f64>,
+    pub value: DVector<f64>,
     /// Its cluster-robust covariance.
-    pub(crate) covariance: DMatrix<f64>,
+    pub covariance: DMatrix<f64>,
     /// Its covariance if the noise were white.
-    pub(crate) white: DMatrix<f64>,
+    pub white: DMatrix<f64>,
     /// Blocks behind the covariance, those that its prior counts for included.
-    pub(crate) blocks: f64,
+    pub blocks: f64,
 }
 
 impl Estimate {
     /// Probability that amplitudes `which` (positions in the set) are all zero
-    /// and yet as far from it as this.
-    pub(crate) fn p_value(&self, which: &[usize]) -> f64 {
+    /// and yet as far from it as this; 1 where there are too few blocks to tell.
+    pub fn p_value(&self, which: &[usize]) -> f64 {
         let (p, b) = (which.len() as f64, self.blocks);
         if which.is_empty() || b <= p {
             return 1.0;
@@ -301,7 +304,7 @@ impl Estimate {
     }
 
     /// Squared distance of amplitudes `which` from zero if the noise were white.
-    pub(crate) fn square(&self, which: &[usize]) -> Option<f64> {
+    pub fn square(&self, which: &[usize]) -> Option<f64> {
         let value = DVector::from_fn(which.len(), |i, _| self.value[which[i]]);
         let white = Cholesky::new(part(&self.white, which))?;
         Some(value.dot(&white.solve(&value)))
@@ -309,7 +312,7 @@ impl Estimate {
 
     /// How many times the variance of white noise the amplitudes `which` really have,
     /// along the directions in which that is a number.
-    pub(crate) fn wider(&self, which: &[usize]) -> Option<DVector<f64>> {
+    pub fn wider(&self, which: &[usize]) -> Option<DVector<f64>> {
         let root = Cholesky::new(part(&self.white, which))?.l();
         let half = root.solve_lower_triangular(&part(&self.covariance, which))?;
         let whole = root.solve_lower_triangular(&half.transpose())?;
@@ -318,7 +321,7 @@ impl Estimate {
     }
 
     /// The cluster-robust covariance with no variance below that of white noise.
-    pub(crate) fn cautious_covariance(&self) -> DMatrix<f64> {
+    pub fn cautious_covariance(&self) -> DMatrix<f64> {
         let stretch =
             |k: usize| self.sigma(k) / self.covariance[(k, k)].sqrt().max(f64::MIN_POSITIVE);
         DMatrix::from_fn(self.value.len(), self.value.len(), |i, j| {
@@ -327,7 +330,7 @@ impl Estimate {
     }
 
     /// Standard error of amplitude `k`.
-    pub(crate) fn sigma(&self, k: usize) -> f64 {
+    pub fn sigma(&self, k: usize) -> f64 {
         self.covariance[(k, k)]
             .max(self.white[(k, k)])
             .max(0.0)
@@ -347,9 +350,11 @@ fn f_tail(f: f64, p: f64, blocks: f64) -> f64 {
     FisherSnedecor::new(p, p * (blocks - 1.0)).map_or(1.0, |law| law.sf(f))
 }
 
-/// All fits that selection needs, on one set of Grams.
+/// All fits that a choice among candidates needs, on one set of Grams.
+///
+/// A `set` holds numbers of candidate columns, each once, from 0 on.
 #[derive(Clone, Debug)]
-pub(crate) struct Fits {
+pub struct Fits {
     layout: Layout,
     folds: Vec<Eliminated>,
     /// Gram of each fold in the columns of its fit, and its scalars.
@@ -366,18 +371,14 @@ pub(crate) struct Fits {
 impl Fits {
     /// Eliminates the nuisance in every fold and on all data. `variance` is the
     /// noise variance of a scalar, which turns prior precisions into the unit of
-    /// the Gram. `None` if the nuisance itself is singular.
-    pub(crate) fn new(
-        grams: &BlockGrams,
-        folds: &Folds,
-        layout: &Layout,
-        variance: f64,
-    ) -> Option<Self> {
+    /// the Gram. `None` if the nuisance itself is singular. `grams` and `folds` have
+    /// the same blocks.
+    pub fn new(grams: &BlockGrams, folds: &Folds, layout: &Layout, variance: f64) -> Option<Self> {
         Self::of(grams, &grams.by_fold(folds), folds, layout, variance)
     }
 
     /// As [`new`](Self::new) where the sums over the folds are there already.
-    pub(crate) fn of(
+    pub fn of(
         grams: &BlockGrams,
         sums: &FoldSums,
         folds: &Folds,
@@ -416,7 +417,7 @@ impl Fits {
     }
 
     /// Noise variance of a scalar where no candidate is in the model, from a first guess.
-    pub(crate) fn noise_alone(sums: &FoldSums, layout: &Layout, guess: f64) -> Option<f64> {
+    pub fn noise_alone(sums: &FoldSums, layout: &Layout, guess: f64) -> Option<f64> {
         let (gram, scalars) = &sums.all;
         let n = layout.nuisance_precision.len();
         let kept: Vec<usize> = (0..n).chain(n + layout.candidates..gram.ncols()).collect();
@@ -434,8 +435,9 @@ impl Fits {
         Self::whole(&alone, &layout, guess)?.variance(&[])
     }
 
-    /// As [`new`](Self::new), on all data alone: for what asks nothing of the folds.
-    pub(crate) fn whole(grams: &BlockGrams, layout: &Layout, variance: f64) -> Option<Self> {
+    /// As [`new`](Self::new), on all data alone: for what asks nothing of folds and blocks. Neither
+    /// [`estimate`](Self::estimate) nor the errors out of fold are to be had then.
+    pub fn whole(grams: &BlockGrams, layout: &Layout, variance: f64) -> Option<Self> {
         let all = Eliminated::new(&grams.total(), layout, variance, &layout.picked(None))?;
         Some(Self {
             layout: layout.clone(),
@@ -449,8 +451,8 @@ impl Fits {
         })
     }
 
-    /// Amplitudes of nuisance and candidate columns `set`, from all data.
-    pub(crate) fn solution(&self, set: &[usize]) -> Option<DVector<f64>> {
+    /// Amplitudes of all nuisance columns and then of the candidate columns `set`, from all data.
+    pub fn solution(&self, set: &[usize]) -> Option<DVector<f64>> {
         let (beta, _) = self.all.amplitudes(set)?;
         let nuisance = self.nuisance(None, set, &beta);
         Some(DVector::from_iterator(
@@ -461,7 +463,7 @@ impl Fits {
 
     /// Out-of-fold error of the candidate columns `set`, fold by fold; `None` if they cannot
     /// be told apart in some fold.
-    pub(crate) fn out_of_fold(&self, set: &[usize]) -> Option<OutOfFold> {
+    pub fn out_of_fold(&self, set: &[usize]) -> Option<OutOfFold> {
         let mut out = OutOfFold::default();
         for (fold, (gram, scalars)) in self.folds.iter().zip(&self.held) {
             let (beta, variance) = fold.trained(set)?;
@@ -471,7 +473,7 @@ impl Fits {
     }
 
     /// As [`out_of_fold`](Self::out_of_fold), block by block.
-    pub(crate) fn out_of_fold_by_block(&self, set: &[usize]) -> Option<OutOfFold> {
+    pub fn out_of_fold_by_block(&self, set: &[usize]) -> Option<OutOfFold> {
         let n = self.layout.nuisance_precision.len();
         let trained: Vec<(DVector<f64>, f64)> = (0..self.folds.len())
             .map(|f| {
@@ -499,20 +501,20 @@ impl Fits {
     /// Log-likelihood of all data at the best amplitudes of `set`, the nuisance
     /// integrated out under its prior; scalars have unit variance. Up to a constant
     /// of the prior, nats.
-    pub(crate) fn log_marginal(&self, set: &[usize]) -> Option<f64> {
+    pub fn log_marginal(&self, set: &[usize]) -> Option<f64> {
         let sse = self.error(set)?;
         let constant = self.all.scalars * std::f64::consts::TAU.ln();
         Some(-0.5 * (sse + self.all.log_det + constant))
     }
 
-    /// Amplitudes of `set` in fold `fold`'s training data.
-    pub(crate) fn amplitudes_without(&self, fold: usize, set: &[usize]) -> Option<DVector<f64>> {
+    /// Amplitudes of `set` in the training data of `fold`: all others.
+    pub fn amplitudes_without(&self, fold: usize, set: &[usize]) -> Option<DVector<f64>> {
         self.folds[fold].amplitudes(set).map(|(beta, _)| beta)
     }
 
-    /// Nuisance amplitudes that go with `beta` on `set`, in fold `fold`'s
-    /// training data (`None`: all data).
-    pub(crate) fn nuisance(
+    /// Nuisance amplitudes that go with `beta` on `set`, in the training data of `fold`
+    /// (`None`: all data).
+    pub fn nuisance(
         &self,
         fold: Option<usize>,
         set: &[usize],
@@ -522,8 +524,11 @@ impl Fits {
         eliminated.left(set, beta)
     }
 
-    /// Joint estimate of `set` on all data.
-    pub(crate) fn estimate(&self, set: &[usize]) -> Option<Estimate> {
+    /// Joint estimate of `set` on all data; `None` if its columns cannot be told apart.
+    pub fn estimate(&self, set: &[usize]) -> Option<Estimate> {
+        if self.inner.len() != self.grams.gram.len() {
+            return None;
+        }
         let (value, factor) = self.all.amplitudes(set)?;
         let n = self.layout.nuisance_precision.len();
         let residual = self.layout.residual(None);
@@ -574,27 +579,27 @@ impl Fits {
         })
     }
 
-    /// Correlation between two columns once the nuisance is out: how alike two
+    /// Correlation between two candidate columns once the nuisance is out: how alike two
     /// one-parameter effects look in this data.
-    pub(crate) fn likeness(&self, a: usize, b: usize) -> f64 {
+    pub fn likeness(&self, a: usize, b: usize) -> f64 {
         let s = &self.all.train;
         let norm = (s[(a, a)] * s[(b, b)]).sqrt();
         if norm > 0.0 { s[(a, b)] / norm } else { 0.0 }
     }
 
-    /// What is left of a column's squared length once the nuisance is out, as a
-    /// share of `whole`, its squared length before: near zero, it is unobservable.
-    pub(crate) fn information(&self, c: usize) -> f64 {
+    /// What is left of the squared length of a candidate column once the nuisance is out: where that is
+    /// next to nothing of what it was before, its amplitude is unobservable.
+    pub fn information(&self, c: usize) -> f64 {
         self.all.train[(c, c)]
     }
 
     /// Noise variance of a scalar on all data with `set` in the model.
-    pub(crate) fn variance(&self, set: &[usize]) -> Option<f64> {
+    pub fn variance(&self, set: &[usize]) -> Option<f64> {
         Some(self.error(set)? / (self.all.freedom - set.len() as f64).max(1.0))
     }
 
     /// Squared error of all data at the best amplitudes of `set`.
-    pub(crate) fn error(&self, set: &[usize]) -> Option<f64> {
+    pub fn error(&self, set: &[usize]) -> Option<f64> {
         let (beta, _) = self.all.amplitudes(set)?;
         let last = self.all.train.ncols() - 1;
         let explained: f64 = (0..set.len())
