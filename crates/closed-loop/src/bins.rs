@@ -11,8 +11,7 @@
 use std::ops::Range;
 
 use block_regression::Folds;
-
-use crate::star::data::median_step;
+use spectra::robust::median_step;
 
 /// About as many bins as an attitude series is cut into at most.
 pub(crate) const MOST: usize = 2400;

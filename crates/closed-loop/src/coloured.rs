@@ -118,7 +118,7 @@ impl Coloured {
             tau_s: 1.0,
         };
         let (Some(step), Some((first, last))) = (
-            crate::star::data::median_step(t_s),
+            spectra::robust::median_step(t_s),
             t_s.first().zip(t_s.last()),
         ) else {
             return white;
@@ -160,7 +160,7 @@ impl Coloured {
         if self.slow <= 0.0 {
             return Self::fit_above(least, t_s, y, count);
         }
-        let Some(step) = crate::star::data::median_step(t_s) else {
+        let Some(step) = spectra::robust::median_step(t_s) else {
             return *self;
         };
         let span = t_s[t_s.len() - 1] - t_s[0];
@@ -344,7 +344,7 @@ pub(crate) fn fit_alike(
     series: &[(&[f64], &[f64])],
     start: &Coloured,
 ) -> Option<(Coloured, f64)> {
-    let step = crate::star::data::median_step(t_s)?;
+    let step = spectra::robust::median_step(t_s)?;
     let span = t_s.last()? - t_s.first()?;
     let problem = Alike {
         t_s,

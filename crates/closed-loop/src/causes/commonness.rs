@@ -18,10 +18,11 @@
 //! Source: an analysis of variance within and between (Fisher 1925) of lagged products.
 
 use nalgebra::{Matrix3, Vector3};
+use spectra::robust::median_step;
 use statrs::function::erf::erfc;
 use telemetry::report::{Dependence, Unattributed};
 
-use crate::star::data::{StarData, median_step};
+use crate::star::data::StarData;
 use crate::star::frame_rotation::rotation_row;
 
 /// Chance below which stars that wander are told.

@@ -362,7 +362,7 @@ impl StarData {
     pub(crate) fn follow(&mut self, motion: Option<&dyn AttitudeSource>) {
         // Short against any motion that the samples resolve, long against the
         // rounding of a difference of positions.
-        let h = 0.05 * median_step(&self.frames.t_s).unwrap_or(1.0);
+        let h = 0.05 * robust::median_step(&self.frames.t_s).unwrap_or(1.0);
         for k in 0..self.frames.frames() {
             let t = self.frames.t_s[k];
             let around =
@@ -609,10 +609,4 @@ impl StarData {
         };
         [axis(0, measured.x), axis(1, measured.y)]
     }
-}
-
-/// Median of the steps of a time grid, s.
-pub(crate) fn median_step(t_s: &[f64]) -> Option<f64> {
-    let mut steps: Vec<f64> = t_s.windows(2).map(|w| w[1] - w[0]).collect();
-    robust::median(&mut steps)
 }

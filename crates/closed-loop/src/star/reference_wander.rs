@@ -11,11 +11,12 @@
 
 use std::collections::BTreeMap;
 
+use spectra::robust::median_step;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use telemetry::report::{ConsideredEffect, Estimate, FoundEffect};
 use telemetry::{EffectEntry, EffectValue};
 
-use crate::star::data::{StarData, median_step};
+use crate::star::data::StarData;
 use crate::star::frame_rotation::rotation_of;
 use crate::star::search::{WIDENING, Wander};
 

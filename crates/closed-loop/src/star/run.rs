@@ -11,6 +11,7 @@ use block_regression::Folds;
 use effects::{Scene, StarFacts, StarRows};
 use focal_plane::{AttitudeSource, Points};
 use nalgebra::DVector;
+use spectra::robust::median_step;
 use telemetry::report::{Errors, FoundEffect, Report, Rows};
 use telemetry::{DarkMap, Model, StarResiduals};
 
@@ -34,7 +35,7 @@ use crate::search::instants;
 use crate::search::selection::columns_of;
 use crate::search::{Found, amplitudes_as, fit};
 use crate::situation::Situation;
-use crate::star::data::{Inputs, Star, StarData, median_step};
+use crate::star::data::{Inputs, Star, StarData};
 use crate::star::evidence::StarEvidence;
 use crate::star::own_attitude;
 use crate::star::reference_wander::{self, REFERENCE_ERROR};

@@ -17,8 +17,8 @@
 //!
 //! Source: Aitken 1935 (weighted least squares); Rousseeuw & Croux 1993 (the median's scale).
 
-use crate::star::data::{StarData, median_step};
-use spectra::robust;
+use crate::star::data::StarData;
+use spectra::robust::{self, median_step};
 
 /// Changes that the common noise counts for beside a star's own.
 const COMMON: f64 = 20.0;

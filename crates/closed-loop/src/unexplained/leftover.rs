@@ -23,6 +23,7 @@
 use block_regression::Folds;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3, Vector4};
 use rayon::prelude::*;
+use spectra::robust::median_step;
 use spectra::{LombScargle, LombScargleSettings, robust};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
@@ -30,7 +31,7 @@ use crate::attitude::spatial_errors::SpatialErrors;
 use crate::bins::{self, Bins};
 use crate::coloured::Coloured;
 use crate::search::selection::FAMILY_ALPHA;
-use crate::star::data::{StarData, median_step};
+use crate::star::data::StarData;
 use crate::star::frame_rotation::rotation_row;
 use crate::star::search::WIDENING;
 use telemetry::report::Unattributed;

@@ -17,11 +17,12 @@
 //! Source: Scargle 1982 (periodogram); Wilks 1938.
 
 use rayon::prelude::*;
+use spectra::robust::median_step;
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
 use telemetry::report::Unattributed;
 
 use crate::causes::commonness::{self, MOSTLY, stars_first};
-use crate::star::data::{StarData, median_step};
+use crate::star::data::StarData;
 
 /// Chance that either is told although there is none.
 const ALPHA: f64 = 0.001;

@@ -10,12 +10,13 @@ use block_regression::Folds;
 use effects::Candidate;
 use focal_plane::{Camera, StarFrames, rotation_from_vector};
 use nalgebra::{DMatrix, UnitQuaternion, Vector3};
+use spectra::robust::median_step;
 use telemetry::Model;
 
 use super::{Flown, information};
 use crate::common_noise::CommonNoise;
 use crate::declared;
-use crate::star::data::{Inputs, Star, StarData, median_step};
+use crate::star::data::{Inputs, Star, StarData};
 use crate::star::evidence::StarEvidence;
 use crate::star::nuisance::StarNuisance;
 
