@@ -12,6 +12,7 @@
 //! | [`spectra`] | one-sided densities, coherence, lines, Allan deviations of error series |
 //! | [`fogm_fit`] | first-order Gauss-Markov processes: simulation, densities, fits |
 //! | [`block_regression`] | fits from sums over blocks of time: errors out of fold, honest variances |
+//! | [`coloured_noise`] | white and Gauss-Markov noise found, and removed by whitening filters |
 //! | [`star_tracker`] | the physics-based model: truth attitude in, centroids and attitude out |
 //! | [`effects`] | the catalogue of effects: how each acts, and what it leaves in a residual |
 //! | [`telemetry`] | bundles, models and results on disk |
@@ -69,8 +70,9 @@
 
 #[doc(inline)]
 pub use {
-    assess, block_regression, centroid, closed_loop, comparison, distortion, effects, figures,
-    focal_plane, fogm_fit, imager, quest, report, scenarios, spectra, star_tracker, telemetry,
+    assess, block_regression, centroid, closed_loop, coloured_noise, comparison, distortion,
+    effects, figures, focal_plane, fogm_fit, imager, quest, report, scenarios, spectra,
+    star_tracker, telemetry,
 };
 
 /// The names that almost every program needs.

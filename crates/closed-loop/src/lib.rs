@@ -11,8 +11,6 @@ mod attitude;
 mod bins;
 mod causes;
 mod close;
-mod coloured;
-mod common_noise;
 mod declared;
 mod error;
 mod evidence;

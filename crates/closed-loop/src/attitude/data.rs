@@ -12,13 +12,13 @@
 use std::ops::Range;
 
 use block_regression::{BlockGrams, Design, Folds};
+use coloured_noise::Coloured;
 use effects::{AttitudeRows, Candidate};
 use focal_plane::{ARCSEC_PER_RAD, AttitudeResidual, AttitudeSeries, AttitudeSource, VectorsMut};
 use nalgebra::{DMatrix, UnitQuaternion};
 use star_tracker::Disturbance;
 
 use crate::bins::{Bins, MOST};
-use crate::coloured::Coloured;
 use crate::evidence::{Amplitudes, Evidence, Residuals};
 
 /// Rows of attitude residuals, structure of arrays.

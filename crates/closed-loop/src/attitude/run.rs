@@ -3,13 +3,13 @@
 //! Not physics: the order of the steps.
 
 use block_regression::Folds;
+use coloured_noise::Coloured;
 use effects::{Candidate, Scene};
 
 use crate::attitude::data::{AttitudeData, AttitudeEvidence};
 use crate::attitude::search;
 use crate::attitude::spatial_errors::SpatialErrors;
 use crate::close::{Closed, Rival, catalogue_candidates};
-use crate::coloured::Coloured;
 use crate::declared;
 use crate::error::CloseError;
 use crate::evidence::{Amplitudes, Evidence, Residuals};

@@ -19,6 +19,7 @@
 //! Source: Wilks 1938 (likelihood ratio); Cochrane & Orcutt 1949 (the alternation).
 
 use block_regression::Folds;
+use coloured_noise::Coloured;
 use effects::Candidate;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -26,7 +27,6 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use crate::attitude::data::{AttitudeData, AttitudeEvidence};
 use crate::attitude::spatial_errors::SpatialErrors;
-use crate::coloured::Coloured;
 use crate::error::CloseError;
 use crate::evidence::{Amplitudes, Evidence};
 use crate::figures;

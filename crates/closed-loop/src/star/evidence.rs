@@ -9,13 +9,13 @@
 use std::sync::Arc;
 
 use block_regression::{BlockGrams, Folds};
+use coloured_noise::CommonNoise;
 use effects::Candidate;
 use focal_plane::AttitudeSource;
 use nalgebra::{DVector, Vector3};
 use rayon::prelude::*;
 
 use crate::bins::Bins;
-use crate::common_noise::CommonNoise;
 use crate::evidence::{Amplitudes, Evidence, Residuals};
 use crate::situation::Situation;
 use crate::star::columns::{CHUNK_FRAMES, Filled, StarColumns};

@@ -11,7 +11,7 @@
 //!
 //! Under white noise a fit needs G; with a free attitude in every frame, R with frames
 //! for bins; under a slow error of the reference, `R / sigma^2` and the products of the
-//! innovations of theta ([`crate::common_noise`]). Sums go in the order of the data
+//! innovations of theta ([`coloured_noise::CommonNoise`]). Sums go in the order of the data
 //! within blocks: the numbers do not depend on the threads.
 //!
 //! Source: the partitioned normal equations of bundle adjustment (Brown 1958).
@@ -24,12 +24,12 @@ use std::ops::Range;
 use std::sync::{Arc, OnceLock};
 
 use block_regression::{BlockGrams, Folds, Gram, add_products};
+use coloured_noise::{CommonNoise, Filter, Rotations};
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use rayon::prelude::*;
 
 use self::sums::Sums;
 use crate::bins::Bins;
-use crate::common_noise::{CommonNoise, Filter, Rotations};
 use crate::star::columns::StarColumns;
 
 /// About as many bins as the rotations are averaged over at most.

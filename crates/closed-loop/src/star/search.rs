@@ -29,11 +29,11 @@
 //! Source: Wilks 1938 (likelihood ratio); George & Foster 2000 (empirical Bayes selection).
 
 use block_regression::{Estimate, Fits, Folds, Layout};
+use coloured_noise::{CommonNoise, Rotations};
 use effects::Candidate;
 use rayon::prelude::*;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use crate::common_noise::{CommonNoise, Rotations};
 use crate::error::CloseError;
 use crate::evidence::Evidence;
 use crate::search::selection::{

@@ -1,7 +1,7 @@
 //! What remains in time: lines and jumps of what all rows of a frame share.
 //!
 //! Series of one number a frame (rotations, growth and shears of the image, attitude axes) are
-//! whitened by the noise that suits them best (coloured.rs) and searched for a sinusoid,
+//! whitened by the noise that suits them best ([`coloured_noise`]) and searched for a sinusoid,
 //!
 //! ```text
 //! z(f) = power of the best sinusoid at f / mean power around f,    P = M (1 + z/n)^-n
@@ -21,6 +21,7 @@
 //! Source: Scargle 1982 (periodogram), the F law of a ratio of two mean powers; Wilks 1938.
 
 use block_regression::Folds;
+use coloured_noise::Coloured;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3, Vector4};
 use rayon::prelude::*;
 use spectra::robust::median_step;
@@ -29,7 +30,6 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use crate::attitude::spatial_errors::SpatialErrors;
 use crate::bins::{self, Bins};
-use crate::coloured::Coloured;
 use crate::search::selection::FAMILY_ALPHA;
 use crate::star::data::StarData;
 use crate::star::frame_rotation::rotation_row;

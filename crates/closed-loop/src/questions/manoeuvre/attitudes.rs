@@ -3,12 +3,12 @@
 //! Not physics: rows of attitudes along a motion.
 
 use block_regression::Folds;
+use coloured_noise::Coloured;
 use effects::Candidate;
 use nalgebra::DMatrix;
 
 use super::{Flown, information};
 use crate::attitude::data::{AttitudeData, AttitudeEvidence};
-use crate::coloured::Coloured;
 
 /// Information on the candidates' columns along a manoeuvre, with frames every `step_s`.
 pub(crate) fn fly(

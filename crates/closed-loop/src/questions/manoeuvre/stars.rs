@@ -7,6 +7,7 @@
 //! Source: `dv/dt = -omega x v` for a fixed star, the convention of `focal_plane::AttitudeSource`.
 
 use block_regression::Folds;
+use coloured_noise::CommonNoise;
 use effects::Candidate;
 use focal_plane::{Camera, StarFrames, rotation_from_vector};
 use nalgebra::{DMatrix, UnitQuaternion, Vector3};
@@ -14,7 +15,6 @@ use spectra::robust::median_step;
 use telemetry::Model;
 
 use super::{Flown, information};
-use crate::common_noise::CommonNoise;
 use crate::declared;
 use crate::star::data::{Inputs, Star, StarData};
 use crate::star::evidence::StarEvidence;

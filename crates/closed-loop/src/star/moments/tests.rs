@@ -1,12 +1,12 @@
 //! The one pass against dense algebra on every row.
 
 use centroid::CentroidError;
+use coloured_noise::Coloured;
 use effects::{AttitudeRows, Candidate, Coefficient, Effect, EffectError, StarRows, Surroundings};
 use focal_plane::{ARCSEC_PER_RAD, Camera, Pixel, PointsMut, StarFrames, VectorsMut};
 use telemetry::Model;
 
 use super::*;
-use crate::coloured::Coloured;
 use crate::search::empirical::{Empirical, Variable};
 use crate::star::columns::Filled;
 use crate::star::data::{Inputs, StarData};

@@ -1,4 +1,4 @@
-//! Noise that all stars of a frame share: the error of the reference.
+//! Noise that all stars of a frame share: the error of the reference that they are held against.
 //!
 //! A frame's residuals split into the rotation that its stars agree on and what no
 //! rotation explains. The centroids' white noise shows in both; an error of the
@@ -32,21 +32,21 @@ use crate::coloured::{Coloured, fit_alike};
 /// Half the relative difference of two noises that serve a fit alike.
 const ALIKE: f64 = 0.02;
 
-/// What the residuals of stars against a reference are made of.
+/// What the residuals of stars against a reference are made of, all in one unit of angle.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct CommonNoise {
-    /// White noise of a centroid per axis, arcsec.
-    pub(crate) centroid: f64,
+pub struct CommonNoise {
+    /// White noise of a centroid per axis.
+    pub centroid: f64,
     /// The reference's error per axis: `white` is its own, beside the centroids'.
-    pub(crate) reference: [Coloured; 3],
+    pub reference: [Coloured; 3],
 }
 
 /// The frames' rotations as three series, and the noise of the centroids.
 #[derive(Clone, Debug)]
-pub(crate) struct Rotations {
+pub struct Rotations {
     /// Mean time of each bin, s.
     t_s: Vec<f64>,
-    /// Mean rotation of each bin per axis, arcsec.
+    /// Mean rotation of each bin per axis.
     mean: [Vec<f64>; 3],
     /// Stars' worth of each bin: the centroid variance over it is the mean's.
     count: [Vec<f64>; 3],
@@ -55,8 +55,10 @@ pub(crate) struct Rotations {
 }
 
 impl Rotations {
-    /// Means at `t_s`, each of as many frames as `frames_per_bin` on average.
-    pub(crate) fn new(
+    /// Mean rotations `mean` about X, Y and Z of bins of consecutive frames at `t_s`, s, each bin of as many
+    /// frames as `frames_per_bin` on average. `count` is the stars' worth of each mean: the variance
+    /// `centroid^2` of a centroid over it is the mean's; 0 leaves a bin out.
+    pub fn new(
         t_s: Vec<f64>,
         mean: [Vec<f64>; 3],
         count: [Vec<f64>; 3],
@@ -73,7 +75,7 @@ impl Rotations {
     }
 
     /// The noise of greatest likelihood; started from `near` where there is one.
-    pub(crate) fn noise(&self, near: Option<&CommonNoise>) -> CommonNoise {
+    pub fn noise(&self, near: Option<&CommonNoise>) -> CommonNoise {
         let of = |axis: usize| {
             let (y, count) = (&self.mean[axis], &self.count[axis]);
             // rotations are no whiter than their stars: a slow part of less than a step between frames is
@@ -97,7 +99,7 @@ impl Rotations {
 
     /// How much more likely each axis's rotations are with the slow error than
     /// without: twice the gain in log-likelihood.
-    pub(crate) fn slow_ratio(&self, noise: &CommonNoise) -> [f64; 3] {
+    pub fn slow_ratio(&self, noise: &CommonNoise) -> [f64; 3] {
         std::array::from_fn(|axis| {
             let with = self.with_centroids(axis, noise.reference[axis]);
             let likely = with.log_likelihood(&self.t_s, &self.mean[axis], &self.count[axis]);
@@ -107,7 +109,7 @@ impl Rotations {
 
     /// As [`slow_ratio`](Self::slow_ratio), of X and Y together with a slow error that is the same about
     /// both: a reference knows no axis across its boresight from another.
-    pub(crate) fn alike_ratio(&self, noise: &CommonNoise) -> f64 {
+    pub fn alike_ratio(&self, noise: &CommonNoise) -> f64 {
         let both = [0, 1].map(|axis| (self.mean[axis].as_slice(), self.count[axis].as_slice()));
         let white: f64 = (0..2).map(|axis| self.white_alone(axis)).sum();
         let starts = (0..2).filter(|&axis| noise.reference[axis].slow > 0.0);
@@ -133,7 +135,7 @@ impl Rotations {
     }
 
     /// Standard errors of the slow part of an axis, relative: of sigma and of tau.
-    pub(crate) fn slow_sigma(&self, noise: &CommonNoise, axis: usize) -> Option<[f64; 2]> {
+    pub fn slow_sigma(&self, noise: &CommonNoise, axis: usize) -> Option<[f64; 2]> {
         self.with_centroids(axis, noise.reference[axis])
             .relative_sigma(&self.t_s, &self.mean[axis], &self.count[axis])
     }
@@ -165,8 +167,8 @@ impl Rotations {
 }
 
 impl CommonNoise {
-    /// Alike within what makes no difference to a fit.
-    pub(crate) fn is_like(&self, other: &Self) -> bool {
+    /// Whether the slow parts are alike within what makes no difference to a fit.
+    pub fn is_like(&self, other: &Self) -> bool {
         let close = |a: f64, b: f64| (a - b).abs() <= ALIKE * (a + b);
         self.reference
             .iter()
@@ -186,16 +188,18 @@ struct Step {
 
 /// The filter with its gains: they depend on times and stars alone.
 #[derive(Clone, Debug)]
-pub(crate) struct Filter {
+pub struct Filter {
     steps: Vec<Step>,
-    /// What the log-likelihood of the innovations lacks, nats.
-    pub(crate) log_scale: f64,
+    /// What the log-likelihood of the innovations lacks to that of what the stars of each bin share, nats:
+    /// `-1/2 ln det F - 1/2 ln det N` summed over the bins, F the covariance of an innovation and N the normal
+    /// matrix of a rotation.
+    pub log_scale: f64,
 }
 
 impl Filter {
-    /// For bins at `t_s` of so many `frames`, with the inverse normal matrix of each
-    /// bin's rotation.
-    pub(crate) fn new(
+    /// For bins at `t_s`, s, of so many `frames`, with the inverse normal matrix `(A^T A)^-1` of each
+    /// bin's rotation; `None` where its stars fix none.
+    pub fn new(
         noise: &CommonNoise,
         t_s: &[f64],
         frames: &[usize],
@@ -240,9 +244,10 @@ impl Filter {
         Self { steps, log_scale }
     }
 
-    /// Whitened innovations of `columns` of `theta` (three rows a bin) at `steps`;
-    /// `state` is what the filter predicts for each column, and goes on.
-    pub(crate) fn innovations(
+    /// Whitened innovations of `columns` of `theta` (three rows a bin) at the bins `steps`, which are all that
+    /// `theta` holds; `state` is where the filter stands for each of `columns`, zero at first, and goes on
+    /// from block to block.
+    pub fn innovations(
         &self,
         steps: Range<usize>,
         theta: &DMatrix<f64>,

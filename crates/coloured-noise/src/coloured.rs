@@ -1,4 +1,4 @@
-//! Coloured noise of an attitude residual: white plus a first-order
+//! Coloured noise of one series: white plus a first-order
 //! Gauss-Markov process, removed exactly by a whitening filter.
 //!
 //! ```text
@@ -26,19 +26,22 @@ use argmin::solver::neldermead::NelderMead;
 use rayon::prelude::*;
 
 /// White plus first-order Gauss-Markov noise of one axis.
+///
+/// A series is given by the times `t_s` of its rows in ascending order, s, its values, and the `count` of
+/// measurements that each row is the mean of; 0 leaves a row out. All three have one length.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Coloured {
-    /// Standard deviation of the white part, arcsec.
-    pub(crate) white: f64,
-    /// Standard deviation of the slow part, arcsec.
-    pub(crate) slow: f64,
+pub struct Coloured {
+    /// Standard deviation of the white part of one measurement, in the unit of the series.
+    pub white: f64,
+    /// Standard deviation of the slow part, in the unit of the series.
+    pub slow: f64,
     /// Correlation time of the slow part, s.
-    pub(crate) tau_s: f64,
+    pub tau_s: f64,
 }
 
 impl Coloured {
-    /// Nothing known: rows count alike and stay as they are.
-    pub(crate) const WHITE: Self = Self {
+    /// Nothing known: measurements count alike and stay as they are.
+    pub const WHITE: Self = Self {
         white: 1.0,
         slow: 0.0,
         tau_s: 1.0,
@@ -72,7 +75,7 @@ impl Coloured {
     }
 
     /// Log-likelihood of `y`, nats.
-    pub(crate) fn log_likelihood(&self, t_s: &[f64], y: &[f64], count: &[f64]) -> f64 {
+    pub fn log_likelihood(&self, t_s: &[f64], y: &[f64], count: &[f64]) -> f64 {
         let (r, s) = (self.white * self.white, self.slow * self.slow);
         let (mut variance, mut mean, mut last_s) = (s, 0.0, f64::NEG_INFINITY);
         let (mut squares, mut kept) = (0.0, 0.0);
@@ -100,14 +103,14 @@ impl Coloured {
         -0.5 * (squares + determinant.ln() + kept * std::f64::consts::TAU.ln())
     }
 
-    /// Noise of greatest likelihood for a series about zero. With too few rows
-    /// to tell a correlation, white noise.
-    pub(crate) fn fit(t_s: &[f64], y: &[f64], count: &[f64]) -> Self {
+    /// Noise of greatest likelihood for a series about zero. With fewer than 30 rows, too
+    /// few to tell a correlation, white noise.
+    pub fn fit(t_s: &[f64], y: &[f64], count: &[f64]) -> Self {
         Self::fit_above(0.0, t_s, y, count)
     }
 
     /// As [`fit`](Self::fit), where the white part is known to be no less than `least`.
-    pub(crate) fn fit_above(least: f64, t_s: &[f64], y: &[f64], count: &[f64]) -> Self {
+    pub fn fit_above(least: f64, t_s: &[f64], y: &[f64], count: &[f64]) -> Self {
         let kept: Vec<usize> = (0..y.len()).filter(|&k| count[k] > 0.0).collect();
         let variance =
             kept.iter().map(|&k| y[k] * y[k] * count[k]).sum::<f64>() / kept.len().max(1) as f64;
@@ -151,12 +154,12 @@ impl Coloured {
     }
 
     /// The noise of a similar series, started from this one.
-    pub(crate) fn refit(&self, t_s: &[f64], y: &[f64], count: &[f64]) -> Self {
+    pub fn refit(&self, t_s: &[f64], y: &[f64], count: &[f64]) -> Self {
         self.refit_above(0.0, t_s, y, count)
     }
 
     /// As [`refit`](Self::refit), where the white part is known to be no less than `least`.
-    pub(crate) fn refit_above(&self, least: f64, t_s: &[f64], y: &[f64], count: &[f64]) -> Self {
+    pub fn refit_above(&self, least: f64, t_s: &[f64], y: &[f64], count: &[f64]) -> Self {
         if self.slow <= 0.0 {
             return Self::fit_above(least, t_s, y, count);
         }
@@ -186,7 +189,7 @@ impl Coloured {
 
     /// Standard errors of the slow part relative to it, of sigma and of tau, from
     /// the curvature of the log-likelihood; `None` where it has no summit.
-    pub(crate) fn relative_sigma(&self, t_s: &[f64], y: &[f64], count: &[f64]) -> Option<[f64; 2]> {
+    pub fn relative_sigma(&self, t_s: &[f64], y: &[f64], count: &[f64]) -> Option<[f64; 2]> {
         const STEP: f64 = 0.05;
         let height = |d: [f64; 3]| {
             Self {
@@ -213,8 +216,8 @@ impl Coloured {
     }
 
     /// Products of whitened steps (0 before each of the rows `at`, 1 from there on) with themselves and
-    /// with two whitened series.
-    pub(crate) fn steps(
+    /// with two whitened series `with`, three numbers a step: what a fit of one step and its likelihood need.
+    pub fn steps(
         &self,
         t_s: &[f64],
         count: &[f64],
@@ -249,8 +252,9 @@ impl Coloured {
         out
     }
 
-    /// Whitens a series in place: independent, unit variance; masked rows are 0.
-    pub(crate) fn whiten(&self, t_s: &[f64], count: &[f64], columns: &mut [&mut [f64]]) {
+    /// Whitens a series in place: independent, unit variance; rows that are left out become 0. Regressors
+    /// whitened alike make least squares generalised.
+    pub fn whiten(&self, t_s: &[f64], count: &[f64], columns: &mut [&mut [f64]]) {
         let gains = self.gains(t_s, count);
         for column in columns {
             let mut mean = 0.0;
@@ -298,9 +302,9 @@ impl Known {
     }
 }
 
-/// The logarithm of a long product of positive numbers, without one for each.
+/// The logarithm of a long product of positive numbers, without one logarithm for each.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct LogProduct {
+pub struct LogProduct {
     product: f64,
     ln: f64,
 }
@@ -315,7 +319,8 @@ impl Default for LogProduct {
 }
 
 impl LogProduct {
-    pub(crate) fn times(&mut self, factor: f64) {
+    /// Multiplies by `factor`.
+    pub fn times(&mut self, factor: f64) {
         self.product *= factor;
         if !(1e-120..1e120).contains(&self.product) {
             self.ln += self.product.ln();
@@ -323,7 +328,9 @@ impl LogProduct {
         }
     }
 
-    pub(crate) fn ln(self) -> f64 {
+    /// The logarithm of the product.
+    #[must_use]
+    pub fn ln(self) -> f64 {
         self.ln + self.product.ln()
     }
 }
