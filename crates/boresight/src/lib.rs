@@ -18,6 +18,7 @@
 //! | [`telemetry`] | bundles, models and results on disk |
 //! | [`scenarios`] | motions and skies: bundles simulated from a scenario |
 //! | [`imager`] | pixels: what the detector sees and the tracker reads out, an independent truth |
+//! | [`star_images`] | dark map, spots and centroids from raw windows |
 //! | [`assess`] | on-orbit noise from quaternions alone: rigid rotator, gyro, plateau |
 //! | [`closed_loop`] | residual, cause, better model |
 //! | [`comparison`] | residual, spectrum, fitted process and ensemble of a model beside a bundle |

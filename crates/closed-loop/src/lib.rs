@@ -5,6 +5,23 @@
 //! model declares unknown, looks among the effects of the catalogue for those
 //! that the residual supports out of fold, and reports the error before and
 //! after on data that took no part in the fit.
+//!
+//! ```text
+//! close              the door: model and bundle joined (situation, declared), then stars or attitudes
+//! star  attitude     the two kinds of measurement, each with the order of its steps (run)
+//! evidence           what the search asks of either: sums over blocks, and residuals out of fold
+//! search             candidates, selection, refinement until it stands; terms without a cause
+//! causes             what speaks against a cause that was found, before it is named
+//! noise_effects      effects that move nothing and change the noise
+//! image_level        whether dark map and spots explain what raw windows show
+//! questions          what else it could be, what would tell, and what somebody asks by name
+//! unexplained        what no effect explains: lines, jumps, waves on the detector
+//! figures            findings turned into the report
+//! motion  bins       whether samples resolve a motion; long series as means over short stretches
+//! ```
+//!
+//! Regression, coloured noise and raw windows are crates of their own: [`block_regression`],
+//! [`coloured_noise`], [`star_images`].
 #![forbid(unsafe_code)]
 
 mod attitude;
@@ -16,7 +33,6 @@ mod error;
 mod evidence;
 mod figures;
 mod image_level;
-mod images;
 mod motion;
 mod noise_effects;
 mod questions;

@@ -12,6 +12,7 @@ use effects::{Scene, StarFacts, StarRows};
 use focal_plane::{AttitudeSource, Points};
 use nalgebra::DVector;
 use spectra::robust::median_step;
+use star_images::Formed;
 use telemetry::report::{Errors, FoundEffect, Report, Rows};
 use telemetry::{DarkMap, Model, StarResiduals};
 
@@ -24,7 +25,6 @@ use crate::error::CloseError;
 use crate::evidence::{Evidence, Residuals};
 use crate::figures;
 use crate::image_level::{self, ImageLevel, Side};
-use crate::images::{self, Formed};
 use crate::motion::resolved_motion;
 use crate::motion::{self, Around};
 use crate::noise_effects;
@@ -162,7 +162,7 @@ fn explain(
     let formed = match &situation.bundle.images {
         Some(windows) => {
             progress("dark map from the raw windows");
-            images::form(data, windows, folds)
+            image_level::form(data, windows, folds)
         }
         None => None,
     };
@@ -485,8 +485,8 @@ fn finish(f: &Finish<'_>, plain: Residuals) -> Result<Closed, CloseError> {
     }
     if let Some((level, _)) = f.image {
         for (id, step) in [
-            (images::DARK_MAP, &level.dark_map),
-            (images::EFFECTIVE_PSF, &level.effective_psf),
+            (image_level::DARK_MAP, &level.dark_map),
+            (image_level::EFFECTIVE_PSF, &level.effective_psf),
         ] {
             considered.retain(|c| !(step.stands && c.id == id));
             for entry in considered.iter_mut().filter(|c| c.id == id) {

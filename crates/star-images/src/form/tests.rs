@@ -2,10 +2,11 @@
 //!
 //! Not physics: tests.
 
-use super::synthetic::{
-    BACKGROUND, Made, SIGMA_PX, Scenario, all, dither, no_hit, nothing, rigid, rms, steady,
-};
 use super::*;
+use crate::synthetic::{
+    BACKGROUND, Data, Made, SIGMA_PX, Scenario, all, dither, no_hit, nothing, rigid, rms, steady,
+};
+use block_regression::Folds;
 
 mod switching_pixels;
 
@@ -32,18 +33,23 @@ fn scenario<'a>() -> Scenario<'a> {
     }
 }
 
+/// The fold of each frame.
+fn folds(frames: usize) -> Vec<usize> {
+    Folds::cut(frames).fold_of_frame()
+}
+
 fn formed(made: &Made) -> Formed {
     form(
-        &made.data,
+        &made.data.stars(),
         &made.windows,
-        &Folds::cut(made.data.frames.frames()),
+        &folds(made.data.frames.frames()),
     )
     .unwrap()
 }
 
 /// Every row from the variant that was learned outside its fold.
 fn out_of_fold(made: &Made, variants: &[[Vec<f64>; 2]]) -> [Vec<f64>; 2] {
-    let fold = Folds::cut(made.data.frames.frames()).fold_of_frame();
+    let fold = folds(made.data.frames.frames());
     let mut out = [Vec::new(), Vec::new()];
     for (k, &f) in fold.iter().enumerate() {
         for row in made.data.frames.rows_of(k) {
@@ -76,12 +82,12 @@ fn pulls(made: &Made, map: &DarkMap, truth: &dyn Fn([f64; 2]) -> f64) -> Vec<f64
             let star = FIELD[*s];
             (p.x_px - star[0]).powi(2) + (p.y_px - star[1]).powi(2)
         };
-        (0..made.data.stars.len())
+        (0..made.data.stars)
             .min_by(|a, b| distance(a).total_cmp(&distance(b)))
             .unwrap()
     };
     let mut out = Vec::new();
-    for s in 0..made.data.stars.len() {
+    for s in 0..made.data.stars {
         let list: Vec<[f64; 2]> = map
             .pixels
             .iter()
@@ -268,7 +274,7 @@ fn a_map_belongs_to_the_detector() {
     let mut mended = table(&both);
     let flux = both.data.frames.flux.as_ref().unwrap();
     let under = |row: usize| {
-        let (slot, t) = (both.data.frames.slot[row], both.data.t_s[row]);
+        let (slot, t) = (both.data.frames.slot[row], both.data.frames.t_s[row / 4]);
         let i = (0..both.windows.len())
             .find(|&i| both.windows.slot[i] == slot && both.windows.t_s[i].to_bits() == t.to_bits())
             .unwrap();
@@ -396,15 +402,15 @@ fn little_or_foreign_data_is_no_failure() {
         ..scenario()
     }
     .make();
-    assert!(form(&few.data, &few.windows, &Folds::cut(12)).is_none());
+    assert!(form(&few.data.stars(), &few.windows, &folds(12)).is_none());
     let mut strange = scenario().make();
     for t in &mut strange.windows.t_s {
         *t += 0.5;
     }
-    assert!(form(&strange.data, &strange.windows, &Folds::cut(400)).is_none());
+    assert!(form(&strange.data.stars(), &strange.windows, &folds(400)).is_none());
     let mut black = scenario().make();
     black.windows.pixels.fill(BACKGROUND);
-    assert!(form(&black.data, &black.windows, &Folds::cut(400)).is_none());
+    assert!(form(&black.data.stars(), &black.windows, &folds(400)).is_none());
 }
 
 /// A spot that never moves over its pixels cannot be told from them: the errors say so, whether the pixels are
@@ -471,15 +477,13 @@ fn stars_may_come_and_go() {
 mod measured {
     use std::path::PathBuf;
 
-    use centroid::CentroidError;
     use telemetry::Bundle;
 
-    use super::super::geometry::Geometry;
     use super::*;
-    use crate::star::data::Inputs;
+    use crate::geometry::Geometry;
     use spectra::robust;
 
-    fn chandra() -> Option<(StarData, WindowTable)> {
+    fn chandra() -> Option<(Data, WindowTable)> {
         let root = std::env::var_os("BORESIGHT_DATA").map_or_else(
             || PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data")),
             PathBuf::from,
@@ -499,14 +503,7 @@ mod measured {
             return None;
         }
         let bundle = Bundle::read(&path).unwrap();
-        let data = StarData::prepare(&Inputs {
-            camera: bundle.camera.as_ref().unwrap(),
-            frames: bundle.stars.as_ref().unwrap(),
-            reference: None,
-            catalogue: None,
-            phase: &CentroidError::None,
-            effects: &[],
-        });
+        let data = Data::new(bundle.camera.unwrap(), bundle.stars.unwrap());
         Some((data, bundle.images.unwrap()))
     }
 
@@ -514,15 +511,15 @@ mod measured {
     /// folds, every frame's attitude from its own stars. `length_px`: with
     /// distortion, or infinite, without.
     fn residual(
-        data: &StarData,
+        data: &Data,
         sample: &Sample,
         variants: &[&[Vec<f64>; 2]],
         length_px: f64,
     ) -> [Vec<f64>; 2] {
-        let fold = Folds::cut(data.frames.frames()).fold_of_frame();
-        let equal = vec![1.0; data.stars.len()];
+        let fold = folds(data.frames.frames());
+        let equal = vec![1.0; data.stars];
         let scale = data.camera.arcsec_per_px();
-        let mut out = [vec![0.0; data.t_s.len()], vec![0.0; data.t_s.len()]];
+        let mut out = [vec![0.0; data.frames.rows()], vec![0.0; data.frames.rows()]];
         for (k, at) in variants.iter().enumerate() {
             let part = |test: bool| -> Vec<usize> {
                 (0..fold.len())
@@ -552,19 +549,19 @@ mod measured {
             return;
         };
         let sample = Sample::collect(
-            data.stars.len(),
+            data.stars,
             windows.size,
             &windows.unread,
-            &entries(&data, &windows),
+            &entries(&data.stars(), &windows),
         )
         .unwrap();
-        let formed = form(&data, &windows, &Folds::cut(data.frames.frames())).unwrap();
+        let formed = form(&data.stars(), &windows, &folds(data.frames.frames())).unwrap();
         assert_eq!(formed.with_map.fallback_rows, 0);
         let table = [data.frames.x_px.clone(), data.frames.y_px.clone()];
         let before = residual(&data, &sample, &[&table; 5], f64::INFINITY);
-        let mut outlier = vec![false; data.t_s.len()];
+        let mut outlier = vec![false; data.frames.rows()];
         for axis in &before {
-            robust::mark_outliers(axis, &data.star, data.stars.len(), &mut outlier);
+            robust::mark_outliers(axis, &data.star, data.stars, &mut outlier);
         }
         let rms = |r: &[Vec<f64>; 2]| {
             r.each_ref().map(|axis| {

@@ -1,70 +1,62 @@
-//! Raw windows: what the detector itself adds, and centroids without it.
+//! Centroids formed anew: what is learned where, and what every row becomes.
 //!
-//! Not physics: the interface of the modules below.
+//! Not physics: the interface of the modules beside it.
 
 use std::collections::HashMap;
 
-use block_regression::Folds;
-use focal_plane::Pixel;
+use focal_plane::{Camera, Pixel, StarFrames};
 use rayon::prelude::*;
 use telemetry::WindowTable;
 
-use crate::star::data::StarData;
+use crate::learn::{self, Learned};
+use crate::sample::{Entry, Sample};
+use crate::spline::Grid;
+use crate::window_fit::{Fitted, Pixels};
+use crate::{map, spot, switching};
 
-use learn::Learned;
-use sample::{Entry, Sample};
-use spline::Grid;
-use window_fit::{Fitted, Pixels};
-
-mod banded;
-mod coupling;
-mod dark;
-mod gaussian_spot;
-mod geometry;
-mod learn;
-mod map;
-mod moment_level;
-mod pixel_noise;
-mod sample;
-mod spline;
-mod spot;
-mod switching;
-#[cfg(test)]
-mod synthetic;
 #[cfg(test)]
 mod tests;
-mod window_fit;
 
-/// Id of the effect in the catalogue.
-pub(crate) const DARK_MAP: &str = "dark_map";
-/// Id of the effect in the catalogue.
-pub(crate) const EFFECTIVE_PSF: &str = "effective_psf";
-/// The file that an adopted map is written to.
-pub(crate) const DARK_MAP_FILE: &str = "dark_map.csv";
+/// Star rows as far as their windows need them, frames one after another.
+#[derive(Clone, Copy, Debug)]
+pub struct Stars<'a> {
+    /// The tracker's camera.
+    pub camera: &'a Camera,
+    /// Times, slots, centroids, and fluxes where there are any.
+    pub frames: &'a StarFrames,
+    /// How many stars there are.
+    pub stars: usize,
+    /// Which of them each row is of.
+    pub star: &'a [usize],
+    /// Where a model puts each row, px. It may be off by a constant of each star, and by a small rotation
+    /// of each frame.
+    pub expected_px: [&'a [f64]; 2],
+}
 
 /// One pixel of a dark map.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct DarkPixel {
+pub struct DarkPixel {
     /// Centre of the pixel, centred px.
-    pub(crate) x_px: f64,
+    pub x_px: f64,
     /// Centre of the pixel, centred px.
-    pub(crate) y_px: f64,
+    pub y_px: f64,
     /// What it adds to every read-out, in the unit of the windows.
-    pub(crate) dn: f64,
+    pub dn: f64,
     /// 1 sigma of the pixel against the mean of its surroundings.
-    pub(crate) sigma_dn: f64,
+    pub sigma_dn: f64,
 }
 
 /// What each detector pixel under the windows adds, by itself, to every read-out.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct DarkMap {
+pub struct DarkMap {
     /// Every pixel that a window has covered.
-    pub(crate) pixels: Vec<DarkPixel>,
+    pub pixels: Vec<DarkPixel>,
 }
 
 impl DarkMap {
     /// Root mean square of the map about its mean: only contrasts mean anything.
-    pub(crate) fn rms_dn(&self) -> f64 {
+    #[must_use]
+    pub fn rms_dn(&self) -> f64 {
         let n = self.pixels.len().max(1) as f64;
         let mean = self.pixels.iter().map(|p| p.dn).sum::<f64>() / n;
         (self
@@ -79,40 +71,42 @@ impl DarkMap {
 
 /// Centroids formed anew in one way: one variant a fold, learned outside it, and a
 /// last one learned on all data; px, `[x, y]` of every star row.
-pub(crate) type Variants = Vec<[Vec<f64>; 2]>;
+pub type Variants = Vec<[Vec<f64>; 2]>;
 
 /// Centroids formed anew with or without a map.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Centroids {
+pub struct Centroids {
     /// First moments.
-    pub(crate) moments: Variants,
+    pub moments: Variants,
     /// First moments less what the effective spot says that they are off by: what
     /// the spot explains, apart from the noise that fitting it saves.
-    pub(crate) unbiased: Variants,
+    pub unbiased: Variants,
     /// Positions fitted with the effective spot.
-    pub(crate) fitted: Variants,
+    pub fitted: Variants,
     /// Positions fitted with the round Gaussian nearest to it.
-    pub(crate) gaussian: Variants,
+    pub gaussian: Variants,
     /// Positions fitted with the effective spot, pixels that switch followed in time; empty where none does.
-    pub(crate) followed: Variants,
+    pub followed: Variants,
     /// How many pixels are followed, from all data.
-    pub(crate) switching: usize,
+    pub switching: usize,
     /// 1 sigma of what is constant for each star, px: what the map takes off moments, and the zeros of
     /// spots, that are set to them.
-    pub(crate) zero_px: Vec<[f64; 2]>,
+    pub zero_px: Vec<[f64; 2]>,
     /// Rows that kept the centroid of the table, at most in any variant.
-    pub(crate) fallback_rows: usize,
+    pub fallback_rows: usize,
 }
 
 /// Centroids formed anew, and the map behind them.
 #[derive(Clone, Debug)]
-pub(crate) struct Formed {
-    pub(crate) without_map: Centroids,
-    pub(crate) with_map: Centroids,
+pub struct Formed {
+    /// By spots that were learned as if no pixel had a value of its own.
+    pub without_map: Centroids,
+    /// By spots and map that were learned together.
+    pub with_map: Centroids,
     /// The map from all data.
-    pub(crate) map: DarkMap,
-    /// Full width at half maximum of each star's spot, px.
-    pub(crate) fwhm_px: Vec<f64>,
+    pub map: DarkMap,
+    /// Full width at half maximum of each star's spot, px; NaN where none could be learned.
+    pub fwhm_px: Vec<f64>,
 }
 
 /// Knots of a spot, px: fine enough for the sharpest spot that a window samples.
@@ -131,31 +125,45 @@ pub(crate) fn robust_median(mut values: Vec<f64>) -> Option<f64> {
 }
 
 /// Learns dark map and spots from the windows, outside each fold and on all
-/// data, and forms the centroids anew. `None` where the windows do not belong to
-/// the star rows or are too few to learn from.
-pub(crate) fn form(data: &StarData, windows: &WindowTable, folds: &Folds) -> Option<Formed> {
+/// data, and forms the centroids anew. `fold` is the fold of each frame, counted from 0. `None` where the
+/// windows do not belong to the star rows (by time and slot) or are too few to learn from: fewer than 30 frames.
+///
+/// # Panics
+/// Unless `fold` has an entry for each frame, and every slice of `data` one for each row.
+#[must_use]
+pub fn form(data: &Stars<'_>, windows: &WindowTable, fold: &[usize]) -> Option<Formed> {
+    let rows = data.frames.rows();
+    assert_eq!(fold.len(), data.frames.frames(), "a fold for each frame");
+    assert!(
+        [
+            data.star.len(),
+            data.expected_px[0].len(),
+            data.expected_px[1].len()
+        ] == [rows; 3],
+        "a star and a place for each row"
+    );
+    let folds = fold.iter().max().map_or(0, |last| last + 1);
     let frames = entries(data, windows);
     if frames.iter().filter(|f| !f.is_empty()).count() < MIN_FRAMES {
         return None;
     }
-    let sample = Sample::collect(data.stars.len(), windows.size, &windows.unread, &frames)?;
+    let sample = Sample::collect(data.stars, windows.size, &windows.unread, &frames)?;
     let grid = Grid::new(sample.reach_px() + MARGIN_PX, KNOTS_PX);
     let length_px = data.camera.half_size_px().into_iter().fold(0.0, f64::max);
-    let fold = folds.fold_of_frame();
     let learn = |mapped: bool| -> Vec<Learned> {
-        (0..=folds.count)
+        (0..=folds)
             .into_par_iter()
             .map(|k| {
                 let taken: Vec<usize> = (0..fold.len()).filter(|&f| fold[f] != k).collect();
-                let last = k == folds.count;
+                let last = k == folds;
                 learn::learn(&sample, &taken, grid, length_px, mapped, mapped && last)
             })
             .collect()
     };
     let (mut learned, bare) = rayon::join(|| learn(true), || learn(false));
     let (with_map, without_map) = rayon::join(
-        || centroids(data, &sample, &learned, &fold),
-        || centroids(data, &sample, &bare, &fold),
+        || centroids(data, &sample, &learned, fold),
+        || centroids(data, &sample, &bare, fold),
     );
     let all = learned.pop()?;
     let width = |s: &learn::Spot| {
@@ -175,7 +183,7 @@ pub(crate) fn form(data: &StarData, windows: &WindowTable, folds: &Folds) -> Opt
 
 /// Centroids of every star row from each of `learned`, the last of which has seen all frames, the others
 /// those outside their `fold`; rows whose window does not give all of them keep the centroid of the table.
-fn centroids(data: &StarData, sample: &Sample, learned: &[Learned], fold: &[usize]) -> Centroids {
+fn centroids(data: &Stars<'_>, sample: &Sample, learned: &[Learned], fold: &[usize]) -> Centroids {
     let made: Vec<Made> = learned
         .par_iter()
         .enumerate()
@@ -217,7 +225,7 @@ const WAYS: usize = 5;
 /// A spot has no zero of its own: positions found with it are set such that they are, in the mean over a
 /// star, where its first moments are.
 fn one_variant(
-    data: &StarData,
+    data: &Stars<'_>,
     sample: &Sample,
     one: &Learned,
     taken: impl Fn(usize) -> bool,
@@ -260,7 +268,7 @@ fn one_variant(
         .into_iter()
         .map(|star| star.map(|list| clipped_mean(&list)))
         .collect();
-    let mut fallback = data.t_s.len() - sample.windows();
+    let mut fallback = data.frames.rows() - sample.windows();
     for (w, found) in formed.into_iter().enumerate() {
         let Some(found) = found else {
             fallback += 1;
@@ -330,8 +338,8 @@ fn clipped_mean(values: &[f64]) -> f64 {
 /// mean over all.
 ///
 /// Source: Efron & Stein 1981, Annals of Statistics 9, 586 (jackknife).
-fn zeros(data: &StarData, kinds: &[&Variants]) -> Vec<[f64; 2]> {
-    let stars = data.stars.len();
+fn zeros(data: &Stars<'_>, kinds: &[&Variants]) -> Vec<[f64; 2]> {
+    let stars = data.stars;
     let mut largest = vec![[0.0_f64; 2]; stars];
     for variants in kinds {
         // the last has seen all frames
@@ -369,7 +377,7 @@ fn zeros(data: &StarData, kinds: &[&Variants]) -> Vec<[f64; 2]> {
 }
 
 /// The windows of the star rows, frame by frame; a row without one has no entry.
-fn entries<'a>(data: &StarData, windows: &'a WindowTable) -> Vec<Vec<Entry<'a>>> {
+fn entries<'a>(data: &Stars<'_>, windows: &'a WindowTable) -> Vec<Vec<Entry<'a>>> {
     let key = |t_s: f64, slot: i32| (t_s.to_bits(), slot);
     let at: HashMap<(u64, i32), usize> = windows
         .t_s
@@ -378,13 +386,6 @@ fn entries<'a>(data: &StarData, windows: &'a WindowTable) -> Vec<Vec<Entry<'a>>>
         .enumerate()
         .map(|(i, (&t, &s))| (key(t, s), i))
         .collect();
-    // With directions of its own every star's constant is free, and a distortion
-    // fitted fold by fold would only add steps between the folds.
-    let base = if data.free_directions {
-        &data.projected
-    } else {
-        &data.modelled
-    };
     // Outliers are kept: a warm pixel that few windows cross looks like one, and
     // particle hits are left out pixel by pixel.
     (0..data.frames.frames())
@@ -392,14 +393,14 @@ fn entries<'a>(data: &StarData, windows: &'a WindowTable) -> Vec<Vec<Entry<'a>>>
             data.frames
                 .rows_of(k)
                 .filter_map(|row| {
-                    let i = *at.get(&key(data.t_s[row], data.frames.slot[row]))?;
+                    let i = *at.get(&key(data.frames.t_s[k], data.frames.slot[row]))?;
                     let centre = Pixel {
-                        x: base[0][row],
-                        y: base[1][row],
+                        x: data.expected_px[0][row],
+                        y: data.expected_px[1][row],
                     };
                     Some(Entry {
                         row,
-                        t_s: data.t_s[row],
+                        t_s: data.frames.t_s[k],
                         star: data.star[row],
                         start: [data.frames.x_px[row], data.frames.y_px[row]],
                         flux: data.frames.flux.as_ref().map(|f| f[row]),

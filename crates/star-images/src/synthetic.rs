@@ -5,15 +5,14 @@
 //!
 //! Source: integration of a Gaussian over square pixels (`centroid::pixel_gaussian_into`).
 
-use centroid::CentroidError;
 use focal_plane::{Camera, Pixel, StarFrames};
 use rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use telemetry::WindowTable;
 
+use super::Stars;
 use super::sample::{Entry, Sample};
-use crate::star::data::{Inputs, StarData};
 
 /// What to make.
 pub(crate) struct Scenario<'a> {
@@ -71,9 +70,71 @@ pub(crate) fn dither(k: usize) -> [f64; 2] {
     ]
 }
 
-/// A bundle's stars and windows, and the true positions of its rows.
+/// Star rows, and where a model without catalogue or reference puts them.
+pub(crate) struct Data {
+    pub(crate) camera: Camera,
+    pub(crate) frames: StarFrames,
+    pub(crate) stars: usize,
+    pub(crate) star: Vec<usize>,
+    expected_px: [Vec<f64>; 2],
+}
+
+impl Data {
+    /// A place of each star and a shift of each frame, by alternating means of the centroids.
+    pub(crate) fn new(camera: Camera, frames: StarFrames) -> Self {
+        let mut ids: Vec<i64> = frames.star_id.clone();
+        ids.sort_unstable();
+        ids.dedup();
+        let star: Vec<usize> = frames
+            .star_id
+            .iter()
+            .map(|id| ids.binary_search(id).unwrap())
+            .collect();
+        let frame: Vec<usize> = (0..frames.frames())
+            .flat_map(|k| frames.rows_of(k).map(move |_| k))
+            .collect();
+        let expected_px = [&frames.x_px, &frames.y_px].map(|at| {
+            let mut shift = vec![0.0; frames.frames()];
+            let mut place = vec![0.0; ids.len()];
+            for _ in 0..50 {
+                place = means(&star, place.len(), |row| at[row] - shift[frame[row]]);
+                shift = means(&frame, shift.len(), |row| at[row] - place[star[row]]);
+            }
+            let rows = star.iter().zip(&frame);
+            rows.map(|(&s, &k)| place[s] + shift[k]).collect()
+        });
+        Self {
+            camera,
+            frames,
+            stars: ids.len(),
+            star,
+            expected_px,
+        }
+    }
+
+    pub(crate) fn stars(&self) -> Stars<'_> {
+        Stars {
+            camera: &self.camera,
+            frames: &self.frames,
+            stars: self.stars,
+            star: &self.star,
+            expected_px: self.expected_px.each_ref().map(Vec::as_slice),
+        }
+    }
+}
+
+/// The mean of the rows of each of so many groups.
+fn means(group: &[usize], groups: usize, value: impl Fn(usize) -> f64) -> Vec<f64> {
+    let mut sums = vec![[0.0; 2]; groups];
+    for (row, &g) in group.iter().enumerate() {
+        sums[g] = [sums[g][0] + value(row), sums[g][1] + 1.0];
+    }
+    sums.into_iter().map(|[sum, n]| sum / n).collect()
+}
+
+/// Stars and windows, and the true positions of the rows.
 pub(crate) struct Made {
-    pub(crate) data: StarData,
+    pub(crate) data: Data,
     pub(crate) windows: WindowTable,
     pub(crate) truth: [Vec<f64>; 2],
 }
@@ -153,19 +214,7 @@ impl Scenario<'_> {
             .unwrap()
             .with_pixel_centre(self.pixel_centre)
             .unwrap();
-        let data = StarData::prepare(&Inputs {
-            camera: &camera,
-            frames: &frames,
-            reference: None,
-            catalogue: None,
-            phase: &CentroidError::None,
-            effects: &[],
-        });
-        assert_eq!(
-            data.t_s.len(),
-            truth[0].len(),
-            "every frame has an attitude"
-        );
+        let data = Data::new(camera, frames);
         Made {
             data,
             windows,
@@ -222,7 +271,7 @@ pub(crate) fn few_windows(count: usize) -> Sample {
 /// Root mean square over both axes of `at - truth` for the rows `taken`, each
 /// star's and axis's mean taken off: a constant offset is a matter of definition.
 pub(crate) fn rms(made: &Made, at: &[Vec<f64>; 2], taken: &dyn Fn(usize) -> bool) -> f64 {
-    let stars = made.data.stars.len();
+    let stars = made.data.stars;
     let (mut total, mut count) = (0.0, 0.0);
     for axis in 0..2 {
         for s in 0..stars {

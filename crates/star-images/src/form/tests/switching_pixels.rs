@@ -3,7 +3,7 @@
 //! Not physics: tests.
 
 use super::*;
-use crate::images::switching::{self, Scores, visits};
+use crate::switching::{self, Scores, visits};
 
 /// One pixel in four has 40 more half of the time, drawn anew every 40 frames.
 fn telegraph(k: usize, centre: [f64; 2]) -> f64 {
@@ -29,7 +29,7 @@ fn eaten(made: &Made, at: &[Vec<f64>; 2]) -> f64 {
     let rows = (0..at[0].len()).filter(|&row| made.data.star[row] == 0);
     let (mut product, mut square) = (0.0, 0.0);
     for row in rows {
-        let s = slow(row / made.data.stars.len(), 0);
+        let s = slow(row / made.data.stars, 0);
         product += s * (at[0][row] - made.truth[0][row]);
         square += s * s;
     }
@@ -102,7 +102,7 @@ fn where_nothing_switches_nothing_is_followed() {
 
 /// Everything learned from all frames.
 fn learned(made: &Made) -> (Sample, Learned, Vec<Option<Fitted>>) {
-    let frames = entries(&made.data, &made.windows);
+    let frames = entries(&made.data.stars(), &made.windows);
     let sample = Sample::collect(FIELD.len(), made.windows.size, &[], &frames).unwrap();
     let grid = Grid::new(sample.reach_px() + MARGIN_PX, KNOTS_PX);
     let taken: Vec<usize> = (0..made.data.frames.frames()).collect();
