@@ -11,11 +11,14 @@
 //! | [`quest`] | attitude from star vectors, one frame or a batch |
 //! | [`spectra`] | one-sided densities, coherence, lines, Allan deviations of error series |
 //! | [`fogm_fit`] | first-order Gauss-Markov processes: simulation, densities, fits |
+//! | [`block_regression`] | fits from sums over blocks of time: errors out of fold, honest variances |
+//! | [`coloured_noise`] | white and Gauss-Markov noise found, and removed by whitening filters |
 //! | [`star_tracker`] | the physics-based model: truth attitude in, centroids and attitude out |
 //! | [`effects`] | the catalogue of effects: how each acts, and what it leaves in a residual |
 //! | [`telemetry`] | bundles, models and results on disk |
 //! | [`scenarios`] | motions and skies: bundles simulated from a scenario |
 //! | [`imager`] | pixels: what the detector sees and the tracker reads out, an independent truth |
+//! | [`star_images`] | dark map, spots and centroids from raw windows |
 //! | [`assess`] | on-orbit noise from quaternions alone: rigid rotator, gyro, plateau |
 //! | [`closed_loop`] | residual, cause, better model |
 //! | [`comparison`] | residual, spectrum, fitted process and ensemble of a model beside a bundle |
@@ -68,8 +71,9 @@
 
 #[doc(inline)]
 pub use {
-    assess, centroid, closed_loop, comparison, distortion, effects, figures, focal_plane, fogm_fit,
-    imager, quest, report, scenarios, spectra, star_tracker, telemetry,
+    assess, block_regression, centroid, closed_loop, coloured_noise, comparison, distortion,
+    effects, figures, focal_plane, fogm_fit, imager, quest, report, scenarios, spectra,
+    star_tracker, telemetry,
 };
 
 /// The names that almost every program needs.

@@ -10,8 +10,8 @@
 
 use std::ops::Range;
 
-use crate::folds::Folds;
-use crate::star_data::median_step;
+use block_regression::Folds;
+use spectra::robust::median_step;
 
 /// About as many bins as an attitude series is cut into at most.
 pub(crate) const MOST: usize = 2400;

@@ -2,8 +2,8 @@
 //!
 //! What the search chose is refused where it stands in for a cause that is in no catalogue:
 //!
-//! - a description by variables explains the same and more ([`crate::stand_ins`]),
-//! - or an effect is not the same wherever it acts ([`crate::invariance`]),
+//! - a description by variables explains the same and more ([`crate::causes::stand_ins`]),
+//! - or an effect is not the same wherever it acts ([`crate::causes::invariance`]),
 //! - or more stars are misplaced than a catalogue has: something moves them all,
 //! - or it is next to nothing beside what no effect explains.
 //!
@@ -15,21 +15,26 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
+use block_regression::Folds;
 use effects::Candidate;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use crate::commonness::{self, Slow};
-use crate::description::{Described, Kept};
-use crate::empirical::Empirical;
 use crate::error::CloseError;
-use crate::folds::Folds;
-use crate::invariance::{Change, Changing, Inner, Way, changing};
 use crate::noise_effects;
+use crate::search::empirical::Empirical;
+use crate::search::selection::{columns_of, costs};
 use crate::search::{Found, borrowed, family, fit};
-use crate::selection::{columns_of, costs};
-use crate::stand_ins::{BY_FAR, Part, describe, stand_ins};
-use crate::star_evidence::StarEvidence;
-use crate::star_search::{Searched, attempt, declared_noise};
+use crate::star::evidence::StarEvidence;
+use crate::star::search::{Searched, attempt, declared_noise};
+use commonness::Slow;
+use description::{Described, Kept};
+use invariance::{Change, Changing, Inner, Way, changing};
+use stand_ins::{BY_FAR, Part, describe, stand_ins};
+
+pub(crate) mod commonness;
+pub(crate) mod description;
+pub(crate) mod invariance;
+mod stand_ins;
 
 /// Searches whose outcome is refused before one is taken as it is.
 const MOST_REFUSALS: usize = 10;

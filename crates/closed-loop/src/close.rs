@@ -15,12 +15,12 @@ use effects::Candidate;
 use telemetry::report::Report;
 use telemetry::{AttitudeResiduals, Bundle, DarkMap, Model, StarResiduals};
 
-use crate::attitude_loop;
+use crate::attitude;
 use crate::declared;
 use crate::error::CloseError;
-use crate::hypothesis::Questions;
+use crate::questions::hypothesis::Questions;
 use crate::situation::Situation;
-use crate::star_loop;
+use crate::star;
 
 /// Everything a run of the loop finds.
 #[derive(Clone, Debug)]
@@ -77,9 +77,9 @@ pub fn close_asking(
     let situation = Situation::join(model, bundle, questions)?;
     declared::refuse_on_images(&situation)?;
     if bundle.stars.is_some() {
-        star_loop::run(&situation, progress)
+        star::run(&situation, progress)
     } else {
-        attitude_loop::run(&situation, progress)
+        attitude::run(&situation, progress)
     }
 }
 

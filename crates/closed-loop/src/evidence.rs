@@ -6,11 +6,9 @@
 //!
 //! Not physics: an interface.
 
+use block_regression::{BlockGrams, Folds};
 use effects::Candidate;
 use nalgebra::DVector;
-
-use crate::folds::Folds;
-use crate::gram::BlockGrams;
 
 /// Amplitudes to predict with: of each fold from the others.
 #[derive(Clone, Debug)]
@@ -34,7 +32,7 @@ pub(crate) struct Residuals {
 pub(crate) trait Evidence: Sync {
     /// Prior precision of each nuisance column, 1/arcsec^2 (or free: 0).
     fn precision(&self) -> Vec<f64>;
-    /// Residual columns (see [`crate::fit::Layout`]).
+    /// Residual columns (see [`block_regression::Layout`]).
     fn residual_columns(&self) -> usize;
     /// First guess of the noise variance of a scalar of the design.
     fn variance_guess(&self) -> f64;

@@ -11,6 +11,7 @@
 
 use std::collections::BTreeMap;
 
+use block_regression::Fits;
 use effects::Surroundings;
 use nalgebra::DMatrix;
 use telemetry::report::{
@@ -19,14 +20,13 @@ use telemetry::report::{
 };
 use telemetry::{EffectEntry, EffectValue};
 
-use crate::empirical::EMPIRICAL;
 use crate::error::CloseError;
 use crate::evidence::Residuals;
-use crate::fit::Fits;
-use crate::hypothesis::Questions;
+use crate::questions::hypothesis::Questions;
 use crate::search::Found;
-use crate::selection::{FAMILY_ALPHA, columns_of, each};
-use crate::star_data::StarData;
+use crate::search::empirical::EMPIRICAL;
+use crate::search::selection::{FAMILY_ALPHA, columns_of, each};
+use crate::star::data::StarData;
 
 /// Shares within this factor are the same.
 const SAME: f64 = 3.0;
@@ -109,7 +109,7 @@ pub(crate) fn amplitudes_of(
     found: &Found,
     g: usize,
     set: &[usize],
-    estimate: &crate::fit::Estimate,
+    estimate: &block_regression::Estimate,
 ) -> (Vec<f64>, DMatrix<f64>) {
     let first: usize = found.candidates[..g]
         .iter()

@@ -22,22 +22,47 @@
 
 use std::collections::BTreeMap;
 
+use block_regression::{Folds, OutOfFold};
 use effects::Candidate;
+use star_images::{Formed, Stars, Variants};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 use telemetry::report::{Estimate, FoundEffect, Selector};
-use telemetry::{EffectEntry, EffectValue};
+use telemetry::{EffectEntry, EffectValue, WindowTable};
 
 use crate::close::Rival;
 use crate::error::CloseError;
 use crate::evidence::Evidence;
 use crate::figures;
-use crate::fit::OutOfFold;
-use crate::folds::Folds;
-use crate::images::{DARK_MAP, DARK_MAP_FILE, EFFECTIVE_PSF, Formed, Variants};
+use crate::search::selection::{FAMILY_ALPHA, columns_of};
 use crate::search::{Fitted, amplitudes, borrowed, fit};
-use crate::selection::{FAMILY_ALPHA, columns_of};
-use crate::star_data::StarData;
-use crate::star_evidence::StarEvidence;
+use crate::star::data::StarData;
+use crate::star::evidence::StarEvidence;
+
+/// Id of the effect in the catalogue.
+pub(crate) const DARK_MAP: &str = "dark_map";
+/// Id of the effect in the catalogue.
+pub(crate) const EFFECTIVE_PSF: &str = "effective_psf";
+/// The file that an adopted map is written to.
+const DARK_MAP_FILE: &str = "dark_map.csv";
+
+/// Dark map, spots and centroids from the raw windows, where these belong to the stars and are enough.
+pub(crate) fn form(data: &StarData, windows: &WindowTable, folds: &Folds) -> Option<Formed> {
+    // With directions of its own every star's constant is free, and a distortion
+    // fitted fold by fold would only add steps between the folds.
+    let expected = if data.free_directions {
+        &data.projected
+    } else {
+        &data.modelled
+    };
+    let stars = Stars {
+        camera: &data.camera,
+        frames: &data.frames,
+        stars: data.stars.len(),
+        star: &data.star,
+        expected_px: expected.each_ref().map(Vec::as_slice),
+    };
+    star_images::form(&stars, windows, &folds.fold_of_frame())
+}
 
 /// Centroids formed with or without a map.
 pub(crate) struct Side<'a> {

@@ -5,60 +5,45 @@
 //! model declares unknown, looks among the effects of the catalogue for those
 //! that the residual supports out of fold, and reports the error before and
 //! after on data that took no part in the fit.
+//!
+//! ```text
+//! close              the door: model and bundle joined (situation, declared), then stars or attitudes
+//! star  attitude     the two kinds of measurement, each with the order of its steps (run)
+//! evidence           what the search asks of either: sums over blocks, and residuals out of fold
+//! search             candidates, selection, refinement until it stands; terms without a cause
+//! causes             what speaks against a cause that was found, before it is named
+//! noise_effects      effects that move nothing and change the noise
+//! image_level        whether dark map and spots explain what raw windows show
+//! questions          what else it could be, what would tell, and what somebody asks by name
+//! unexplained        what no effect explains: lines, jumps, waves on the detector
+//! figures            findings turned into the report
+//! motion  bins       whether samples resolve a motion; long series as means over short stretches
+//! ```
+//!
+//! Regression, coloured noise and raw windows are crates of their own: [`block_regression`],
+//! [`coloured_noise`], [`star_images`].
 #![forbid(unsafe_code)]
 
-mod attitude_data;
-mod attitude_loop;
-mod attitude_search;
+mod attitude;
 mod bins;
 mod causes;
 mod close;
-mod coloured;
-mod common_noise;
-mod commonness;
-mod confusion;
 mod declared;
-mod description;
-mod directions;
-mod empirical;
 mod error;
 mod evidence;
 mod figures;
-mod fit;
-mod folds;
-mod frame_rotation;
-mod gram;
-mod hypothesis;
 mod image_level;
-mod images;
-mod instants;
-mod invariance;
-mod leftover;
-mod manoeuvre;
 mod motion;
 mod noise_effects;
-mod nuisance;
-mod own_attitude;
-mod pattern;
-mod reference_wander;
+mod questions;
 mod search;
-mod selection;
-mod settling;
 mod situation;
-mod spatial_errors;
-mod stand_ins;
-mod star_columns;
-mod star_data;
-mod star_evidence;
-mod star_loop;
-mod star_moments;
-mod star_search;
-mod star_series;
-mod star_weights;
+mod star;
+mod unexplained;
 
 pub use close::{Closed, Rival, close, close_asking};
 pub use error::CloseError;
-pub use hypothesis::Questions;
+pub use questions::hypothesis::Questions;
 
 /// Seeds of a trial of alarms and the most of them that may raise one: `seeds` and
 /// `most`, or as many as `BORESIGHT_SEEDS` says and 5 sigma above one in `rarity`.

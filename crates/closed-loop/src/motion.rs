@@ -21,8 +21,10 @@ mod around;
 
 pub(crate) use around::Around;
 
-use focal_plane::rotation_vector;
+use focal_plane::{AttitudeSource, rotation_vector};
 use nalgebra::{UnitQuaternion, Vector3};
+
+use crate::situation::Situation;
 
 /// Largest ratio of prediction error to step at which the motion is resolved.
 const RESOLVED: f64 = 0.3;
@@ -38,6 +40,22 @@ pub(crate) fn resolved(q: &[UnitQuaternion<f64>]) -> bool {
         count += 1;
     }
     count > 0 && error <= RESOLVED * RESOLVED * step
+}
+
+/// The reference as a motion around each frame, where its samples resolve one.
+pub(crate) fn resolved_motion(
+    situation: &Situation<'_>,
+    t_s: &[f64],
+) -> Option<Box<dyn AttitudeSource>> {
+    let reference = situation.reference.as_ref()?;
+    // Rates that were measured do not come from differences.
+    let known = situation
+        .bundle
+        .reference
+        .as_ref()
+        .is_some_and(|r| r.rates_rad_s.is_some());
+    (known || resolved(reference.quaternions()))
+        .then(|| Box::new(Around::new(reference, t_s)) as Box<dyn AttitudeSource>)
 }
 
 #[cfg(test)]

@@ -22,6 +22,7 @@ mod variance;
 
 use std::collections::BTreeMap;
 
+use block_regression::Folds;
 use focal_plane::Pixel;
 use star_tracker::StarView;
 use telemetry::report::{ConsideredEffect, Estimate, FoundEffect};
@@ -30,12 +31,11 @@ use telemetry::{EffectEntry, EffectValue};
 use crate::declared;
 use crate::error::CloseError;
 use crate::evidence::{Amplitudes, Evidence, Residuals};
-use crate::folds::Folds;
 use crate::search::Found;
-use crate::selection::columns_of;
+use crate::search::selection::columns_of;
 use crate::situation::Situation;
-use crate::star_data::StarData;
-use crate::star_evidence::StarEvidence;
+use crate::star::data::StarData;
+use crate::star::evidence::StarEvidence;
 pub(crate) use follows::{NoiseFollows, noise_follows};
 use judge::{Judged, SLOPE_AS_DECLARED, judge};
 use rows::{Row, Source};

@@ -9,15 +9,17 @@
 //! Source: variable projection (Golub & Pereyra 1973): linear amplitudes are
 //! solved for at every trial value of the non-linear ones.
 
+use block_regression::{BlockGrams, Design, Fits, Folds, Layout};
 use effects::{Candidate, Coefficient};
 use nalgebra::DVector;
 
 use crate::error::CloseError;
 use crate::evidence::{Amplitudes, Evidence};
-use crate::fit::{Fits, Layout};
-use crate::folds::Folds;
-use crate::gram::{BlockGrams, Design};
-use crate::selection::{Group, Selection, columns_of, select};
+use selection::{Group, Selection, columns_of, select};
+
+pub(crate) mod empirical;
+pub(crate) mod instants;
+pub(crate) mod selection;
 
 /// Amplitudes beyond this many plausible sigmas are not credible.
 const CREDIBLE: f64 = 20.0;

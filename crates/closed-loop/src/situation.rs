@@ -9,8 +9,8 @@ use focal_plane::{AttitudeSeries, Camera, Series};
 use telemetry::{Bundle, Model};
 
 use crate::error::CloseError;
-use crate::hypothesis::Questions;
-use crate::star_data::Star;
+use crate::questions::hypothesis::Questions;
+use crate::star::data::Star;
 
 /// Focal lengths that differ by more than this share are different trackers;
 /// rounded numbers in files differ by less.
@@ -121,6 +121,16 @@ impl<'a> Situation<'a> {
             .exposure_s
             .or(self.bundle.meta.tracker.exposure_s)
     }
+}
+
+/// Channels that an empirical term may follow.
+pub(crate) fn channels_of_interest(
+    channels: &BTreeMap<String, Series>,
+) -> impl Iterator<Item = (String, &Series)> {
+    channels
+        .iter()
+        .filter(|(name, _)| !["vx_", "vy_", "vz_"].iter().any(|v| name.starts_with(v)))
+        .map(|(name, series)| (name.clone(), series))
 }
 
 /// The better estimate as a series; rates given with it, or the gyro's where its

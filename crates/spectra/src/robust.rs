@@ -29,6 +29,19 @@ pub fn median(values: &mut Vec<f64>) -> Option<f64> {
     Some(0.5 * (lower + upper))
 }
 
+/// The median of the steps of a time grid, in its unit; `None` with fewer than two times.
+///
+/// ```
+/// // a gap is one step
+/// assert_eq!(spectra::robust::median_step(&[0.0, 0.5, 1.0, 9.0]), Some(0.5));
+/// assert_eq!(spectra::robust::median_step(&[3.0]), None);
+/// ```
+#[must_use]
+pub fn median_step(t_s: &[f64]) -> Option<f64> {
+    let mut steps: Vec<f64> = t_s.windows(2).map(|w| w[1] - w[0]).collect();
+    median(&mut steps)
+}
+
 /// Median and scaled median absolute deviation of the finite values.
 ///
 /// ```

@@ -19,8 +19,7 @@
 
 use focal_plane::{AttitudeSeries, AttitudeSource, rotation_from_vector, rotation_vector};
 use nalgebra::{UnitQuaternion, Vector3};
-
-use crate::star_data::median_step;
+use spectra::robust::median_step;
 
 /// Neighbours on each side, without and with rates.
 const SIDE: usize = 3;

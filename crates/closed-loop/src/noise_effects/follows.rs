@@ -15,17 +15,17 @@
 //!
 //! Source: Breusch & Pagan 1979, studentised by Koenker 1981; clusters as in Liang & Zeger 1986.
 
+use block_regression::Folds;
 use nalgebra::{Cholesky, DMatrix, DVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor, StudentsT};
 use telemetry::report::{Dependence, Unattributed};
 
 use super::rows::{Row, Source};
 use super::{NoiseEffects, declared_variance, quick};
-use crate::empirical::Variable;
 use crate::error::CloseError;
-use crate::folds::Folds;
+use crate::search::empirical::Variable;
 use crate::situation::Situation;
-use crate::star_evidence::StarEvidence;
+use crate::star::evidence::StarEvidence;
 
 /// Chance that any variable of a bundle is told although the noise follows none.
 const ALPHA: f64 = 0.001;

@@ -17,14 +17,14 @@
 //!
 //! Source: Wilks 1938; Liang & Zeger 1986; Satorra & Bentler 1994 (scaled ratio).
 
+use block_regression::Folds;
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
 
 use super::rows::Row;
 use super::variance::{
     Fit, LEVEL, MAGNITUDE, Model, PARAMETERS, RATE, SHARE, SIZE, Vector, logit, sigmoid,
 };
-use crate::folds::Folds;
-use crate::selection::FAMILY_ALPHA;
+use crate::search::selection::FAMILY_ALPHA;
 
 /// Effects that are tried.
 const TRIED: f64 = 3.0;

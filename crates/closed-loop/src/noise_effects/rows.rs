@@ -11,11 +11,11 @@
 //!
 //! Source: leverage in linear regression (Hoaglin & Welsch 1978).
 
+use block_regression::Folds;
 use nalgebra::{Matrix3, Vector3};
 
-use crate::folds::Folds;
-use crate::frame_rotation::rotation_row;
-use crate::star_data::StarData;
+use crate::star::data::StarData;
+use crate::star::frame_rotation::rotation_row;
 
 /// Fewest stars of a frame that leave something beside its rotation.
 const MIN_STARS: usize = 3;

@@ -1,10 +1,10 @@
+use block_regression::Folds;
 use rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal, StudentT, Uniform};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::judge::{Verdicts, judge};
 use super::rows::Row;
-use crate::folds::Folds;
 
 /// What acts on synthetic rows.
 #[derive(Clone, Copy, Default)]

@@ -19,11 +19,11 @@
 //! Source: maximum likelihood of a scale mixture; White 1980, Liang & Zeger 1986
 //! (sandwich over clusters); Berndt, Hall, Hall & Hausman 1974 (the ascent).
 
+use coloured_noise::LogProduct;
 use nalgebra::{Cholesky, SMatrix, SVector};
 use rayon::prelude::*;
 
 use super::rows::Row;
-use crate::coloured::LogProduct;
 
 /// Parameters: level a, magnitude b, rate w, share rho (logit), size S^2 (log).
 pub(super) const PARAMETERS: usize = 5;

@@ -1,0 +1,700 @@
+//! Out-of-fold fits and honest variances, all from the block Grams.
+//!
+//! With nuisance columns n (prior precision L), candidate columns c and the
+//! residual r, the nuisance is eliminated exactly (Schur complement):
+//!
+//! ```text
+//! W = (G_nn + L)^-1 G_n,[c r]      T = [ -W ; I ]
+//! S = G_cc - G_cn W_c              s = G_cr - G_cn W_r        beta = S^-1 s
+//! ```
+//!
+//! G is the sum over the training blocks. A held-out block b is judged with the
+//! nuisance *and* the amplitudes of the others: its squared error is the
+//! quadratic form of `[-beta, 1]` in `T^T G_b T`. The variance of beta is
+//! cluster-robust over blocks, which stays right when the leftovers are coloured
+//! on times shorter than a block and whatever the true noise level is:
+//!
+//! ```text
+//! V = S^-1 (g sum_b s_b s_b^T + v (S - sum_b S_b)) S^-1,   s_b = the score of block b at beta
+//! B = 1 / sum_b t_b^2,   t_b = mean over the diagonal of S_b / S, less its sum,   g = B / (B - 1)
+//! ```
+//!
+//! with B the number of blocks that hold the information: not all do where the motion
+//! comes in slews.
+//!
+//! How much wider than under white noise, m = eigenvalues of V over v S^-1, is known far
+//! better on average over p parameters than for each alone: p (B - 1) squares tell it
+//! instead of B - p. So beta is measured by white noise, and that by the mean of m,
+//!
+//! ```text
+//! Q = beta^T S beta / v      Q / sum m ~ F(p e, p e (B - 1)),   e = (sum m)^2 / (p sum m^2)
+//! ```
+//!
+//! and, where the m are unequal, no tail is let below that of the widest alone. Hotelling's
+//! T^2, which asks for all of V, loses a tenth of six-parameter effects of six standard errors.
+//!
+//! `S - sum_b S_b` is what the prior of the nuisance adds: a drawn distortion is
+//! one draw for all blocks, and its share of the score shows in none of them.
+//! Few blocks, or a column that lives in few of them, make V too small by chance:
+//! neither the standard error nor the p-value is let below that of white noise,
+//! v S^-1 and chi-squared of Q.
+//!
+//! What all columns say of m ([`moderation`]) enters V as a prior that counts for `d` blocks,
+//!
+//! ```text
+//! V' = (d m_0 v S^-1 + (B - 1) V) / (d + B - 1)      and B + d takes the place of B in F
+//! ```
+//!
+//! Frames that share nothing in time have independent noise but for what the data
+//! says otherwise: there d is given, with 1 for `m_0`.
+//!
+//! Source: Liang & Zeger 1986 (cluster-robust variance); Smyth 2004 (moderated variance);
+//! Box 1954 and Greenhouse & Geisser 1959 (F of unequal variances).
+
+use std::ops::Range;
+use std::sync::OnceLock;
+
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn, SymmetricEigen};
+use rayon::prelude::*;
+use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
+
+use crate::folds::Folds;
+use crate::gram::{BlockGrams, FoldSums, Gram};
+
+mod moderation;
+#[cfg(test)]
+mod tests;
+
+use moderation::Usual;
+
+/// Share of a column's squared length that has to be left: near zero, it is unobservable.
+const OBSERVABLE_SHARE: f64 = 1e-7;
+
+/// The columns of a Gram matrix, in their order: nuisance, candidates, residuals.
+#[derive(Clone, Debug, Default)]
+pub struct Layout {
+    /// Prior precision of each nuisance column, 1/variance of the column's amplitude; zero leaves it free.
+    pub nuisance_precision: Vec<f64>,
+    /// How many candidate columns follow the nuisance.
+    pub candidates: usize,
+    /// Residual columns: one, or one per fold and a last one for all data, where
+    /// what was measured depends on what was learned outside the fold.
+    pub residuals: usize,
+}
+
+impl Layout {
+    /// Candidate columns and the residual of `fold`.
+    fn picked(&self, fold: Option<usize>) -> Vec<usize> {
+        let n = self.nuisance_precision.len();
+        (n..n + self.candidates)
+            .chain([self.residual(fold)])
+            .collect()
+    }
+
+    /// The residual column that belongs to `fold` (`None`: all data).
+    pub fn residual(&self, fold: Option<usize>) -> usize {
+        let first = self.nuisance_precision.len() + self.candidates;
+        match fold {
+            _ if self.residuals == 1 => first,
+            Some(f) => first + f,
+            None => first + self.residuals - 1,
+        }
+    }
+}
+
+/// The nuisance eliminated on one training set.
+#[derive(Clone, Debug)]
+struct Eliminated {
+    /// W: nuisance amplitudes of each candidate column and of the residual, last.
+    nuisance: DMatrix<f64>,
+    /// Training Gram of the candidates and the residual (last), nuisance removed.
+    train: DMatrix<f64>,
+    /// What the prior adds to the diagonal of the nuisance's normal matrix.
+    prior: Vec<f64>,
+    /// ln det of the nuisance's normal matrix.
+    log_det: f64,
+    /// Training scalars.
+    scalars: f64,
+    /// Training scalars less the nuisance freedom.
+    freedom: f64,
+}
+
+impl Eliminated {
+    fn new(
+        (gram, scalars): &(DMatrix<f64>, f64),
+        layout: &Layout,
+        variance: f64,
+        pick: &[usize],
+    ) -> Option<Self> {
+        let n = layout.nuisance_precision.len();
+        let mut normal = gram.view((0, 0), (n, n)).into_owned();
+        // A column that nothing constrains (a gauge freedom, a star never seen in
+        // training) gets a precision far below what one scalar of data brings.
+        let floor = 1e-10 * normal.diagonal().max().max(f64::MIN_POSITIVE);
+        let priors = layout.nuisance_precision.iter();
+        let prior: Vec<f64> = priors.map(|p| p * variance + floor).collect();
+        for (k, prior) in prior.iter().enumerate() {
+            normal[(k, k)] += prior;
+        }
+        let cross = picked(gram, 0..n, pick);
+        let (nuisance, log_det) = if n == 0 {
+            (cross.clone(), 0.0)
+        } else {
+            let factor = Cholesky::new(normal)?;
+            (factor.solve(&cross), factor.ln_determinant())
+        };
+        let mut reduced = both(gram, pick);
+        reduced.gemm(-1.0, &cross.transpose(), &nuisance, 1.0);
+        // Columns under a tight prior cost less than one degree of freedom each;
+        // counting them whole is the cautious side.
+        let freedom = (scalars - n as f64).max(1.0);
+        Some(Self {
+            nuisance,
+            train: reduced,
+            prior,
+            log_det,
+            scalars: *scalars,
+            freedom,
+        })
+    }
+
+    /// Amplitudes of the candidate columns `set`, with prior precisions.
+    fn amplitudes(&self, set: &[usize]) -> Option<(DVector<f64>, Cholesky<f64, Dyn>)> {
+        let last = self.train.ncols() - 1;
+        let normal = DMatrix::from_fn(set.len(), set.len(), |i, j| self.train[(set[i], set[j])]);
+        let score = DVector::from_fn(set.len(), |i, _| self.train[(set[i], last)]);
+        if (0..set.len()).any(|i| normal[(i, i)].is_nan() || normal[(i, i)] <= 0.0) {
+            return None;
+        }
+        let factor = Cholesky::new(normal.clone())?;
+        // Collinear within rounding: the set cannot be told apart in this data.
+        let pivots = factor.l_dirty();
+        for i in 0..set.len() {
+            if pivots[(i, i)] * pivots[(i, i)] < 1e-9 * normal[(i, i)] {
+                return None;
+            }
+        }
+        let beta = factor.solve(&score);
+        Some((beta, factor))
+    }
+
+    /// Amplitudes of `set`, and the noise variance beside them.
+    fn trained(&self, set: &[usize]) -> Option<(DVector<f64>, f64)> {
+        let (beta, _) = self.amplitudes(set)?;
+        let last = self.train.ncols() - 1;
+        let explained: f64 = (0..set.len())
+            .map(|i| beta[i] * self.train[(set[i], last)])
+            .sum();
+        let freedom = (self.freedom - set.len() as f64).max(1.0);
+        let variance = (self.train[(last, last)] - explained) / freedom;
+        Some((beta, variance.max(f64::MIN_POSITIVE)))
+    }
+
+    /// Nuisance amplitudes of the residual less `beta` times `set`.
+    fn left(&self, set: &[usize], beta: &DVector<f64>) -> DVector<f64> {
+        less(&self.nuisance, set, beta)
+    }
+}
+
+/// The last column less `beta` times the columns `set`.
+fn less(columns: &DMatrix<f64>, set: &[usize], beta: &DVector<f64>) -> DVector<f64> {
+    let mut out = columns.column(columns.ncols() - 1).into_owned();
+    for (&c, b) in set.iter().zip(beta.iter()) {
+        out.axpy(-b, &columns.column(c), 1.0);
+    }
+    out
+}
+
+/// `T^T G T` for `T = [-W; I]` over the picked columns.
+fn transformed(gram: &DMatrix<f64>, n: usize, pick: &[usize], w: &DMatrix<f64>) -> DMatrix<f64> {
+    let cross = picked(gram, 0..n, pick);
+    // cross^T W and its transpose, and W^T G W, in one product: W^T (G W - 2 cross)
+    let mut inner = -2.0 * cross;
+    inner.gemm(1.0, &gram.view((0, 0), (n, n)), w, 1.0);
+    let mut out = both(gram, pick);
+    out.gemm(1.0, &w.transpose(), &inner, 1.0);
+    // the product above is symmetric but for its cross term
+    symmetric(out)
+}
+
+/// Mean of a matrix and its transpose.
+fn symmetric(mut m: DMatrix<f64>) -> DMatrix<f64> {
+    for j in 0..m.ncols() {
+        for i in 0..j {
+            let mean = 0.5 * (m[(i, j)] + m[(j, i)]);
+            m[(i, j)] = mean;
+            m[(j, i)] = mean;
+        }
+    }
+    m
+}
+
+/// Columns `pick` of some rows.
+fn picked(gram: &DMatrix<f64>, rows: Range<usize>, pick: &[usize]) -> DMatrix<f64> {
+    let mut out = DMatrix::zeros(rows.len(), pick.len());
+    for (&column, mut out) in pick.iter().zip(out.column_iter_mut()) {
+        out.copy_from(&gram.column(column).rows(rows.start, rows.len()));
+    }
+    out
+}
+
+/// Rows and columns `pick`: candidates in one run, then a residual.
+fn both(gram: &DMatrix<f64>, pick: &[usize]) -> DMatrix<f64> {
+    let run = pick.len() - 1;
+    let first = pick[0];
+    let mut out = DMatrix::zeros(pick.len(), pick.len());
+    for (&column, mut out) in pick.iter().zip(out.column_iter_mut()) {
+        let from = gram.column(column);
+        out.rows_mut(0, run).copy_from(&from.rows(first, run));
+        out[run] = from[pick[run]];
+    }
+    out
+}
+
+/// What a set of candidate columns does outside the folds it was fitted on.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct OutOfFold {
+    /// Squared error of each fold, or block, predicted from the other folds.
+    pub sse: Vec<f64>,
+    /// Log-likelihood of each, nats, noise variance from the other folds.
+    pub loglik: Vec<f64>,
+    /// Scalars of each.
+    pub scalars: Vec<f64>,
+}
+
+impl OutOfFold {
+    fn add(&mut self, error: f64, scalars: f64, variance: f64) {
+        let constant = (std::f64::consts::TAU * variance).ln();
+        self.sse.push(error);
+        self.loglik
+            .push(-0.5 * (scalars * constant + error / variance));
+        self.scalars.push(scalars);
+    }
+
+    /// Sum of the log-likelihoods, nats.
+    pub fn total_loglik(&self) -> f64 {
+        self.loglik.iter().sum()
+    }
+
+    /// Sum of the squared errors.
+    pub fn total_sse(&self) -> f64 {
+        self.sse.iter().sum()
+    }
+}
+
+/// A set of amplitudes from all data with their cluster-robust covariance.
+///
+/// An amplitude is in the unit of the residual over that of its column.
+#[derive(Clone, Debug)]
+pub struct Estimate {
+    /// One amplitude a column of the set.
+    pub value: DVector<f64>,
+    /// Its cluster-robust covariance.
+    pub covariance: DMatrix<f64>,
+    /// Its covariance if the noise were white.
+    pub white: DMatrix<f64>,
+    /// Blocks behind the covariance, those that its prior counts for included.
+    pub blocks: f64,
+}
+
+impl Estimate {
+    /// Probability that amplitudes `which` (positions in the set) are all zero
+    /// and yet as far from it as this; 1 where there are too few blocks to tell.
+    pub fn p_value(&self, which: &[usize]) -> f64 {
+        let (p, b) = (which.len() as f64, self.blocks);
+        if which.is_empty() || b <= p {
+            return 1.0;
+        }
+        let (Some(square), Some(wider)) = (self.square(which), self.wider(which)) else {
+            return 1.0;
+        };
+        let mean = wider.sum() / p;
+        let likeness = wider.sum().powi(2) / (p * wider.norm_squared());
+        let alike = f_tail(square / (p * mean), p * likeness, b);
+        let worst = f_tail(square / wider.max(), 1.0, b);
+        let white = ChiSquared::new(p).map_or(1.0, |law| law.sf(square));
+        alike.max(worst).max(white)
+    }
+
+    /// Squared distance of amplitudes `which` from zero if the noise were white.
+    pub fn square(&self, which: &[usize]) -> Option<f64> {
+        let value = DVector::from_fn(which.len(), |i, _| self.value[which[i]]);
+        let white = Cholesky::new(part(&self.white, which))?;
+        Some(value.dot(&white.solve(&value)))
+    }
+
+    /// How many times the variance of white noise the amplitudes `which` really have,
+    /// along the directions in which that is a number.
+    pub fn wider(&self, which: &[usize]) -> Option<DVector<f64>> {
+        let root = Cholesky::new(part(&self.white, which))?.l();
+        let half = root.solve_lower_triangular(&part(&self.covariance, which))?;
+        let whole = root.solve_lower_triangular(&half.transpose())?;
+        let values = SymmetricEigen::new(symmetric(whole)).eigenvalues;
+        (values.max() > 0.0).then_some(values)
+    }
+
+    /// The cluster-robust covariance with no variance below that of white noise.
+    pub fn cautious_covariance(&self) -> DMatrix<f64> {
+        let stretch =
+            |k: usize| self.sigma(k) / self.covariance[(k, k)].sqrt().max(f64::MIN_POSITIVE);
+        DMatrix::from_fn(self.value.len(), self.value.len(), |i, j| {
+            stretch(i) * self.covariance[(i, j)] * stretch(j)
+        })
+    }
+
+    /// Standard error of amplitude `k`.
+    pub fn sigma(&self, k: usize) -> f64 {
+        self.covariance[(k, k)]
+            .max(self.white[(k, k)])
+            .max(0.0)
+            .sqrt()
+    }
+}
+
+/// Rows and columns `which`.
+fn part(matrix: &DMatrix<f64>, which: &[usize]) -> DMatrix<f64> {
+    DMatrix::from_fn(which.len(), which.len(), |i, j| {
+        matrix[(which[i], which[j])]
+    })
+}
+
+/// Chance of F beyond `f` with `p` parameters, each with a variance from `blocks` blocks.
+fn f_tail(f: f64, p: f64, blocks: f64) -> f64 {
+    FisherSnedecor::new(p, p * (blocks - 1.0)).map_or(1.0, |law| law.sf(f))
+}
+
+/// All fits that a choice among candidates needs, on one set of Grams.
+///
+/// A `set` holds numbers of candidate columns, each once, from 0 on.
+#[derive(Clone, Debug)]
+pub struct Fits {
+    layout: Layout,
+    folds: Vec<Eliminated>,
+    /// Gram of each fold in the columns of its fit, and its scalars.
+    held: Vec<(DMatrix<f64>, f64)>,
+    all: Eliminated,
+    grams: BlockGrams,
+    fold_of_block: Vec<usize>,
+    /// `G W - 2 G_nc` of each block with W of all data: what makes T^T G T of any few columns.
+    inner: Vec<DMatrix<f64>>,
+    /// [`Folds::prior_blocks`].
+    prior: f64,
+    /// What all columns say of the noise, once it is asked for.
+    usual: OnceLock<Usual>,
+}
+
+/// Amplitudes and how they scatter from block to block.
+struct Scatter {
+    value: DVector<f64>,
+    /// V of the module's header.
+    robust: DMatrix<f64>,
+    white: DMatrix<f64>,
+    /// Blocks that hold the information.
+    blocks: f64,
+}
+
+impl Fits {
+    /// Eliminates the nuisance in every fold and on all data. `variance` is the
+    /// noise variance of a scalar, which turns prior precisions into the unit of
+    /// the Gram. `None` if the nuisance itself is singular. `grams` and `folds` have
+    /// the same blocks.
+    pub fn new(grams: &BlockGrams, folds: &Folds, layout: &Layout, variance: f64) -> Option<Self> {
+        Self::of(grams, &grams.by_fold(folds), folds, layout, variance)
+    }
+
+    /// As [`new`](Self::new) where the sums over the folds are there already.
+    pub fn of(
+        grams: &BlockGrams,
+        sums: &FoldSums,
+        folds: &Folds,
+        layout: &Layout,
+        variance: f64,
+    ) -> Option<Self> {
+        let n = layout.nuisance_precision.len();
+        let by_fold = (0..folds.count)
+            .into_par_iter()
+            .map(|f| {
+                let pick = layout.picked(Some(f));
+                let fold = Eliminated::new(&sums.without(f), layout, variance, &pick)?;
+                let (own, scalars) = &sums.fold[f];
+                let held = transformed(own, n, &pick, &fold.nuisance);
+                Some((fold, (held, *scalars)))
+            })
+            .collect::<Option<Vec<_>>>()?;
+        let (by_fold, held) = by_fold.into_iter().unzip();
+        let pick = layout.picked(None);
+        let all = Eliminated::new(&sums.all, layout, variance, &pick)?;
+        let inner = grams
+            .gram
+            .par_iter()
+            .map(|g| g.inner(&all.nuisance, &pick))
+            .collect();
+        Some(Self {
+            layout: layout.clone(),
+            folds: by_fold,
+            held,
+            all,
+            grams: grams.clone(),
+            fold_of_block: folds.fold_of_block.clone(),
+            inner,
+            prior: folds.prior_blocks,
+            usual: OnceLock::new(),
+        })
+    }
+
+    /// Noise variance of a scalar where no candidate is in the model, from a first guess.
+    pub fn noise_alone(sums: &FoldSums, layout: &Layout, guess: f64) -> Option<f64> {
+        let (gram, scalars) = &sums.all;
+        let n = layout.nuisance_precision.len();
+        let kept: Vec<usize> = (0..n).chain(n + layout.candidates..gram.ncols()).collect();
+        let alone = gram.select_columns(&kept).select_rows(&kept);
+        let layout = Layout {
+            candidates: 0,
+            ..layout.clone()
+        };
+        let alone = BlockGrams {
+            gram: vec![Gram::whole(alone)],
+            scalars: vec![*scalars],
+            log_scale: 0.0,
+            known: None,
+        };
+        Self::whole(&alone, &layout, guess)?.variance(&[])
+    }
+
+    /// As [`new`](Self::new), on all data alone: for what asks nothing of folds and blocks. Neither
+    /// [`estimate`](Self::estimate) nor the errors out of fold are to be had then.
+    pub fn whole(grams: &BlockGrams, layout: &Layout, variance: f64) -> Option<Self> {
+        let all = Eliminated::new(&grams.total(), layout, variance, &layout.picked(None))?;
+        Some(Self {
+            layout: layout.clone(),
+            folds: Vec::new(),
+            held: Vec::new(),
+            all,
+            grams: grams.clone(),
+            fold_of_block: Vec::new(),
+            inner: Vec::new(),
+            prior: 0.0,
+            usual: OnceLock::new(),
+        })
+    }
+
+    /// Amplitudes of all nuisance columns and then of the candidate columns `set`, from all data.
+    pub fn solution(&self, set: &[usize]) -> Option<DVector<f64>> {
+        let (beta, _) = self.all.amplitudes(set)?;
+        let nuisance = self.nuisance(None, set, &beta);
+        Some(DVector::from_iterator(
+            nuisance.len() + beta.len(),
+            nuisance.iter().chain(beta.iter()).copied(),
+        ))
+    }
+
+    /// Out-of-fold error of the candidate columns `set`, fold by fold; `None` if they cannot
+    /// be told apart in some fold.
+    pub fn out_of_fold(&self, set: &[usize]) -> Option<OutOfFold> {
+        let mut out = OutOfFold::default();
+        for (fold, (gram, scalars)) in self.folds.iter().zip(&self.held) {
+            let (beta, variance) = fold.trained(set)?;
+            out.add(quadratic(gram, set, &beta), *scalars, variance);
+        }
+        Some(out)
+    }
+
+    /// As [`out_of_fold`](Self::out_of_fold), block by block.
+    pub fn out_of_fold_by_block(&self, set: &[usize]) -> Option<OutOfFold> {
+        let n = self.layout.nuisance_precision.len();
+        let trained: Vec<(DVector<f64>, f64)> = (0..self.folds.len())
+            .map(|f| {
+                let fold = &self.folds[f];
+                let (beta, variance) = fold.trained(set)?;
+                let residual = self.layout.residual(Some(f));
+                let mut z = DVector::zeros(n + self.layout.candidates + self.layout.residuals);
+                z[residual] = 1.0;
+                for (&c, b) in set.iter().zip(beta.iter()) {
+                    z[n + c] = -b;
+                }
+                z.rows_mut(0, n).axpy(-1.0, &fold.left(set, &beta), 1.0);
+                Some((z, variance))
+            })
+            .collect::<Option<_>>()?;
+        let mut out = OutOfFold::default();
+        for (b, &f) in self.fold_of_block.iter().enumerate() {
+            let (z, variance) = &trained[f];
+            let error = self.grams.gram[b].quadratic(z).max(0.0);
+            out.add(error, self.grams.scalars[b], *variance);
+        }
+        Some(out)
+    }
+
+    /// Log-likelihood of all data at the best amplitudes of `set`, the nuisance
+    /// integrated out under its prior; scalars have unit variance. Up to a constant
+    /// of the prior, nats.
+    pub fn log_marginal(&self, set: &[usize]) -> Option<f64> {
+        let sse = self.error(set)?;
+        let constant = self.all.scalars * std::f64::consts::TAU.ln();
+        Some(-0.5 * (sse + self.all.log_det + constant))
+    }
+
+    /// Amplitudes of `set` in the training data of `fold`: all others.
+    pub fn amplitudes_without(&self, fold: usize, set: &[usize]) -> Option<DVector<f64>> {
+        self.folds[fold].amplitudes(set).map(|(beta, _)| beta)
+    }
+
+    /// Nuisance amplitudes that go with `beta` on `set`, in the training data of `fold`
+    /// (`None`: all data).
+    pub fn nuisance(
+        &self,
+        fold: Option<usize>,
+        set: &[usize],
+        beta: &DVector<f64>,
+    ) -> DVector<f64> {
+        let eliminated = fold.map_or(&self.all, |f| &self.folds[f]);
+        eliminated.left(set, beta)
+    }
+
+    /// Joint estimate of `set` on all data; `None` if its columns cannot be told apart.
+    pub fn estimate(&self, set: &[usize]) -> Option<Estimate> {
+        if self.inner.len() != self.grams.gram.len() {
+            return None;
+        }
+        let own = self.scatter(set)?;
+        let Usual { wider, blocks: d } = if self.prior > 0.0 {
+            Usual {
+                wider: 1.0,
+                blocks: self.prior,
+            }
+        } else {
+            *self.usual.get_or_init(|| self.usual())
+        };
+        let freedom = (own.blocks - 1.0).max(0.0);
+        let covariance = if d > 0.0 {
+            (&own.white * (d * wider) + own.robust * freedom) / (d + freedom)
+        } else {
+            own.robust
+        };
+        Some(Estimate {
+            value: own.value,
+            covariance,
+            white: own.white,
+            blocks: own.blocks + d,
+        })
+    }
+
+    /// Takes what `all` says of the noise for its own: more columns say more.
+    pub fn scatter_as(&mut self, all: &Self) {
+        self.usual = OnceLock::from(*all.usual.get_or_init(|| all.usual()));
+    }
+
+    /// What all columns, each alone, say of the noise.
+    fn usual(&self) -> Usual {
+        let columns: Vec<(f64, f64)> = (0..self.layout.candidates)
+            .into_par_iter()
+            .filter(|&c| self.shows(c))
+            .filter_map(|c| self.scatter(&[c]))
+            .map(|own| (own.robust[(0, 0)] / own.white[(0, 0)], own.blocks - 1.0))
+            .collect();
+        Usual::of(&columns, self.grams.gram.len() as f64)
+    }
+
+    fn scatter(&self, set: &[usize]) -> Option<Scatter> {
+        let (value, factor) = self.all.amplitudes(set)?;
+        let n = self.layout.nuisance_precision.len();
+        let residual = self.layout.residual(None);
+        let p = set.len();
+        // M = T^T G T of a block: M_ij = G_ij + (W_i inner_j + inner_i W_j) / 2
+        let w = &self.all.nuisance;
+        let left = self.all.left(set, &value);
+        let mut spread = DMatrix::zeros(p, p);
+        let (mut shares, mut squares) = (0.0, 0.0);
+        for (gram, inner) in self.grams.gram.iter().zip(&self.inner) {
+            let within = less(inner, set, &value);
+            let score = DVector::from_fn(p, |i, _| {
+                let row = n + set[i];
+                let own = (0..p)
+                    .map(|j| gram.at(row, n + set[j]) * value[j])
+                    .sum::<f64>();
+                let cross = w.column(set[i]).dot(&within) + inner.column(set[i]).dot(&left);
+                gram.at(row, residual) - own + 0.5 * cross
+            });
+            spread.ger(1.0, &score, &score, 1.0);
+            let share: f64 = set
+                .iter()
+                .map(|&c| {
+                    let own = gram.at(n + c, n + c) + w.column(c).dot(&inner.column(c));
+                    own.max(0.0) / self.all.train[(c, c)]
+                })
+                .sum();
+            shares += share;
+            squares += share * share;
+        }
+        // as many equal blocks would hold as much
+        let blocks = shares * shares / f64::max(squares, f64::MIN_POSITIVE);
+        // the amplitudes take their part of every block's score
+        spread *= blocks / (blocks - 1.0).max(1.0);
+        let variance = self.variance(set)?;
+        // S less the sum of M is what the prior adds
+        for i in 0..p {
+            for j in 0..p {
+                let prior: f64 = (0..n)
+                    .map(|k| self.all.prior[k] * w[(k, set[i])] * w[(k, set[j])])
+                    .sum();
+                spread[(i, j)] += variance * prior;
+            }
+        }
+        let inverse = factor.inverse();
+        Some(Scatter {
+            robust: &inverse * spread * &inverse,
+            white: inverse * variance,
+            value,
+            blocks,
+        })
+    }
+
+    /// Whether anything is left of a column once the nuisance is out.
+    pub fn shows(&self, c: usize) -> bool {
+        let n = self.layout.nuisance_precision.len();
+        let raw: f64 = self.grams.gram.iter().map(|g| g.at(n + c, n + c)).sum();
+        raw > 0.0 && self.information(c) > OBSERVABLE_SHARE * raw
+    }
+
+    /// Correlation between two candidate columns once the nuisance is out: how alike two
+    /// one-parameter effects look in this data.
+    pub fn likeness(&self, a: usize, b: usize) -> f64 {
+        let s = &self.all.train;
+        let norm = (s[(a, a)] * s[(b, b)]).sqrt();
+        if norm > 0.0 { s[(a, b)] / norm } else { 0.0 }
+    }
+
+    /// What is left of the squared length of a candidate column once the nuisance is out: where that is
+    /// next to nothing of what it was before, its amplitude is unobservable.
+    pub fn information(&self, c: usize) -> f64 {
+        self.all.train[(c, c)]
+    }
+
+    /// Noise variance of a scalar on all data with `set` in the model.
+    pub fn variance(&self, set: &[usize]) -> Option<f64> {
+        Some(self.error(set)? / (self.all.freedom - set.len() as f64).max(1.0))
+    }
+
+    /// Squared error of all data at the best amplitudes of `set`.
+    pub fn error(&self, set: &[usize]) -> Option<f64> {
+        let (beta, _) = self.all.amplitudes(set)?;
+        let last = self.all.train.ncols() - 1;
+        let explained: f64 = (0..set.len())
+            .map(|i| beta[i] * self.all.train[(set[i], last)])
+            .sum();
+        Some(self.all.train[(last, last)] - explained)
+    }
+}
+
+/// Squared error of a block: `[-beta, 1] G [-beta, 1]^T`.
+fn quadratic(gram: &DMatrix<f64>, set: &[usize], beta: &DVector<f64>) -> f64 {
+    let last = gram.ncols() - 1;
+    let mut error = gram[(last, last)];
+    for (i, &a) in set.iter().enumerate() {
+        error -= 2.0 * beta[i] * gram[(a, last)];
+        for (j, &b) in set.iter().enumerate() {
+            error += beta[i] * beta[j] * gram[(a, b)];
+        }
+    }
+    error.max(0.0)
+}

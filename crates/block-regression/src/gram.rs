@@ -1,0 +1,246 @@
+//! Normal equations, accumulated in one pass, block by block.
+//!
+//! ```text
+//! G_b = sum over the scalars of block b of c c^T,   c = [ nuisance | candidates | residuals ]
+//! ```
+//!
+//! Everything that selection asks afterwards (a fit on four folds, the squared
+//! error on the fifth, a cluster-robust variance) is algebra on these matrices,
+//! so that the data is read once however many sets of effects are tried. The
+//! blocks are summed in parallel, each in its own order: the result does not
+//! depend on the number of threads.
+//!
+//! Not physics: linear least squares.
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+use crate::folds::Folds;
+
+/// Scalars handed to the matrix product at once: large enough that the product
+/// dominates, small enough to stay in cache.
+const CHUNK_FRAMES: usize = 32;
+
+/// A source of design rows: scalars (one per axis of a measurement) by columns.
+pub trait Design: Sync {
+    /// Columns of each row: nuisance, then candidates, then residuals.
+    fn width(&self) -> usize;
+    /// Writes the scalars of `frames` into `out`, resized by the callee to
+    /// scalars x [`width`](Self::width), and returns how many of them count: a
+    /// masked scalar is a row of zeros.
+    fn fill(&self, frames: Range<usize>, out: &mut DMatrix<f64>) -> usize;
+}
+
+/// The Gram matrix of one block,
+///
+/// ```text
+/// G = weight M + E^T E
+/// ```
+///
+/// with a matrix M that fits at several noises share, and a few rows E that are one noise's own.
+#[derive(Clone, Debug)]
+pub struct Gram {
+    weight: f64,
+    shared: Arc<DMatrix<f64>>,
+    rows: Arc<DMatrix<f64>>,
+}
+
+impl Gram {
+    /// `weight * shared + rows^T rows`; `shared` is symmetric, width x width, and `rows` any number x width.
+    pub fn new(weight: f64, shared: Arc<DMatrix<f64>>, rows: DMatrix<f64>) -> Self {
+        Self {
+            weight,
+            shared,
+            rows: Arc::new(rows),
+        }
+    }
+
+    /// A matrix as it is: symmetric, width x width.
+    pub fn whole(shared: impl Into<Arc<DMatrix<f64>>>) -> Self {
+        let shared = shared.into();
+        let rows = DMatrix::zeros(0, shared.ncols());
+        Self::new(1.0, shared, rows)
+    }
+
+    pub(crate) fn at(&self, i: usize, j: usize) -> f64 {
+        self.weight * self.shared[(i, j)] + self.rows.column(i).dot(&self.rows.column(j))
+    }
+
+    /// `z^T G z`.
+    pub(crate) fn quadratic(&self, z: &DVector<f64>) -> f64 {
+        let own = (&*self.rows * z).norm_squared();
+        self.weight * z.dot(&(&*self.shared * z)) + own
+    }
+
+    /// `G_n W - 2 G_nc` with the first columns n and the columns c.
+    pub(crate) fn inner(&self, w: &DMatrix<f64>, columns: &[usize]) -> DMatrix<f64> {
+        let n = w.nrows();
+        let mut out = DMatrix::zeros(n, columns.len());
+        for (&column, mut out) in columns.iter().zip(out.column_iter_mut()) {
+            out.axpy(
+                -2.0 * self.weight,
+                &self.shared.column(column).rows(0, n),
+                0.0,
+            );
+        }
+        out.gemm(self.weight, &self.shared.view((0, 0), (n, n)), w, 1.0);
+        if self.rows.nrows() > 0 {
+            let first = self.rows.columns(0, n);
+            let mut left = self.rows.select_columns(columns);
+            left.gemm(1.0, &first, w, -2.0);
+            out.gemm(1.0, &first.transpose(), &left, 1.0);
+        }
+        out
+    }
+
+    /// Adds what lies below the diagonal, M only where it is not `known`.
+    fn add_to(&self, sum: &mut DMatrix<f64>, known: bool) {
+        if !known {
+            for (sum, own) in sum.iter_mut().zip(self.shared.iter()) {
+                *sum += self.weight * own;
+            }
+        }
+        if self.rows.nrows() > 0 {
+            add_products(1.0, &self.rows, sum);
+        }
+    }
+}
+
+/// Columns of a product that are formed at once.
+const PANEL: usize = 96;
+
+/// Adds `factor E^T E` to `sum`, where it lies on the diagonal and below; above, `sum` may change too and means
+/// nothing. `rows` is E, any number x n; `sum` is n x n.
+pub fn add_products(factor: f64, rows: &DMatrix<f64>, sum: &mut DMatrix<f64>) {
+    let (flipped, n) = (rows.transpose(), rows.ncols());
+    for start in (0..n).step_by(PANEL) {
+        let panel = PANEL.min(n - start);
+        let below = flipped.rows(start, n - start);
+        sum.view_mut((start, start), (n - start, panel)).gemm(
+            factor,
+            &below,
+            &rows.columns(start, panel),
+            1.0,
+        );
+    }
+}
+
+/// Gram matrices per block.
+#[derive(Clone, Debug)]
+pub struct BlockGrams {
+    /// One a block, width x width.
+    pub gram: Vec<Gram>,
+    /// How many scalars each block holds.
+    pub scalars: Vec<f64>,
+    /// What the log-likelihood of the scalars lacks to that of the measurements in their own unit, nats: scalars
+    /// may have been whitened. No fit uses it.
+    pub log_scale: f64,
+    /// Where it is known, the sum of M over the blocks of each fold; the weight is then the same in all blocks.
+    pub known: Option<Arc<Vec<DMatrix<f64>>>>,
+}
+
+/// Sums of Gram matrices and scalars over the blocks of each fold, and over all.
+#[derive(Clone, Debug)]
+pub struct FoldSums {
+    /// Gram matrix and number of scalars of each fold.
+    pub fold: Vec<(DMatrix<f64>, f64)>,
+    /// The same of all folds.
+    pub all: (DMatrix<f64>, f64),
+}
+
+impl FoldSums {
+    /// The sum over all folds but one: a sum, not a difference, so that a column which lives in that fold
+    /// alone is exactly nothing.
+    pub(crate) fn without(&self, fold: usize) -> (DMatrix<f64>, f64) {
+        let others = self.fold.iter().enumerate().filter(|(f, _)| *f != fold);
+        sum(self.all.0.nrows(), others.map(|(_, s)| s))
+    }
+}
+
+fn sum<'a>(
+    width: usize,
+    parts: impl Iterator<Item = &'a (DMatrix<f64>, f64)>,
+) -> (DMatrix<f64>, f64) {
+    let mut out = (DMatrix::zeros(width, width), 0.0);
+    for (gram, scalars) in parts {
+        out.0 += gram;
+        out.1 += scalars;
+    }
+    out
+}
+
+impl BlockGrams {
+    /// One pass over `design`, blocks in parallel.
+    pub fn accumulate(design: &dyn Design, folds: &Folds) -> Self {
+        let width = design.width();
+        let blocks = folds.blocks.par_iter().map(|block| {
+            let mut gram = DMatrix::zeros(width, width);
+            let mut rows = DMatrix::zeros(0, width);
+            let mut scalars = 0;
+            let mut at = block.start;
+            while at < block.end {
+                let end = (at + CHUNK_FRAMES).min(block.end);
+                scalars += design.fill(at..end, &mut rows);
+                gram.gemm(1.0, &rows.transpose(), &rows, 1.0);
+                at = end;
+            }
+            (Gram::whole(gram), scalars as f64)
+        });
+        let (gram, scalars) = blocks.unzip();
+        Self {
+            gram,
+            scalars,
+            log_scale: 0.0,
+            known: None,
+        }
+    }
+
+    fn width(&self) -> usize {
+        self.gram.first().map_or(0, |g| g.shared.ncols())
+    }
+
+    /// The sums over the folds.
+    pub fn by_fold(&self, folds: &Folds) -> FoldSums {
+        let of = &folds.fold_of_block;
+        let fold: Vec<_> = (0..folds.count)
+            .into_par_iter()
+            .map(|f| {
+                let known = self.known.as_ref().map(|known| &known[f]);
+                self.sum(|b| of[b] == f, known)
+            })
+            .collect();
+        FoldSums {
+            all: sum(self.width(), fold.iter()),
+            fold,
+        }
+    }
+
+    /// The sum over all blocks.
+    pub fn total(&self) -> (DMatrix<f64>, f64) {
+        self.sum(|_| true, None)
+    }
+
+    /// The sum over the blocks for which `wanted` is true, over which the sum of M may be `known`.
+    fn sum(
+        &self,
+        wanted: impl Fn(usize) -> bool,
+        known: Option<&DMatrix<f64>>,
+    ) -> (DMatrix<f64>, f64) {
+        let width = self.width();
+        let mut gram = match (known, self.gram.first()) {
+            // the blocks are of one noise
+            (Some(known), Some(gram)) => known * gram.weight,
+            _ => DMatrix::zeros(width, width),
+        };
+        let mut scalars = 0.0;
+        for b in (0..self.gram.len()).filter(|&b| wanted(b)) {
+            self.gram[b].add_to(&mut gram, known.is_some());
+            scalars += self.scalars[b];
+        }
+        gram.fill_upper_triangle_with_lower_triangle();
+        (gram, scalars)
+    }
+}

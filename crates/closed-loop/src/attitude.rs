@@ -1,0 +1,17 @@
+//! Attitudes as the measurement: the tracker's own against a better one.
+//!
+//! ```text
+//! run             the order of the steps, from bundle to report
+//! data            the rotation between both, axis by axis, as evidence for the search
+//! search          every hypothesis with its own noise
+//! spatial_errors  what the declared model itself makes of crossing and changing stars
+//! ```
+//!
+//! Not physics: the contents of a folder.
+
+pub(crate) mod data;
+mod run;
+mod search;
+pub(crate) mod spatial_errors;
+
+pub(crate) use run::run;

@@ -1,0 +1,336 @@
+//! Attitude measurements against a reference: the residual rotation per axis.
+//!
+//! ```text
+//! theta = log(q_measured q_reference^-1)       rad, tracker axes; arcsec here
+//! ```
+//!
+//! Each axis is whitened by its own noise, so that a noisy boresight axis does not
+//! drown the others and a slow error of the reference is no trend.
+//!
+//! Source: [M23] Section 4 (residuals by differencing quaternions).
+
+use std::ops::Range;
+
+use block_regression::{BlockGrams, Design, Folds};
+use coloured_noise::Coloured;
+use effects::{AttitudeRows, Candidate};
+use focal_plane::{ARCSEC_PER_RAD, AttitudeResidual, AttitudeSeries, AttitudeSource, VectorsMut};
+use nalgebra::{DMatrix, UnitQuaternion};
+use star_tracker::Disturbance;
+
+use crate::bins::{Bins, MOST};
+use crate::evidence::{Amplitudes, Evidence, Residuals};
+
+/// Rows of attitude residuals, structure of arrays.
+#[derive(Clone, Debug)]
+pub(crate) struct AttitudeData {
+    pub(crate) t_s: Vec<f64>,
+    /// Residual per axis, arcsec.
+    pub(crate) theta: [Vec<f64>; 3],
+    /// Rate per axis, rad/s; zero where unknown.
+    pub(crate) rate: [Vec<f64>; 3],
+    /// Rows left out, per axis.
+    pub(crate) outlier: [Vec<bool>; 3],
+    /// How the rows are averaged for the search.
+    pub(crate) bins: Bins,
+    /// Rows that count in each bin, per axis; fresh after [`Self::rebin`].
+    pub(crate) count: [Vec<f64>; 3],
+    /// Rows set aside because the reference does not cover them.
+    pub(crate) outside_reference: usize,
+}
+
+impl AttitudeData {
+    /// Differences `q` (at `t_s`) against the reference.
+    pub(crate) fn against(
+        t_s: &[f64],
+        q: &[UnitQuaternion<f64>],
+        reference: &AttitudeSeries,
+    ) -> Self {
+        let mut data = Self {
+            t_s: Vec::new(),
+            theta: Default::default(),
+            rate: Default::default(),
+            outlier: Default::default(),
+            bins: Bins::cut(&[], &Folds::cut(0), MOST),
+            count: Default::default(),
+            outside_reference: 0,
+        };
+        let residual = AttitudeResidual::against(t_s, q, reference);
+        for &t in &residual.t_s {
+            let rate = reference.rate_rad_s(t).unwrap_or_default();
+            for axis in 0..3 {
+                data.rate[axis].push(rate[axis]);
+                data.outlier[axis].push(false);
+            }
+        }
+        data.theta = residual
+            .theta_rad
+            .map(|axis| axis.iter().map(|theta| theta * ARCSEC_PER_RAD).collect());
+        data.t_s = residual.t_s;
+        data.outside_reference = residual.outside_reference;
+        data
+    }
+
+    /// Takes off what a declared effect does to the attitude as a whole.
+    pub(crate) fn subtract(&mut self, effect: &dyn Disturbance) {
+        if !effect.stages().attitude {
+            return;
+        }
+        for (k, &t) in self.t_s.iter().enumerate() {
+            let theta = effect.misalignment_rad(t) * ARCSEC_PER_RAD;
+            for axis in 0..3 {
+                self.theta[axis][k] -= theta[axis];
+            }
+        }
+    }
+
+    /// Cuts the bins and counts what counts in them.
+    pub(crate) fn rebin(&mut self, folds: &Folds) {
+        self.bins = Bins::cut(&self.t_s, folds, MOST);
+        self.count = std::array::from_fn(|axis| {
+            let kept =
+                |rows: &Range<usize>| rows.clone().filter(|&k| !self.outlier[axis][k]).count();
+            self.bins
+                .rows
+                .iter()
+                .map(|rows| kept(rows) as f64)
+                .collect()
+        });
+    }
+
+    /// Means over the bins of one axis of a series of rows; 0 where nothing counts.
+    pub(crate) fn binned(&self, axis: usize, values: &[f64]) -> Vec<f64> {
+        let mean = |rows: &Range<usize>, count: f64| {
+            let sum: f64 = rows
+                .clone()
+                .filter(|&k| !self.outlier[axis][k])
+                .map(|k| values[k])
+                .sum();
+            if count > 0.0 { sum / count } else { 0.0 }
+        };
+        self.bins
+            .rows
+            .iter()
+            .zip(&self.count[axis])
+            .map(|(rows, &count)| mean(rows, count))
+            .collect()
+    }
+
+    /// Rows as effects see them.
+    pub(crate) fn rows<'a>(
+        &'a self,
+        rows: Range<usize>,
+        attitude: Option<&'a dyn AttitudeSource>,
+    ) -> AttitudeRows<'a> {
+        AttitudeRows {
+            t_s: &self.t_s[rows.clone()],
+            wx_rad_s: &self.rate[0][rows.clone()],
+            wy_rad_s: &self.rate[1][rows.clone()],
+            wz_rad_s: &self.rate[2][rows],
+            attitude,
+        }
+    }
+}
+
+/// Attitude residuals as evidence: a constant an axis, coloured noise an axis.
+pub(crate) struct AttitudeEvidence<'a> {
+    pub(crate) data: &'a AttitudeData,
+    /// 1 sigma of each constant, arcsec; infinite = free.
+    pub(crate) constant_sigma: [f64; 3],
+    /// Noise of each axis: rows are whitened with it.
+    pub(crate) noise: [Coloured; 3],
+    pub(crate) motion: Option<&'a dyn AttitudeSource>,
+}
+
+impl AttitudeEvidence<'_> {
+    /// Binned residuals with each fold's own constants and amplitudes, as the
+    /// whitening filter wants them, arcsec. `raw` is [`Self::binned`] of the
+    /// candidates that the amplitudes belong to.
+    pub(crate) fn generalised(
+        &self,
+        folds: &Folds,
+        raw: &DMatrix<f64>,
+        amplitudes: &Amplitudes,
+    ) -> [Vec<f64>; 3] {
+        let m = self.data.bins.rows.len();
+        let mut out: [Vec<f64>; 3] =
+            std::array::from_fn(|axis| self.data.binned(axis, &self.data.theta[axis]));
+        for (f, bins) in folds.fold_ranges().into_iter().enumerate() {
+            let (constant, beta) = (&amplitudes.nuisance[f], &amplitudes.candidates[f]);
+            for (axis, series) in out.iter_mut().enumerate() {
+                for k in bins.clone() {
+                    let row = raw.row(axis * m + k);
+                    let shift: f64 = (0..beta.len()).map(|j| row[3 + j] * beta[j]).sum();
+                    series[k] -= constant[axis] + shift;
+                }
+            }
+        }
+        out
+    }
+
+    /// Constants and candidates of `rows`, arcsec, x then y then z of every row.
+    fn raw(&self, rows: Range<usize>, candidates: &[&dyn Candidate]) -> DMatrix<f64> {
+        let n = rows.len();
+        let width = 3 + candidates
+            .iter()
+            .map(|c| c.coefficients().len())
+            .sum::<usize>();
+        let mut out = DMatrix::zeros(3 * n, width);
+        let seen = self.data.rows(rows, self.motion);
+        let mut columns: [Vec<f64>; 3] = Default::default();
+        for axis in 0..3 {
+            out.view_mut((axis * n, axis), (n, 1)).fill(1.0);
+        }
+        let mut column = 3;
+        for candidate in candidates {
+            let p = candidate.coefficients().len();
+            for axis in &mut columns {
+                axis.clear();
+                axis.resize(p * n, 0.0);
+            }
+            let [x, y, z] = &mut columns;
+            if candidate.attitude_columns(&seen, VectorsMut { x, y, z }) {
+                for (axis, values) in columns.iter().enumerate() {
+                    for j in 0..p {
+                        for i in 0..n {
+                            out[(axis * n + i, column + j)] = values[j * n + i] * ARCSEC_PER_RAD;
+                        }
+                    }
+                }
+            }
+            column += p;
+        }
+        out
+    }
+}
+
+impl AttitudeEvidence<'_> {
+    /// Whitens binned columns, with the residual as the last.
+    pub(crate) fn whitened(&self, binned: &DMatrix<f64>) -> Box<dyn Design + '_> {
+        let (m, width) = (self.data.bins.rows.len(), binned.ncols());
+        let mut columns = binned.clone().insert_column(width, 0.0);
+        for axis in 0..3 {
+            let theta = self.data.binned(axis, &self.data.theta[axis]);
+            columns
+                .view_mut((axis * m, width), (m, 1))
+                .copy_from_slice(&theta);
+            let mut slices: Vec<&mut [f64]> = columns
+                .as_mut_slice()
+                .chunks_exact_mut(3 * m)
+                .map(|column| &mut column[axis * m..(axis + 1) * m])
+                .collect();
+            self.noise[axis].whiten(&self.data.bins.t_s, &self.data.count[axis], &mut slices);
+        }
+        Box::new(WhitenedDesign {
+            data: self.data,
+            columns,
+        })
+    }
+
+    /// Constants and candidates averaged over the bins: x, y, z of every bin by
+    /// three constants and the candidates' columns, arcsec.
+    pub(crate) fn binned(&self, candidates: &[&dyn Candidate]) -> DMatrix<f64> {
+        let (n, m) = (self.data.t_s.len(), self.data.bins.rows.len());
+        let raw = self.raw(0..n, candidates);
+        let mut out = DMatrix::zeros(3 * m, raw.ncols());
+        for (j, column) in raw.column_iter().enumerate() {
+            for axis in 0..3 {
+                let rows = &column.as_slice()[axis * n..(axis + 1) * n];
+                let means = self.data.binned(axis, rows);
+                out.view_mut((axis * m, j), (m, 1)).copy_from_slice(&means);
+            }
+        }
+        out
+    }
+}
+
+/// Whitened columns of the whole binned series, handed out by bins.
+struct WhitenedDesign<'a> {
+    data: &'a AttitudeData,
+    columns: DMatrix<f64>,
+}
+
+impl Design for WhitenedDesign<'_> {
+    fn width(&self) -> usize {
+        self.columns.ncols()
+    }
+
+    fn fill(&self, rows: Range<usize>, out: &mut DMatrix<f64>) -> usize {
+        let (n, all) = (rows.len(), self.data.bins.rows.len());
+        *out = DMatrix::zeros(3 * n, self.width());
+        let mut scalars = 0;
+        for axis in 0..3 {
+            out.rows_mut(axis * n, n)
+                .copy_from(&self.columns.rows(axis * all + rows.start, n));
+            scalars += rows
+                .clone()
+                .filter(|&k| self.data.count[axis][k] > 0.0)
+                .count();
+        }
+        scalars
+    }
+}
+
+impl Evidence for AttitudeEvidence<'_> {
+    fn precision(&self) -> Vec<f64> {
+        self.constant_sigma
+            .iter()
+            .map(|s| if s.is_finite() { 1.0 / (s * s) } else { 0.0 })
+            .collect()
+    }
+
+    fn residual_columns(&self) -> usize {
+        1
+    }
+
+    fn variance_guess(&self) -> f64 {
+        1.0
+    }
+
+    fn grams(&self, folds: &Folds, candidates: &[&dyn Candidate]) -> BlockGrams {
+        BlockGrams::accumulate(self.whitened(&self.binned(candidates)).as_ref(), folds)
+    }
+
+    /// The constants of the figures are plain means over the other folds: those
+    /// of a generalised fit would carry the slow noise of a distant fold along.
+    fn residuals(
+        &self,
+        folds: &Folds,
+        candidates: &[&dyn Candidate],
+        amplitudes: &Amplitudes,
+    ) -> Residuals {
+        let n = self.data.t_s.len();
+        let raw = self.raw(0..n, candidates);
+        let fold = folds.fold_of_frame();
+        let mut out = Residuals {
+            axes: vec![vec![0.0; n]; 3],
+            modelled: vec![vec![0.0; n]; 3],
+        };
+        for f in 0..folds.count {
+            let shift = raw.columns_range(3..) * &amplitudes.candidates[f];
+            for axis in 0..3 {
+                let left = |k: usize| self.data.theta[axis][k] - shift[axis * n + k];
+                let train: Vec<f64> = (0..n)
+                    .filter(|&k| fold[k] != f && !self.data.outlier[axis][k])
+                    .map(left)
+                    .collect();
+                let count = train.len().max(1) as f64;
+                let free = train.iter().sum::<f64>() / count;
+                // A declared spread pulls the mean toward zero as far as the data is poor.
+                let noise = self.noise[axis];
+                let variance = (noise.white.powi(2) + noise.slow.powi(2)) / count;
+                let prior = self.constant_sigma[axis].powi(2);
+                let constant = if prior.is_finite() {
+                    free * prior / (prior + variance)
+                } else {
+                    free
+                };
+                for k in (0..n).filter(|&k| fold[k] == f) {
+                    out.axes[axis][k] = left(k) - constant;
+                    out.modelled[axis][k] = shift[axis * n + k] + constant;
+                }
+            }
+        }
+        out
+    }
+}

@@ -1,0 +1,482 @@
+//! The loop at attitude level: the tracker's own attitude against a reference.
+//!
+//! Not physics: the order of the steps.
+
+use block_regression::Folds;
+use coloured_noise::Coloured;
+use effects::{Candidate, Scene};
+
+use crate::attitude::data::{AttitudeData, AttitudeEvidence};
+use crate::attitude::search;
+use crate::attitude::spatial_errors::SpatialErrors;
+use crate::close::{Closed, Rival, catalogue_candidates};
+use crate::declared;
+use crate::error::CloseError;
+use crate::evidence::{Amplitudes, Evidence, Residuals};
+use crate::figures;
+use crate::motion::resolved_motion;
+use crate::questions::confusion;
+use crate::questions::hypothesis::{self, Grounds};
+use crate::questions::manoeuvre::attitudes::fly;
+use crate::search::empirical::{Empirical, Variable, range};
+use crate::search::instants;
+use crate::search::selection::columns_of;
+use crate::search::{Found, amplitudes, borrowed, fit};
+use crate::situation::{Situation, channels_of_interest};
+use crate::unexplained::leftover;
+use focal_plane::AttitudeSource;
+use nalgebra::{DVector, UnitQuaternion};
+use spectra::robust::{self, median_step};
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+use telemetry::AttitudeResiduals;
+use telemetry::report::{Dependence, Errors, Report, Rows, Unattributed};
+
+/// A correlated part below this share of the variance, or that the likelihood
+/// hardly sees, is not worth a word.
+const SLOW_SHARE: f64 = 0.1;
+const SLOW_GAIN: f64 = 20.0;
+/// Fewest frames from which an effect and its noise can both be had.
+const MIN_FRAMES: usize = 20;
+
+pub(crate) fn run(
+    situation: &Situation<'_>,
+    progress: &dyn Fn(&str),
+) -> Result<Closed, CloseError> {
+    let table = situation
+        .bundle
+        .attitude
+        .as_ref()
+        .ok_or(CloseError::NothingToCompare("no attitude"))?;
+    let reference = situation
+        .reference
+        .as_ref()
+        .ok_or(CloseError::NothingToCompare(
+            "the bundle has an attitude but no reference to hold it against",
+        ))?;
+    let mut data = AttitudeData::against(&table.t_s, &table.q, reference);
+    if data.t_s.len() < MIN_FRAMES {
+        return Err(CloseError::TooFewFrames {
+            frames: data.t_s.len(),
+            need: MIN_FRAMES,
+            why: "the others lie outside the reference or in its gaps",
+        });
+    }
+    for effect in declared::effects(situation)? {
+        data.subtract(effect.as_ref());
+    }
+    let folds = Folds::cut(data.t_s.len());
+    let around = resolved_motion(situation, &data.t_s);
+    let motion = around.as_deref();
+    if motion.is_none() {
+        data.rate = std::array::from_fn(|_| vec![0.0; data.t_s.len()]);
+    }
+    progress("residuals of the declared model");
+    let before = settle(&mut data, situation, &folds, motion)?;
+
+    progress("searching for causes");
+    let mut candidates = catalogue_candidates(&scene(situation, &data));
+    candidates.retain(|c| c.acts_on_attitude());
+    candidates.extend(leftover_terms(situation, &data));
+    let with_noise = |noise: [Coloured; 3]| evidence(&data, situation, noise, motion);
+    let start = fit_noise(&data, &before);
+    let changes = SpatialErrors::declared(situation, &data.t_s);
+    let bins = &data.bins.folds;
+    let (found, noise) =
+        search::search(&with_noise, &data, bins, &folds, candidates, changes, start)?;
+    let after = residuals(&with_noise(noise), &folds, &found, &found.selection.chosen)?;
+    let mut rivals = Vec::new();
+    for (set, gain) in search::rivals(&with_noise, &data, bins, &found, noise) {
+        let residual = residuals(&with_noise(noise), &folds, &found, &set)?;
+        rivals.push(Rival {
+            what: names(&found, &set),
+            rms_arcsec: (0..3)
+                .map(|a| figures::rms(&residual.axes[a], &data.outlier[a]).unwrap_or(f64::NAN))
+                .collect(),
+            delta_loglik: gain,
+        });
+    }
+    progress("figures");
+    finish(
+        situation, &data, &folds, noise, motion, &found, before, after, rivals, changes,
+    )
+}
+
+/// What a set of candidates is called.
+fn names(found: &Found, set: &[usize]) -> String {
+    let name = |&g: &usize| {
+        let candidate = &found.candidates[g];
+        candidate
+            .selectors()
+            .get("variable")
+            .cloned()
+            .unwrap_or_else(|| candidate.id().to_owned())
+    };
+    if set.is_empty() {
+        return "declared model".to_owned();
+    }
+    set.iter().map(name).collect::<Vec<_>>().join(" + ")
+}
+
+/// The before residual, with outliers marked per axis.
+fn settle(
+    data: &mut AttitudeData,
+    situation: &Situation<'_>,
+    folds: &Folds,
+    motion: Option<&dyn AttitudeSource>,
+) -> Result<Residuals, CloseError> {
+    let white = [Coloured::WHITE; 3];
+    loop {
+        data.rebin(folds);
+        let evidence = evidence(data, situation, white, motion);
+        let fitted = fit(&evidence, &data.bins.folds, &[])?;
+        let amplitudes = amplitudes(&fitted, folds, &[], 0).ok_or(CloseError::Singular)?;
+        let before = evidence.residuals(folds, &[], &amplitudes);
+        let group = vec![0; data.t_s.len()];
+        let added: usize = (0..3)
+            .map(|axis| {
+                robust::mark_outliers(&before.axes[axis], &group, 1, &mut data.outlier[axis])
+            })
+            .sum();
+        if added == 0 {
+            return Ok(before);
+        }
+    }
+}
+
+fn evidence<'a>(
+    data: &'a AttitudeData,
+    situation: &Situation<'_>,
+    noise: [Coloured; 3],
+    motion: Option<&'a dyn AttitudeSource>,
+) -> AttitudeEvidence<'a> {
+    AttitudeEvidence {
+        data,
+        constant_sigma: situation
+            .model
+            .noise
+            .bias_arcsec
+            .map_or([f64::INFINITY; 3], |b| {
+                b.map(|s| if s > 0.0 { s } else { f64::INFINITY })
+            }),
+        noise,
+        motion,
+    }
+}
+
+fn fit_noise(data: &AttitudeData, residual: &Residuals) -> [Coloured; 3] {
+    std::array::from_fn(|axis| {
+        let means = data.binned(axis, &residual.axes[axis]);
+        Coloured::fit(&data.bins.t_s, &means, &data.count[axis])
+    })
+}
+
+/// Log-likelihood of all rows a row, under the noise that suits them best, nats.
+fn loglik_per_frame(data: &AttitudeData, residual: &Residuals) -> f64 {
+    let total: f64 = (0..3)
+        .map(|axis| {
+            let count: Vec<f64> = data.outlier[axis]
+                .iter()
+                .map(|out| f64::from(u8::from(!out)))
+                .collect();
+            let series = &residual.axes[axis];
+            Coloured::fit(&data.t_s, series, &count).log_likelihood(&data.t_s, series, &count)
+        })
+        .sum();
+    total / data.t_s.len() as f64
+}
+
+fn residuals(
+    evidence: &AttitudeEvidence<'_>,
+    folds: &Folds,
+    found: &Found,
+    chosen: &[usize],
+) -> Result<Residuals, CloseError> {
+    let columns = found
+        .candidates
+        .iter()
+        .map(|c| c.coefficients().len())
+        .sum();
+    let amplitudes =
+        amplitudes(&found.fitted, folds, chosen, columns).ok_or(CloseError::Singular)?;
+    Ok(evidence.residuals(folds, &borrowed(&found.candidates), &amplitudes))
+}
+
+fn scene<'a>(situation: &'a Situation<'_>, data: &AttitudeData) -> Scene<'a> {
+    Scene {
+        surroundings: situation.surroundings(),
+        has_stars: false,
+        has_catalogue: false,
+        has_reference: true,
+        has_attitude: true,
+        stars: &[],
+        exposure_s: situation.exposure_s(),
+        step_s: median_step(&data.t_s).unwrap_or(f64::INFINITY),
+        rows: None,
+    }
+}
+
+/// Time and every housekeeping channel but velocities, which belong to
+/// aberration alone.
+fn leftover_terms(situation: &Situation<'_>, data: &AttitudeData) -> Vec<Box<dyn Candidate>> {
+    let mut terms: Vec<Box<dyn Candidate>> = Vec::new();
+    let mut add = |variable: Variable, range: [f64; 2]| {
+        if let Some(term) = Empirical::new(variable, range, false) {
+            terms.push(Box::new(term));
+        }
+    };
+    add(Variable::Time, range(data.t_s.iter().copied()));
+    for (name, series) in channels_of_interest(&situation.channels) {
+        add(
+            Variable::Housekeeping(name, series.clone()),
+            range(series.value().iter().copied()),
+        );
+    }
+    terms
+}
+
+/// A slowly varying part that no term predicts is left too: it shows as noise that
+/// is correlated in time, which the declared model does not have.
+fn slow_leftover(
+    data: &AttitudeData,
+    after: &Residuals,
+    declared: [f64; 3],
+    unattributed: &mut Unattributed,
+    left: f64,
+) {
+    let (mut slow, mut whole, mut gain) = (0.0, 0.0, 0.0);
+    for axis in 0..3 {
+        let means = data.binned(axis, &after.axes[axis]);
+        let noise = Coloured::fit(&data.bins.t_s, &means, &data.count[axis]);
+        let white = Coloured {
+            slow: 0.0,
+            white: noise.white.hypot(noise.slow),
+            ..noise
+        };
+        let loglik = |n: &Coloured| n.log_likelihood(&data.bins.t_s, &means, &data.count[axis]);
+        // what the declared model makes by itself is not left over
+        if noise.slow > declared[axis] {
+            slow += noise.slow * noise.slow;
+        }
+        whole += figures::rms(&after.axes[axis], &data.outlier[axis]).map_or(0.0, |r| r * r);
+        gain += (loglik(&noise) - loglik(&white)).max(0.0);
+    }
+    let share = (slow / whole).min(1.0);
+    if share < SLOW_SHARE || gain < SLOW_GAIN {
+        return;
+    }
+    unattributed.present = true;
+    unattributed.variance_fraction = Some(
+        unattributed
+            .variance_fraction
+            .unwrap_or(0.0)
+            .max(share * left),
+    );
+    unattributed.depends_on.retain(|d| d.variable != "time");
+    let entry = Dependence {
+        variable: "time".to_owned(),
+        variance_explained: share,
+        // two parameters an axis: Wilks
+        p_value: ChiSquared::new(6.0).map_or(1.0, |law| law.sf(2.0 * gain)),
+    };
+    unattributed.depends_on.insert(0, entry);
+    unattributed
+        .depends_on
+        .sort_by(|a, b| b.variance_explained.total_cmp(&a.variance_explained));
+}
+
+/// Residuals with the chosen effects estimated from all data: what other folds
+/// predict has steps of its own where folds meet.
+fn in_sample(evidence: &AttitudeEvidence<'_>, rows: usize, found: &Found) -> Option<Residuals> {
+    let set = columns_of(&found.fitted.groups, &found.selection.chosen);
+    let value = found.fitted.fits.estimate(&set)?.value;
+    let list = borrowed(&found.candidates);
+    let columns = list.iter().map(|c| c.coefficients().len()).sum();
+    let mut beta = DVector::zeros(columns);
+    for (i, &c) in set.iter().enumerate() {
+        beta[c] = value[i];
+    }
+    let amplitudes = Amplitudes {
+        nuisance: Vec::new(),
+        candidates: vec![beta],
+    };
+    Some(evidence.residuals(&Folds::whole(rows), &list, &amplitudes))
+}
+
+/// Squared length of each candidate column about its mean on every axis, arcsec^2.
+fn column_lengths(evidence: &AttitudeEvidence<'_>, found: &Found) -> Vec<f64> {
+    let data = evidence.data;
+    let binned = evidence.binned(&borrowed(&found.candidates));
+    let m = data.bins.rows.len();
+    let length = |column: &[f64]| -> f64 {
+        (0..3)
+            .map(|axis| {
+                let (values, count) = (&column[axis * m..(axis + 1) * m], &data.count[axis]);
+                let all = || values.iter().zip(count);
+                let rows: f64 = count.iter().sum();
+                let mean = all().map(|(v, n)| v * n).sum::<f64>() / rows.max(1.0);
+                all().map(|(v, n)| n * (v - mean) * (v - mean)).sum::<f64>()
+            })
+            .sum()
+    };
+    binned
+        .column_iter()
+        .skip(3)
+        .map(|column| length(column.as_slice()))
+        .collect()
+}
+
+/// Squared residual beyond the white noise of each axis, arcsec^2.
+fn beyond_white(data: &AttitudeData, residual: &Residuals) -> Option<f64> {
+    let noise = fit_noise(data, residual);
+    let (mut excess, mut scatter) = (0.0, 0.0);
+    for axis in 0..3 {
+        let rows: f64 = data.count[axis].iter().sum();
+        let white = noise[axis].white * noise[axis].white;
+        let square = figures::rms(&residual.axes[axis], &data.outlier[axis])?.powi(2);
+        excess += (rows * (square - white)).max(0.0);
+        scatter += rows * white * white;
+    }
+    hypothesis::beyond(excess, scatter.sqrt(), 1.0)
+}
+
+fn finish(
+    situation: &Situation<'_>,
+    data: &AttitudeData,
+    folds: &Folds,
+    noise: [Coloured; 3],
+    motion: Option<&dyn AttitudeSource>,
+    found: &Found,
+    before: Residuals,
+    after: Residuals,
+    rivals: Vec<Rival>,
+    changes: Option<SpatialErrors>,
+) -> Result<Closed, CloseError> {
+    let chosen = &found.selection.chosen;
+    let evidence = evidence(data, situation, noise, motion);
+    let power = |r: &Residuals| -> f64 {
+        (0..3)
+            .filter_map(|a| figures::rms(&r.axes[a], &data.outlier[a]))
+            .map(|v| v * v)
+            .sum()
+    };
+    let whole = power(&before);
+    let mut explained = Vec::new();
+    let mut last = whole;
+    for k in 0..chosen.len() {
+        let now = power(&residuals(&evidence, folds, found, &chosen[..=k])?);
+        explained.push((last - now) / whole);
+        last = now;
+    }
+    // what is left is judged before a term without a cause is added
+    let mut unattributed = figures::unattributed(found, last / whole);
+    let (surroundings, questions) = (situation.surroundings(), situation.questions);
+    let mut added = chosen.clone();
+    let plain = after;
+    let mut after = plain.clone();
+    if questions.empirical
+        && let Some(g) = figures::best_empirical(found, &unattributed, &surroundings)
+    {
+        added.push(g);
+        after = residuals(&evidence, folds, found, &added)?;
+        explained.push((last - power(&after)) / whole);
+    }
+    let (mut effects, entries) =
+        figures::effects_found(found, &added, &explained, &surroundings, questions)?;
+    let confusion = confusion::compare(found, &mut effects);
+    if let (false, Some(step), Some(&start)) = (
+        confusion.is_empty(),
+        median_step(&data.t_s),
+        data.t_s.first(),
+    ) {
+        let sigma = evidence.constant_sigma;
+        confusion.tell(&mut effects, start, UnitQuaternion::identity(), &|flown| {
+            fly(flown, &confusion.candidates, step, sigma, noise)
+        });
+    }
+    instants::complete(
+        &evidence,
+        &data.bins.folds,
+        found,
+        &situation.surroundings(),
+        median_step(&data.t_s).unwrap_or(1.0),
+        &mut effects,
+    )?;
+    let mut model = situation.model.clone();
+    model.effects.extend(entries);
+    if let Some(changes) = changes {
+        let own: f64 = changes.slow_arcsec.iter().map(|s| s * s).sum();
+        unattributed.present &= unattributed.variance_fraction.unwrap_or(0.0) * whole > own;
+    }
+    if situation.model.hem.is_none() {
+        let declared = changes.map_or([0.0; 3], |c| c.slow_arcsec);
+        slow_leftover(data, &plain, declared, &mut unattributed, last / whole);
+    }
+    let inside = in_sample(&evidence, data.t_s.len(), found);
+    let tracks = leftover::attitude_tracks(
+        &data.t_s,
+        &inside.as_ref().unwrap_or(&plain).axes,
+        &data.outlier,
+        changes,
+    );
+    leftover::describe(&tracks).tell(&mut unattributed);
+    let errors = |r: &Residuals| Errors {
+        star_rms_arcsec: None,
+        attitude_rms_arcsec: Some(std::array::from_fn(|a| {
+            figures::rms(&r.axes[a], &data.outlier[a]).unwrap_or(f64::NAN)
+        })),
+        log_psd_cost: None,
+        chi2_per_dof: None,
+        loglik_per_frame: Some(loglik_per_frame(data, r)),
+    };
+    let considered = figures::considered(found, 0.0);
+    let lengths = column_lengths(&evidence, found);
+    let hypotheses = hypothesis::answer(
+        situation.questions,
+        &Grounds {
+            found,
+            surroundings: situation.surroundings(),
+            information: &|c| lengths[c],
+            alone: beyond_white(data, &before),
+            left: beyond_white(data, &plain),
+            resolved: motion.is_some(),
+            effects: &effects,
+            considered: &considered,
+        },
+    );
+    let outliers: Vec<bool> = (0..data.t_s.len())
+        .map(|k| (0..3).any(|a| data.outlier[a][k]))
+        .collect();
+    let count = outliers.iter().filter(|o| **o).count();
+    let report = Report {
+        format: telemetry::report::REPORT_FORMAT.to_owned(),
+        verdict: figures::verdict(&effects, unattributed.present),
+        folds: folds.count,
+        rows: Rows {
+            used: data.t_s.len() - count,
+            outliers: count,
+            outside_reference: data.outside_reference,
+        },
+        before: errors(&before),
+        after: errors(&after),
+        effects,
+        considered,
+        hypotheses,
+        unattributed,
+    };
+    let [bx, by, bz]: [Vec<f64>; 3] = before.axes.try_into().unwrap_or_default();
+    let [ax, ay, az]: [Vec<f64>; 3] = after.axes.try_into().unwrap_or_default();
+    Ok(Closed {
+        report,
+        model,
+        stars: None,
+        attitude: Some(AttitudeResiduals {
+            t_s: data.t_s.clone(),
+            before_arcsec: [bx, by, bz],
+            after_arcsec: [ax, ay, az],
+            fold: folds.column(),
+            outlier: outliers,
+        }),
+        dark_map: None,
+        rivals,
+    })
+}

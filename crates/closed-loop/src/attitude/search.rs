@@ -1,0 +1,389 @@
+//! The search at attitude level: every hypothesis with its own noise.
+//!
+//! Coloured noise fitted with an effect still in the data takes a slow effect for
+//! noise, and noise fitted after removing whatever fits takes noise for an effect.
+//! So each hypothesis is scored at its own best noise,
+//!
+//! ```text
+//! L(H) = max over noise, amplitudes of ln p(data | H)       2 (L(H1) - L(H0)) ~ chi2_p
+//! ```
+//!
+//! by alternating generalised least squares and the noise fit. The p-value pays
+//! for the whole search; the gain that is reported and ranked is out of fold, each
+//! side predicted with amplitudes of the other folds under its own noise.
+//!
+//! A likelihood of coloured noise may rise where the error itself grows: a step
+//! makes the noise look whiter. What is added has to lower the error out of fold,
+//! in units of each axis's white noise, and on every axis whose sign was chosen.
+//!
+//! Source: Wilks 1938 (likelihood ratio); Cochrane & Orcutt 1949 (the alternation).
+
+use block_regression::Folds;
+use coloured_noise::Coloured;
+use effects::Candidate;
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+
+use crate::attitude::data::{AttitudeData, AttitudeEvidence};
+use crate::attitude::spatial_errors::SpatialErrors;
+use crate::error::CloseError;
+use crate::evidence::{Amplitudes, Evidence};
+use crate::figures;
+use crate::search::empirical::EMPIRICAL;
+use crate::search::selection::{Judgement, Selection, columns_of, costs, price};
+use crate::search::{Fitted, Found, amplitudes, borrowed, fit, fit_design, polish};
+
+/// The effect that a change of stars looks like.
+const STEP: &str = "step_misalignment";
+
+/// Rounds of generalised least squares and noise fit.
+const ALTERNATIONS: usize = 3;
+/// The ratio statistic of a noise model that is only nearly right runs this much
+/// wider than chi-squared (red-noise nulls: rms t of 1.13).
+const WIDENING: f64 = 1.3;
+
+/// Builds the evidence of one noise.
+pub(crate) type WithNoise<'d> = dyn Fn([Coloured; 3]) -> AttitudeEvidence<'d> + Sync + 'd;
+
+/// A hypothesis at its best noise.
+#[derive(Clone, Debug)]
+struct Scored {
+    noise: [Coloured; 3],
+    /// Log-likelihood at the maximum, nats.
+    loglik: f64,
+    /// Log-likelihood predicted out of fold, nats.
+    out_of_fold: f64,
+    /// Amplitudes and their robust standard errors are within credible bounds.
+    credible: bool,
+    /// Amplitudes of all columns of the candidates, in order; zero where not observable.
+    amplitudes: Vec<f64>,
+}
+
+/// The search, and the noise it ends with; `rows` are the folds of the unbinned rows.
+pub(crate) fn search<'d>(
+    with_noise: &WithNoise<'d>,
+    data: &AttitudeData,
+    folds: &Folds,
+    rows: &Folds,
+    mut candidates: Vec<Box<dyn Candidate>>,
+    changes: Option<SpatialErrors>,
+    start: [Coloured; 3],
+) -> Result<(Found, [Coloured; 3]), CloseError> {
+    let mut chosen: Vec<usize> = Vec::new();
+    let mut banned = vec![false; candidates.len()];
+    let mut noise = start;
+    loop {
+        let binned = with_noise(noise).binned(&borrowed(&candidates));
+        let fitted = fit_design(
+            &with_noise(noise),
+            with_noise(noise).whitened(&binned).as_ref(),
+            folds,
+            &borrowed(&candidates),
+        )?;
+        let trial = Trial {
+            with_noise,
+            data,
+            folds,
+            fitted: &fitted,
+            candidates: &candidates,
+            binned,
+            changes,
+            noise,
+            cost: cost(&fitted, &candidates),
+        };
+        let base = trial.score(&chosen).ok_or(CloseError::Singular)?;
+        let judged: Vec<Judgement> = (0..candidates.len())
+            .into_par_iter()
+            .map(|g| trial.judge(&chosen, g, &base))
+            .collect();
+        if let Some(fallen) = chosen.iter().copied().find(|&g| !judged[g].stands()) {
+            banned[fallen] = true;
+            chosen.retain(|&g| g != fallen);
+            continue;
+        }
+        let mut ranked = trial.ranked(&chosen, &banned, &judged);
+        while let Some(&g) = ranked.first()
+            && !trial.lowers_the_error(rows, &chosen, g)
+        {
+            banned[g] = true;
+            ranked.remove(0);
+        }
+        noise = base.noise;
+        let Some(&added) = ranked.first() else {
+            let fitted = fit(&with_noise(noise), folds, &borrowed(&candidates))?;
+            return Ok((
+                Found {
+                    candidates,
+                    fitted,
+                    selection: Selection { chosen, judged },
+                },
+                noise,
+            ));
+        };
+        chosen.push(added);
+        if let Some(score) = trial.score(&chosen) {
+            noise = score.noise;
+        }
+        let fitted = fit(&with_noise(noise), folds, &borrowed(&candidates))?;
+        polish(&with_noise(noise), folds, &mut candidates, &fitted, &chosen)?;
+    }
+}
+
+/// How `first` compares with each housekeeping channel as the cause: alone, and
+/// beside the best of them. Groups of candidates with their out-of-fold gain over
+/// the declared model, nats; the first entry is that model itself.
+pub(crate) fn rivals(
+    with_noise: &WithNoise<'_>,
+    data: &AttitudeData,
+    folds: &Folds,
+    found: &Found,
+    noise: [Coloured; 3],
+) -> Vec<(Vec<usize>, f64)> {
+    let candidates = &found.candidates;
+    let binned = with_noise(noise).binned(&borrowed(candidates));
+    let trial = Trial {
+        with_noise,
+        data,
+        folds,
+        fitted: &found.fitted,
+        candidates,
+        binned,
+        changes: None,
+        noise,
+        cost: cost(&found.fitted, candidates),
+    };
+    let mut sets: Vec<Vec<usize>> = vec![Vec::new()];
+    sets.extend(found.selection.chosen.first().map(|&g| vec![g]));
+    let channels = (0..candidates.len()).filter(|&g| {
+        candidates[g].id() == EMPIRICAL
+            && candidates[g]
+                .selectors()
+                .get("variable")
+                .is_some_and(|v| v.starts_with("housekeeping:"))
+            && !found.fitted.groups[g].columns.is_empty()
+    });
+    sets.extend(channels.map(|g| vec![g]));
+    let mut scored: Vec<(Vec<usize>, f64)> = sets
+        .into_par_iter()
+        .filter_map(|set| trial.score(&set).map(|s| (set, s.out_of_fold)))
+        .collect();
+    let best = scored
+        .iter()
+        .filter(|(set, _)| {
+            set.first()
+                .is_some_and(|&g| candidates[g].id() == EMPIRICAL)
+        })
+        .max_by(|a, b| a.1.total_cmp(&b.1))
+        .map(|(set, _)| set.clone());
+    if let (Some(&first), Some(best)) = (found.selection.chosen.first(), best) {
+        let both = vec![first, best[0]];
+        scored.extend(trial.score(&both).map(|s| (both, s.out_of_fold)));
+    }
+    let zero = scored.first().map_or(0.0, |s| s.1);
+    for entry in &mut scored {
+        entry.1 -= zero;
+    }
+    scored
+}
+
+/// What the p-value of each candidate is multiplied by: descriptions are not tried.
+fn cost(fitted: &Fitted, candidates: &[Box<dyn Candidate>]) -> Vec<f64> {
+    let may: Vec<bool> = candidates.iter().map(|c| c.id() != EMPIRICAL).collect();
+    costs(&fitted.groups, &may)
+}
+
+/// One list of candidates, ready to be tried in any combination.
+struct Trial<'a, 'd> {
+    with_noise: &'a WithNoise<'d>,
+    data: &'a AttitudeData,
+    folds: &'a Folds,
+    fitted: &'a Fitted,
+    candidates: &'a [Box<dyn Candidate>],
+    /// Columns of all candidates, averaged over the bins.
+    binned: DMatrix<f64>,
+    /// Jumps that are no step.
+    changes: Option<SpatialErrors>,
+    noise: [Coloured; 3],
+    /// What the p-value of each candidate is multiplied by.
+    cost: Vec<f64>,
+}
+
+impl Trial<'_, '_> {
+    /// Candidates that may be added, best first: by the gain out of fold after a
+    /// price for every parameter and choice.
+    fn ranked(&self, chosen: &[usize], banned: &[bool], judged: &[Judgement]) -> Vec<usize> {
+        let groups = &self.fitted.groups;
+        let score = |g: usize| judged[g].delta_loglik - price(&groups[g], self.fitted.scalars);
+        let mut ranked: Vec<usize> = (0..self.candidates.len())
+            .filter(|g| !chosen.contains(g) && !banned[*g] && judged[*g].stands())
+            .filter(|&g| self.candidates[g].id() != EMPIRICAL)
+            .filter(|&g| chosen.iter().all(|&c| groups[c].family != groups[g].family))
+            .collect();
+        ranked.sort_by(|&a, &b| score(b).total_cmp(&score(a)));
+        ranked
+    }
+
+    /// Whether the residual out of fold is smaller with `g` than without.
+    fn lowers_the_error(&self, rows: &Folds, chosen: &[usize], g: usize) -> bool {
+        let mut with = chosen.to_vec();
+        with.push(g);
+        let (Some(without), Some(with)) = (
+            self.mean_squares(rows, chosen),
+            self.mean_squares(rows, &with),
+        ) else {
+            return false;
+        };
+        let rise: f64 = (0..3)
+            .map(|a| (with[a] - without[a]) / self.noise[a].white.powi(2).max(f64::MIN_POSITIVE))
+            .sum();
+        let claimed = self.fitted.groups[g].choices > 0;
+        rise < 0.0 && !(claimed && (0..3).any(|a| with[a] > without[a]))
+    }
+
+    /// Mean square of the residual per axis, out of fold, arcsec².
+    fn mean_squares(&self, rows: &Folds, chosen: &[usize]) -> Option<[f64; 3]> {
+        let columns = self.candidates.iter().map(|c| c.coefficients().len()).sum();
+        let amplitudes = amplitudes(self.fitted, self.folds, chosen, columns)?;
+        let evidence = (self.with_noise)(self.noise);
+        let residual = evidence.residuals(rows, &borrowed(self.candidates), &amplitudes);
+        let rms = |a: usize| figures::rms(&residual.axes[a], &self.data.outlier[a]);
+        Some([rms(0)?, rms(1)?, rms(2)?].map(|r| r * r))
+    }
+
+    /// Standing of group `g` beside the others of `chosen`.
+    fn judge(&self, chosen: &[usize], g: usize, base: &Scored) -> Judgement {
+        let group = &self.fitted.groups[g];
+        if group.columns.is_empty() {
+            return Judgement::UNSEEN;
+        }
+        let others: Vec<usize> = chosen.iter().copied().filter(|&c| c != g).collect();
+        let mut set = others.clone();
+        set.push(g);
+        let scores = if others.len() == chosen.len() {
+            self.score(&set).map(|s| (s, base.clone()))
+        } else {
+            set = chosen.to_vec();
+            self.score(&others).map(|s| (base.clone(), s))
+        };
+        let Some((with, without)) = scores else {
+            return Judgement::UNSEEN;
+        };
+        let ratio = 2.0 * (with.loglik - without.loglik) / WIDENING;
+        let freedom = (group.columns.len() + group.choices) as f64;
+        let p = ChiSquared::new(freedom).map_or(1.0, |law| law.sf(ratio.max(0.0)));
+        let p = (p * self.cost[g]).min(1.0);
+        Judgement {
+            delta_loglik: with.out_of_fold - without.out_of_fold,
+            p_value: p.max(self.a_change(&set, g, &with)),
+            credible: with.credible,
+            observable: true,
+        }
+    }
+
+    /// Chance that step `g` of `set` is a change of stars.
+    fn a_change(&self, set: &[usize], g: usize, scored: &Scored) -> f64 {
+        let Some(changes) = self.changes.filter(|_| self.candidates[g].id() == STEP) else {
+            return 0.0;
+        };
+        let width = |c: &usize| self.candidates[*c].coefficients().len();
+        let first: usize = set.iter().take_while(|c| **c != g).map(width).sum();
+        let step = |axis: usize| scored.amplitudes.get(first + axis).copied().unwrap_or(0.0);
+        changes.chance([step(0), step(1), step(2)])
+    }
+
+    /// `chosen` at its own best noise.
+    fn score(&self, chosen: &[usize]) -> Option<Scored> {
+        let candidates: Vec<&dyn Candidate> = chosen
+            .iter()
+            .map(|&g| self.candidates[g].as_ref())
+            .collect();
+        let columns = candidates.iter().map(|c| c.coefficients().len()).sum();
+        let all: Vec<usize> = (0..candidates.len()).collect();
+        let binned = self.columns(chosen);
+        let mut noise = self.noise;
+        let mut last = None;
+        for _ in 0..ALTERNATIONS {
+            let evidence = (self.with_noise)(noise);
+            let design = evidence.whitened(&binned);
+            let fitted = fit_design(&evidence, design.as_ref(), self.folds, &candidates).ok()?;
+            let set = columns_of(&fitted.groups, &all);
+            let estimate = fitted.fits.estimate(&set)?;
+            let residual = self.left(&evidence, &binned, &fitted, &set, &estimate.value);
+            noise = std::array::from_fn(|axis| {
+                noise[axis].refit(&self.data.bins.t_s, &residual[axis], &self.data.count[axis])
+            });
+            let credible = fitted.groups.iter().all(|group| {
+                group
+                    .columns
+                    .iter()
+                    .zip(&group.bounds)
+                    .all(|(c, [low, high])| {
+                        set.iter()
+                            .position(|s| s == c)
+                            .is_some_and(|i| (*low..=*high).contains(&estimate.value[i]))
+                    })
+            });
+            let mut all = vec![0.0; columns];
+            for (value, &c) in estimate.value.iter().zip(&set) {
+                all[c] = *value;
+            }
+            last = Some((self.loglik(&noise, &residual), credible, all));
+        }
+        let (loglik, credible, values) = last?;
+        let evidence = (self.with_noise)(noise);
+        let design = evidence.whitened(&binned);
+        let fitted = fit_design(&evidence, design.as_ref(), self.folds, &candidates).ok()?;
+        let amplitudes = amplitudes(&fitted, self.folds, &all, columns)?;
+        let predicted = evidence.generalised(self.folds, &binned, &amplitudes);
+        Some(Scored {
+            noise,
+            loglik,
+            out_of_fold: self.loglik(&noise, &predicted),
+            credible,
+            amplitudes: values,
+        })
+    }
+
+    /// Binned columns of some candidates, constants first.
+    fn columns(&self, chosen: &[usize]) -> DMatrix<f64> {
+        let mut pick = vec![0, 1, 2];
+        for &g in chosen {
+            let before: usize = self.candidates[..g]
+                .iter()
+                .map(|c| c.coefficients().len())
+                .sum();
+            pick.extend((0..self.candidates[g].coefficients().len()).map(|j| 3 + before + j));
+        }
+        self.binned.select_columns(&pick)
+    }
+
+    /// What is left in sample.
+    fn left(
+        &self,
+        evidence: &AttitudeEvidence<'_>,
+        binned: &DMatrix<f64>,
+        fitted: &Fitted,
+        set: &[usize],
+        value: &DVector<f64>,
+    ) -> [Vec<f64>; 3] {
+        let mut beta = DVector::zeros(binned.ncols() - 3);
+        for (i, &c) in set.iter().enumerate() {
+            beta[c] = value[i];
+        }
+        let one = Folds::whole(self.data.bins.rows.len());
+        let amplitudes = Amplitudes {
+            nuisance: vec![fitted.fits.nuisance(None, set, value)],
+            candidates: vec![beta],
+        };
+        evidence.generalised(&one, binned, &amplitudes)
+    }
+
+    fn loglik(&self, noise: &[Coloured; 3], residual: &[Vec<f64>; 3]) -> f64 {
+        (0..3)
+            .map(|a| {
+                noise[a].log_likelihood(&self.data.bins.t_s, &residual[a], &self.data.count[a])
+            })
+            .sum()
+    }
+}

@@ -1,0 +1,301 @@
+//! Whether a slow error is the frame's or the stars'.
+//!
+//! A reference that wanders moves all stars of a frame alike. Stars that each follow
+//! something of their own (pixel phases, windows, charge) make a frame's rotation wander
+//! too, by as much as they make everything else wander that the frame's stars could do. So
+//! the slow part of the rotation is held against that of all other directions in the space
+//! of the frame's centroids, in units of the white noise,
+//!
+//! ```text
+//! S = mean over lags 1..D, times, directions of u(t) u(t + lag)      D = tau/2
+//! ```
+//!
+//! and a slow error is not the reference's if S of the other directions is beyond doubt and
+//! the rotation's is less than eight times as large: the power of one line in one direction
+//! is exponential, so that the largest of three exceeds its mean eightfold in 1 of 1000. Of
+//! white noise S has a sigma of 1/sqrt(n D) for n products a lag.
+//!
+//! Source: an analysis of variance within and between (Fisher 1925) of lagged products.
+
+use nalgebra::{Matrix3, Vector3};
+use spectra::robust::median_step;
+use statrs::function::erf::erfc;
+use telemetry::report::{Dependence, Unattributed};
+
+use crate::star::data::StarData;
+use crate::star::frame_rotation::rotation_row;
+
+/// Chance below which stars that wander are told.
+const ALPHA: f64 = 0.002;
+/// Shares of what the stars are known to follow beyond which they mostly wander.
+pub(crate) const MOSTLY: f64 = 20.0;
+/// The same where it is more certain than any of that, which is not quite certain by itself.
+const SURER: f64 = 5.0;
+const CERTAIN: f64 = 1e-4;
+/// Sigmas of what is beyond doubt.
+const BEYOND_DOUBT: f64 = 3.5;
+/// Least share of the rotation's slow part.
+const SHARE: f64 = 1.0 / 8.0;
+/// Longest lag, frames.
+const MOST_LAGS: usize = 100;
+/// Products of which a sum is nearly Gaussian.
+const LEAST_PRODUCTS: f64 = 300.0;
+/// Sums of products have wider tails than a Gaussian.
+const WIDER: f64 = 1.3;
+
+/// Slow parts over the white noise.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Slow {
+    /// Of the rotation, about the axes asked for.
+    pub(crate) rotation: f64,
+    /// Of all else, and its sigma if there is none.
+    pub(crate) stars: f64,
+    pub(crate) sigma: f64,
+    /// Lags that it is the mean of.
+    lags: usize,
+    /// The most certain star: its slow part over its sigma, and how many there are.
+    star: f64,
+    count: usize,
+}
+
+/// Puts it first that every star does something of its own in time.
+pub(crate) fn stars_first(list: &mut Vec<Dependence>, variance_explained: f64, p_value: f64) {
+    const VARIABLE: &str = "time*star";
+    list.retain(|d| d.variable != VARIABLE);
+    let entry = Dependence {
+        variable: VARIABLE.to_owned(),
+        variance_explained,
+        p_value,
+    };
+    list.insert(0, entry);
+}
+
+impl Slow {
+    /// Each star wanders by itself.
+    pub(crate) fn is_of_the_stars(&self) -> bool {
+        self.stars > BEYOND_DOUBT * self.sigma && self.stars > SHARE * self.rotation
+    }
+
+    /// Writes it where it is reported, unless what the stars follow is known. `left` is the
+    /// share of the before variance that is left.
+    pub(crate) fn tell(&self, unattributed: &mut Unattributed, left: f64) {
+        let share = (self.stars / (1.0 + self.stars)).max(0.0);
+        let first = unattributed.depends_on.first();
+        let known = first.map_or(0.0, |d| d.variance_explained);
+        let certain = |d: &Dependence| d.p_value < self.chance() || d.p_value < CERTAIN;
+        let surer = !unattributed.depends_on.iter().any(certain) && share > SURER * known;
+        let little = share < MOSTLY * known && !surer;
+        if self.chance() >= ALPHA || unattributed.present && little {
+            return;
+        }
+        if !unattributed.present {
+            unattributed.depends_on.clear();
+        }
+        unattributed.present = true;
+        unattributed.variance_fraction = Some(share * left);
+        stars_first(&mut unattributed.depends_on, share, self.chance());
+    }
+
+    /// The chance of as much slow noise of the stars, or of one of them, where there is none.
+    fn chance(&self) -> f64 {
+        let tail = |z: f64| 0.5 * erfc(z / WIDER * std::f64::consts::FRAC_1_SQRT_2);
+        let whole = tail(self.stars / self.sigma);
+        (2.0 * whole.min(tail(self.star) * self.count as f64)).min(1.0)
+    }
+
+    /// How much wider than under white noise an effect scatters that is the same for all
+    /// stars of a frame and slow: at least 1.
+    pub(crate) fn inflation(&self) -> f64 {
+        if self.stars > BEYOND_DOUBT * self.sigma {
+            1.0 + 2.0 * self.lags as f64 * self.stars
+        } else {
+            1.0
+        }
+    }
+}
+
+/// Slow parts of `residual` (arcsec, per axis over all rows) on times of `tau_s`, about
+/// those `axes` that count. `None` with too little data.
+pub(crate) fn slow(
+    data: &StarData,
+    residual: &[Vec<f64>],
+    axes: [bool; 3],
+    tau_s: f64,
+) -> Option<Slow> {
+    let step = median_step(&data.frames.t_s)?;
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a positive number of frames, limited"
+    )]
+    let lags = (0.5 * tau_s / step).clamp(1.0, MOST_LAGS as f64) as usize;
+    let weight = weights(data, residual);
+    let counts = |r: &usize| {
+        !data.outlier[*r]
+            && weight[data.star[*r]] > 0.0
+            && residual.iter().all(|a| a[*r].is_finite())
+    };
+    let frames = data.frames.frames();
+    // the rotation in units of its white noise; what is left of every star in units of its own
+    let mut turn: Vec<Option<Vector3<f64>>> = vec![None; frames];
+    let mut left = vec![[0.0; 2]; data.t_s.len()];
+    let mut freedom = vec![0.0; frames];
+    for k in 0..frames {
+        let rows: Vec<usize> = data.frames.rows_of(k).filter(counts).collect();
+        if rows.len() < 3 {
+            continue;
+        }
+        let (mut normal, mut moment) = (Matrix3::zeros(), Vector3::zeros());
+        for &r in &rows {
+            let w = weight[data.star[r]];
+            for (axis, a) in rotation_row(data, r).map(Vector3::from).iter().enumerate() {
+                normal += a * a.transpose() * w;
+                moment += a * (w * residual[axis][r]);
+            }
+        }
+        let Some(covariance) = normal.try_inverse() else {
+            continue;
+        };
+        let theta = covariance * moment;
+        turn[k] = Some(Vector3::from_fn(|a, _| {
+            theta[a] / covariance[(a, a)].sqrt()
+        }));
+        for &r in &rows {
+            let root = weight[data.star[r]].sqrt();
+            for (axis, a) in rotation_row(data, r).map(Vector3::from).iter().enumerate() {
+                left[r][axis] = root * (residual[axis][r] - a.dot(&theta));
+            }
+        }
+        freedom[k] = 2.0 * rows.len() as f64 - 3.0;
+    }
+    let asked: Vec<usize> = (0..3).filter(|&a| axes[a]).collect();
+    let (mut rotation, mut of_rotation, mut stars, mut of_stars) = (0.0, 0.0, 0.0, 0.0);
+    let mut last: Vec<Vec<usize>> = vec![Vec::new(); data.stars.len()];
+    let mut own = vec![[0.0; 2]; data.stars.len()];
+    for k in 0..frames {
+        let Some(now) = turn[k] else { continue };
+        for lag in 1..=lags.min(k) {
+            if data.frames.t_s[k] - data.frames.t_s[k - lag] > (lags as f64 + 0.5) * step {
+                break;
+            }
+            if let Some(before) = turn[k - lag] {
+                rotation += asked.iter().map(|&a| now[a] * before[a]).sum::<f64>();
+                of_rotation += asked.len() as f64;
+            }
+        }
+        let mut products = 0.0;
+        let rows: Vec<usize> = data.frames.rows_of(k).filter(counts).collect();
+        for &r in &rows {
+            let past = &mut last[data.star[r]];
+            for &p in past.iter().rev().take(lags) {
+                if data.t_s[r] - data.t_s[p] > (lags as f64 + 0.5) * step {
+                    break;
+                }
+                let product = left[r][0] * left[p][0] + left[r][1] * left[p][1];
+                stars += product;
+                products += 1.0;
+                own[data.star[r]][0] += product;
+                own[data.star[r]][1] += 2.0;
+            }
+            past.push(r);
+        }
+        of_stars += products * freedom[k] / rows.len().max(1) as f64;
+    }
+    (of_rotation > 0.0 && of_stars >= LEAST_PRODUCTS).then(|| Slow {
+        rotation: rotation / of_rotation,
+        stars: stars / of_stars,
+        sigma: of_stars.sqrt().recip(),
+        lags,
+        star: own
+            .iter()
+            .filter(|[_, n]| *n >= LEAST_PRODUCTS)
+            .map(|[sum, n]| sum / n.sqrt())
+            .fold(0.0, f64::max),
+        count: data.stars.len(),
+    })
+}
+
+/// One over the white variance of each star, from differences of neighbours.
+fn weights(data: &StarData, residual: &[Vec<f64>]) -> Vec<f64> {
+    let mut last: Vec<Option<usize>> = vec![None; data.stars.len()];
+    let mut sum = vec![[0.0; 2]; data.stars.len()];
+    for r in (0..data.t_s.len()).filter(|&r| !data.outlier[r]) {
+        let star = data.star[r];
+        if let Some(p) = last[star] {
+            let square: f64 = residual.iter().map(|a| (a[r] - a[p]).powi(2)).sum();
+            if square.is_finite() {
+                // two axes, two ends
+                sum[star][0] += 0.25 * square;
+                sum[star][1] += 1.0;
+            }
+        }
+        last[star] = Some(r);
+    }
+    sum.iter()
+        .map(|[square, n]| if *square > 0.0 { n / square } else { 0.0 })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn slow(rotation: f64, stars: f64, star: f64) -> Slow {
+        Slow {
+            rotation,
+            stars,
+            sigma: 0.001,
+            lags: 50,
+            star,
+            count: 14,
+        }
+    }
+
+    #[test]
+    fn whose_it_is() {
+        // less than eight times the stars' own, which are beyond doubt
+        assert!(slow(0.03, 0.005, 1.0).is_of_the_stars());
+        assert!(!slow(0.05, 0.005, 1.0).is_of_the_stars());
+        // the stars show nothing
+        assert!(!slow(0.01, 0.003, 1.0).is_of_the_stars());
+    }
+
+    #[test]
+    fn it_is_told_where_nothing_else_explains_it() {
+        let beside = |slow: Slow, known: &[f64], p_value: f64| {
+            let mut left = Unattributed {
+                present: !known.is_empty(),
+                ..Unattributed::default()
+            };
+            left.depends_on
+                .extend(known.iter().map(|&share| Dependence {
+                    variable: "mag".to_owned(),
+                    variance_explained: share,
+                    p_value,
+                }));
+            slow.tell(&mut left, 1.0);
+            let names = left.depends_on.into_iter().map(|d| d.variable);
+            (left.present, names.collect::<Vec<_>>())
+        };
+        let told = |slow: Slow, known: &[f64]| beside(slow, known, 1e-9);
+        assert_eq!(
+            told(slow(0.0, 0.01, 1.0), &[]),
+            (true, vec!["time*star".to_owned()])
+        );
+        // one star is enough
+        assert!(told(slow(0.0, 0.0, 8.0), &[]).0);
+        assert!(!told(slow(0.0, 0.002, 3.0), &[]).0);
+        let both = ["time*star", "mag"];
+        assert_eq!(told(slow(0.0, 0.1, 1.0), &[0.005]).1, ["mag"]);
+        assert_eq!(told(slow(0.0, 0.1, 1.0), &[0.004]).1, both);
+        // 0.1 is beyond doubt, but chance makes the other in one bundle of 200
+        assert_eq!(beside(slow(0.0, 0.1, 1.0), &[0.019], 5e-3).1, ["mag"]);
+        assert_eq!(beside(slow(0.0, 0.1, 1.0), &[0.018], 5e-3).1, both);
+    }
+
+    #[test]
+    fn slow_noise_widens() {
+        assert!((slow(0.0, 0.01, 1.0).inflation() - 2.0).abs() < 1e-12);
+        assert!((slow(0.0, 0.003, 1.0).inflation() - 1.0).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,466 @@
+//! What is left beside the effects that were chosen, described.
+//!
+//! One pass over the stars holds the chosen effects, what each would be if it changed
+//! with something ([`crate::causes::invariance`]), and every term of one variable or of two
+//! ([`crate::search::empirical`]). Whether an effect stands in for another cause, whether it is
+//! the same everywhere, and what the leftover follows are then algebra.
+//!
+//! Not physics: which columns stand beside which.
+
+use block_regression::Folds;
+use effects::{AttitudeRows, Candidate, Coefficient, Effect, EffectError, StarRows, Surroundings};
+use focal_plane::{Camera, PointsMut, VectorsMut};
+use std::sync::Arc;
+
+use crate::causes::invariance::{Changing, Inner, Way};
+use crate::error::CloseError;
+use crate::figures::{self, Followed};
+use crate::search::empirical::{Empirical, Variable, flux_of, range};
+use crate::search::selection::{columns_of, each, judged};
+use crate::search::{Fitted, Found, borrowed, fit};
+use crate::situation::Situation;
+use crate::situation::channels_of_interest;
+use crate::star::columns::star_columns_of;
+use crate::star::data::StarData;
+use crate::star::evidence::StarEvidence;
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+use telemetry::report::{Dependence, Unattributed};
+
+/// Stars beyond which none has a term of its own.
+const MOST_STARS: usize = 64;
+/// Stars beyond which an effect is not tried with a size for each.
+const MOST_OF_OWN_SIZE: usize = 24;
+/// Rows beyond which blocks are this many times as long.
+const MANY_ROWS: usize = 300_000;
+const FEWER: usize = 3;
+/// Chance beyond which stars differ by more than a line through them.
+const BESIDE_A_LINE: f64 = 1e-4;
+/// Channels beyond which none is paired with another variable: all pairs are paid for.
+const MOST_CHANNELS: usize = 6;
+
+/// A term, and where its columns stand.
+#[derive(Debug)]
+pub(crate) struct Term {
+    pub(crate) term: Empirical,
+    /// Its first column.
+    pub(crate) first: usize,
+    /// Parts by which it is judged, as columns; those that the data cannot show are left out.
+    pub(crate) parts: Vec<Vec<usize>>,
+}
+
+/// See the module.
+#[derive(Debug)]
+pub(crate) struct Described {
+    pub(crate) fitted: Fitted,
+    /// The chosen effects are the first groups.
+    pub(crate) chosen: Vec<usize>,
+    pub(crate) terms: Vec<Term>,
+    /// Of each chosen effect, how it may change and the columns of that change.
+    pub(crate) changes: Vec<Vec<(Way, Vec<usize>)>>,
+    /// Ids of the chosen effects.
+    pub(crate) names: Vec<&'static str>,
+    /// What the columns of each chosen effect cost, nats: terms do not pay for choices either.
+    pub(crate) paid: Vec<f64>,
+}
+
+impl Described {
+    /// The pass; `found` is what was chosen under `evidence`.
+    pub(crate) fn new(
+        evidence: &StarEvidence<'_>,
+        folds: &Folds,
+        found: &Found,
+        terms: Vec<Empirical>,
+        ways: &[Way],
+    ) -> Result<Self, CloseError> {
+        let chosen = &found.selection.chosen;
+        let estimate = found
+            .fitted
+            .fits
+            .estimate(&columns_of(&found.fitted.groups, chosen));
+        let only = found.only(chosen);
+        let mut changing = Vec::new();
+        if let Some(estimate) = estimate {
+            let values = only.spread(&estimate.value);
+            let mut first = 0;
+            for candidate in &only.candidates {
+                let end = first + candidate.coefficients().len();
+                let own = &values.as_slice()[first..end];
+                first = end;
+                changing.push(Changing::new(Inner::Lent(*candidate), own, ways.to_vec()));
+            }
+        }
+        let mut all: Vec<&dyn Candidate> = only.candidates.clone();
+        all.extend(changing.iter().map(|c| c as &dyn Candidate));
+        all.extend(terms.iter().map(|t| t as &dyn Candidate));
+        // products of hundreds of columns a block: in long runs, of fewer blocks
+        let fitted = if evidence.data.t_s.len() > MANY_ROWS {
+            fit(evidence, &folds.coarser(FEWER), &all)?
+        } else {
+            fit(evidence, folds, &all)?
+        };
+        let n = chosen.len();
+        let names = only.candidates.iter().map(|c| c.id()).collect();
+        let paid = fitted.groups[..n]
+            .iter()
+            .map(|g| g.columns.len() as f64 * each(fitted.scalars))
+            .collect();
+        let mut first: usize = only.candidates.iter().map(|c| c.coefficients().len()).sum();
+        let mut changes = vec![Vec::new(); n];
+        for (k, changing) in changing.iter().enumerate() {
+            let seen = &fitted.groups[n + k].columns;
+            for (way, columns) in changing.ways() {
+                let own = first + columns.start..first + columns.end;
+                let columns: Vec<usize> = own.filter(|c| seen.contains(c)).collect();
+                if !columns.is_empty() {
+                    changes[k].push((way.clone(), columns));
+                }
+            }
+            first += changing.coefficients().len();
+        }
+        let groups = &fitted.groups[n + changing.len()..];
+        let terms = terms
+            .into_iter()
+            .zip(groups)
+            .map(|(term, group)| {
+                let mut parts: Vec<Vec<usize>> = Vec::new();
+                for part in term.parts() {
+                    let part: Vec<usize> = part
+                        .into_iter()
+                        .map(|k| first + k)
+                        .filter(|c| group.columns.contains(c))
+                        .collect();
+                    if !part.is_empty() && !parts.contains(&part) {
+                        parts.push(part);
+                    }
+                }
+                let own = first;
+                first += term.coefficients().len();
+                Term {
+                    term,
+                    first: own,
+                    parts,
+                }
+            })
+            .collect();
+        Ok(Self {
+            fitted,
+            chosen: (0..n).collect(),
+            terms,
+            changes,
+            names,
+            paid,
+        })
+    }
+}
+
+impl Described {
+    /// What the leftover follows; `left` is the share of the before variance that is left.
+    pub(crate) fn follows(&self, left: f64) -> Unattributed {
+        let set = columns_of(&self.fitted.groups, &self.chosen);
+        let terms: Vec<_> = self
+            .terms
+            .iter()
+            .map(|t| Followed {
+                variable: t.term.name(),
+                parts: t.parts.clone(),
+                of_many: t.term.is_of_many(),
+            })
+            .collect();
+        let tried = terms.len();
+        let each = each(self.fitted.scalars);
+        let mut told = figures::follows(&self.fitted.fits, &set, &terms, tried, each, left);
+        self.stars_before_their_constants(&set, &mut told.depends_on);
+        told
+    }
+
+    /// A dozen stars lie on some bent line of any number that they have: magnitude, colour and
+    /// flux stand behind `star` where the stars differ beyond what such a line explains.
+    fn stars_before_their_constants(&self, set: &[usize], list: &mut Vec<Dependence>) {
+        let fits = &self.fitted.fits;
+        let square = |term: &Term| -> Option<(f64, f64)> {
+            let own = term.parts.last()?;
+            let mut with = set.to_vec();
+            with.extend(own);
+            let which: Vec<usize> = (set.len()..with.len()).collect();
+            Some((fits.estimate(&with)?.square(&which)?, own.len() as f64))
+        };
+        let Some(stars) = self.terms.iter().find(|t| t.term.is_of_stars()) else {
+            return;
+        };
+        let Some((of_stars, columns)) = square(stars) else {
+            return;
+        };
+        let behind: Vec<String> = self
+            .terms
+            .iter()
+            .filter(|t| t.term.is_of_a_star())
+            .filter(|t| {
+                square(t).is_some_and(|(of_line, own)| {
+                    let law = ChiSquared::new((columns - own).max(1.0));
+                    let beyond = (of_stars - of_line).max(0.0);
+                    law.is_ok_and(|law| law.sf(beyond) < BESIDE_A_LINE)
+                })
+            })
+            .map(|t| t.term.name())
+            .collect();
+        let first = list.iter().position(|d| behind.contains(&d.variable));
+        let Some(first) = first else { return };
+        let name = stars.term.name();
+        let all: Vec<Vec<usize>> = stars.parts.last().into_iter().cloned().collect();
+        let tried = self.terms.len();
+        let term = Followed {
+            variable: name.clone(),
+            parts: all,
+            of_many: false,
+        };
+        let whole = figures::follows(fits, set, &[term], tried, 0.0, 1.0);
+        let Some(entry) = whole.depends_on.into_iter().find(figures::certain) else {
+            return;
+        };
+        let at = list.iter().position(|d| d.variable == name);
+        if at.is_some_and(|at| at < first) {
+            return;
+        }
+        list.retain(|d| d.variable != name);
+        list.insert(first, entry);
+    }
+}
+
+/// The term that `left` follows most, of those that a model can declare, as a candidate
+/// behind those of `found`.
+pub(crate) fn offer(
+    evidence: &StarEvidence<'_>,
+    folds: &Folds,
+    found: &mut Found,
+    left: &Unattributed,
+    terms: Vec<Empirical>,
+    surroundings: &Surroundings<'_>,
+) -> Result<(), CloseError> {
+    let certain = left.depends_on.iter().filter(|d| figures::certain(d));
+    let Some(term) = certain
+        .filter_map(|d| terms.iter().find(|t| t.name() == d.variable))
+        .find(|t| t.is_declarable(surroundings))
+    else {
+        return Ok(());
+    };
+    found.candidates.push(Box::new(term.clone()));
+    found.fitted = fit(evidence, folds, &borrowed(&found.candidates))?;
+    let (fitted, chosen) = (&found.fitted, &found.selection.chosen);
+    let mut all = judged(
+        &fitted.fits,
+        &fitted.groups,
+        chosen,
+        &vec![terms.len() as f64; fitted.groups.len()],
+    );
+    found.selection.judged.extend(all.pop());
+    Ok(())
+}
+
+/// What an effect may change with.
+pub(crate) fn ways(situation: &Situation<'_>, data: &StarData) -> Vec<Way> {
+    let range = |values: &[f64]| range(values.iter().copied());
+    let [vx, vy] = &data.velocity;
+    let rate: Vec<f64> = vx.iter().zip(vy).map(|(x, y)| x.hypot(*y)).collect();
+    let mut ways = vec![
+        Way::With(Variable::Time, range(&data.t_s)),
+        Way::With(Variable::Rate, range(&rate)),
+        Way::With(Variable::Magnitude, range(&data.mag)),
+        Way::With(Variable::Colour, range(&data.bv)),
+        Way::With(Variable::Position(0), range(&data.modelled[0])),
+        Way::With(Variable::Position(1), range(&data.modelled[1])),
+    ];
+    for (name, series) in channels_of_interest(&situation.channels) {
+        let known = range(series.value());
+        ways.push(Way::With(
+            Variable::Housekeeping(name, series.clone()),
+            known,
+        ));
+    }
+    ways.retain(|w| match w {
+        Way::With(_, [low, high]) => high > low,
+        Way::Star(_) => true,
+    });
+    if data.stars.len() <= MOST_OF_OWN_SIZE {
+        ways.push(Way::Star(data.stars.iter().map(|s| s.id).collect()));
+    }
+    ways
+}
+
+/// What the noise level may follow.
+pub(crate) fn of_noise(situation: &Situation<'_>, data: &StarData) -> Vec<(Variable, [f64; 2])> {
+    let mut list: Vec<(Variable, [f64; 2])> = ways(situation, data)
+        .into_iter()
+        .filter_map(|way| match way {
+            // the catalogue has an effect for a slope in magnitude
+            Way::With(Variable::Magnitude, _) | Way::Star(_) => None,
+            Way::With(variable, range) => Some((variable, range)),
+        })
+        .collect();
+    let [ax, ay] = &data.acceleration;
+    let size = range(ax.iter().zip(ay).map(|(x, y)| x.hypot(*y)));
+    if size[1] > size[0] {
+        list.push((Variable::Acceleration, size));
+    }
+    list.extend((0..2).map(|axis| (Variable::Phase(axis), [0.0, 1.0])));
+    list
+}
+
+/// Every variable that the bundle gives values of, and the pairs that matter.
+pub(crate) fn terms(situation: &Situation<'_>, data: &StarData) -> Vec<Empirical> {
+    let largest = |series: &[Vec<f64>; 2]| {
+        let [low, high] = range(series.iter().flatten().copied());
+        let size = low.abs().max(high.abs());
+        [-size, size]
+    };
+    let range = |values: &[f64]| range(values.iter().copied());
+    let off: Vec<f64> = (0..2)
+        .flat_map(|a| {
+            let (at, window) = (&data.modelled[a], &data.window_px[a]);
+            at.iter().zip(window).map(|(p, w)| p - w)
+        })
+        .collect();
+    let position = [0, 1].map(|a| (Variable::Position(a), range(&data.modelled[a])));
+    let phase = [0, 1].map(|a| (Variable::Phase(a), [0.0, 1.0]));
+    let time = (Variable::Time, range(&data.t_s));
+    let rate = (Variable::Rate, largest(&data.velocity));
+    let mag = (Variable::Magnitude, range(&data.mag));
+    let colour = (Variable::Colour, range(&data.bv));
+    let flux: Vec<f64> = data.mag.iter().map(|m| flux_of(*m)).collect();
+    let flux = (Variable::Brightness, range(&flux));
+    let channels: Vec<_> = channels_of_interest(&situation.channels)
+        .map(|(name, series)| {
+            let known = range(series.value());
+            (Variable::Housekeeping(name, series.clone()), known)
+        })
+        .collect();
+    let mut terms = Vec::new();
+    let one =
+        |(variable, range): &(Variable, [f64; 2])| Empirical::new(variable.clone(), *range, true);
+    let two = |of: &(Variable, [f64; 2]), by: &(Variable, [f64; 2])| {
+        Empirical::pair(of.0.clone(), of.1, by.0.clone(), by.1)
+    };
+    for axis in 0..2 {
+        terms.extend(one(&position[axis]));
+        terms.extend(one(&phase[axis]));
+    }
+    for single in [&time, &rate, &mag, &colour] {
+        terms.extend(one(single));
+    }
+    terms.extend(one(&(Variable::Acceleration, largest(&data.acceleration))));
+    if mag.1[0] >= mag.1[1] || !mag.1[0].is_finite() {
+        // no magnitudes
+        terms.extend(one(&(Variable::Flux, range(&data.log_flux))));
+    } else {
+        terms.extend(one(&flux));
+    }
+    terms.extend(one(&(Variable::Window, range(&off))));
+    terms.extend(channels.iter().filter_map(one));
+    let few = !data.free_directions && data.stars.len() <= MOST_STARS;
+    let ids: Vec<i64> = data.stars.iter().map(|s| s.id).collect();
+    if few {
+        let star = (Variable::Star(ids), [0.0, 1.0]);
+        terms.extend(one(&star));
+        terms.extend(two(&star, &time));
+        if let Some(slots) = own_slots(data) {
+            terms.extend(one(&(Variable::Slot(slots), [0.0, 1.0])));
+        }
+    }
+    let mut scalars = vec![&time, &mag, &colour];
+    if channels.len() <= MOST_CHANNELS {
+        scalars.extend(&channels);
+    }
+    for by in &scalars {
+        for of in position.iter().chain(&phase) {
+            terms.extend(two(of, by));
+        }
+    }
+    // charge is held back in proportion to it, the more the farther it is moved
+    terms.extend(position.iter().filter_map(|of| two(of, &flux)));
+    for by in position.iter().chain([&time, &mag, &colour]) {
+        terms.extend(two(&rate, by));
+    }
+    for of in [&mag, &colour] {
+        terms.extend(
+            scalars
+                .iter()
+                .filter(|by| !matches!(by.0, Variable::Magnitude | Variable::Colour))
+                .filter_map(|by| two(of, by)),
+        );
+    }
+    terms
+}
+
+/// The slots, where they are not just the stars under another name.
+fn own_slots(data: &StarData) -> Option<Vec<i32>> {
+    let mut pairs: Vec<(i32, i64)> = data
+        .frames
+        .slot
+        .iter()
+        .copied()
+        .zip(data.frames.star_id.iter().copied())
+        .collect();
+    pairs.sort_unstable();
+    pairs.dedup();
+    let mut slots: Vec<i32> = pairs.iter().map(|p| p.0).collect();
+    slots.dedup();
+    let moved = pairs.len() > slots.len() || pairs.len() > data.stars.len();
+    (moved && slots.len() <= MOST_STARS).then_some(slots)
+}
+
+/// Some of the columns of a candidate, kept in every fit: described, but not named.
+#[derive(Clone, Debug)]
+pub(crate) struct Kept {
+    inner: Arc<dyn Candidate>,
+    columns: Vec<usize>,
+    coefficients: Vec<Coefficient>,
+}
+
+impl Kept {
+    pub(crate) fn new(inner: Arc<dyn Candidate>, columns: Vec<usize>) -> Self {
+        let coefficients = columns
+            .iter()
+            .map(|&c| inner.coefficients()[c].clone())
+            .collect();
+        Self {
+            inner,
+            columns,
+            coefficients,
+        }
+    }
+}
+
+impl Candidate for Kept {
+    fn id(&self) -> &'static str {
+        self.inner.id()
+    }
+    fn coefficients(&self) -> &[Coefficient] {
+        &self.coefficients
+    }
+    fn acts_on_stars(&self) -> bool {
+        true
+    }
+    fn acts_on_attitude(&self) -> bool {
+        false
+    }
+    fn star_columns(&self, camera: &Camera, rows: &StarRows<'_>, out: PointsMut<'_>) -> bool {
+        let n = rows.len();
+        let Some([x, y]) = star_columns_of(self.inner.as_ref(), camera, rows) else {
+            return false;
+        };
+        for (to, &from) in self.columns.iter().enumerate() {
+            out.x[to * n..(to + 1) * n].copy_from_slice(&x[from * n..(from + 1) * n]);
+            out.y[to * n..(to + 1) * n].copy_from_slice(&y[from * n..(from + 1) * n]);
+        }
+        true
+    }
+    fn attitude_columns(&self, _: &AttitudeRows<'_>, _: VectorsMut<'_>) -> bool {
+        false
+    }
+    fn realise(
+        &self,
+        values: &[f64],
+        surroundings: &Surroundings<'_>,
+    ) -> Result<Box<dyn Effect>, EffectError> {
+        self.inner.realise(values, surroundings)
+    }
+}

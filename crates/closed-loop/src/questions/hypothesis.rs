@@ -1,0 +1,494 @@
+//! What the data says of an effect that somebody asks about by name.
+//!
+//! ```text
+//! detectable     5 sigma of the size, everything else estimated beside it
+//! needed         size c with c^2 |column|^2 = squared residual beyond the noise
+//! share          (E_without - E_with) / E_without, E the squared error at the best fit, in sample
+//! at most        (sqrt(E_without - E_with) + sqrt(k v chi2_95))^2 / E_without
+//! ```
+//!
+//! `|column|^2` is what the declared unknowns leave of the effect's regressor, `v` the noise
+//! variance, `chi2_95` the 95 % point for the effect's number of coefficients, and `k` how much
+//! wider than white noise the coefficients scatter from block to block. All of it is worked out
+//! beside the other effects that were added. Sizes are given as the effect's parameter: a smear
+//! enters with the square of its exposure, and is told as an exposure.
+//!
+//! Source: Scheffe 1953 (the largest of all combinations within a confidence ellipsoid).
+
+use block_regression::Estimate;
+use effects::{Candidate, EffectKind, Surroundings};
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+use telemetry::report::{ConsideredEffect, FoundEffect, Hypothesis, HypothesisSize, Selector};
+
+use crate::error::CloseError;
+use crate::search::Found;
+use crate::search::selection::columns_of;
+
+/// Sigmas that a size takes to be seen.
+const SEEN: f64 = 5.0;
+/// Sizes within this many sigmas of what nature makes are plausible.
+const PLAUSIBLE: f64 = 3.0;
+
+/// Effects to be tested by name.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Questions {
+    ids: Vec<String>,
+    /// Whether what is left is to be added as an empirical term.
+    pub(crate) empirical: bool,
+}
+
+impl Questions {
+    /// Asks about effects of the catalogue by id; one that is named twice is asked about once.
+    ///
+    /// # Errors
+    /// [`CloseError::UnknownHypothesis`] with the ids that exist.
+    ///
+    /// ```
+    /// use closed_loop::Questions;
+    ///
+    /// assert!(Questions::about(["rolling_shutter", "exposure_smear"]).is_ok());
+    /// let error = Questions::about(["turn-around"]).unwrap_err().to_string();
+    /// assert!(error.contains("`turn-around`") && error.contains("exposure_smear"));
+    /// ```
+    pub fn about<S: AsRef<str>>(ids: impl IntoIterator<Item = S>) -> Result<Self, CloseError> {
+        let mut all: Vec<String> = Vec::new();
+        for id in ids {
+            let id = id.as_ref();
+            if !effects::catalogue().iter().any(|kind| kind.id() == id) {
+                let known: Vec<&str> = effects::catalogue().iter().map(|k| k.id()).collect();
+                return Err(CloseError::UnknownHypothesis {
+                    id: id.to_owned(),
+                    known: known.join(", "),
+                });
+            }
+            if !all.iter().any(|known| known == id) {
+                all.push(id.to_owned());
+            }
+        }
+        Ok(Self {
+            ids: all,
+            empirical: false,
+        })
+    }
+
+    /// Also add what the leftover follows most, as an empirical term: after the verdict, which it does
+    /// not change.
+    #[must_use]
+    pub fn adding_empirical(self, yes: bool) -> Self {
+        Self {
+            empirical: yes,
+            ..self
+        }
+    }
+
+    /// Whether this effect was asked about.
+    pub(crate) fn include(&self, id: &str) -> bool {
+        self.ids.iter().any(|known| known == id)
+    }
+}
+
+/// What the answers are drawn from.
+pub(crate) struct Grounds<'a> {
+    pub(crate) found: &'a Found,
+    pub(crate) surroundings: Surroundings<'a>,
+    /// Squared length of a candidate column, in the square of the residual's unit.
+    pub(crate) information: &'a dyn Fn(usize) -> f64,
+    /// Squared residual beyond the noise of the declared model, and with what was added; `None`
+    /// where there is none to speak of.
+    pub(crate) alone: Option<f64>,
+    pub(crate) left: Option<f64>,
+    /// Whether the samples tell how the tracker moved between them.
+    pub(crate) resolved: bool,
+    pub(crate) effects: &'a [FoundEffect],
+    pub(crate) considered: &'a [ConsideredEffect],
+}
+
+/// Whether a squared residual stands out of noise with `scalars` numbers of `variance` each: by 5
+/// sigma of the sum of their squares.
+pub(crate) fn beyond(excess: f64, variance: f64, scalars: f64) -> Option<f64> {
+    (excess > SEEN * variance * (2.0 * scalars).sqrt()).then_some(excess)
+}
+
+/// Answers in the order asked.
+pub(crate) fn answer(questions: &Questions, grounds: &Grounds<'_>) -> Vec<Hypothesis> {
+    effects::catalogue()
+        .iter()
+        .filter_map(|kind| {
+            let at = questions.ids.iter().position(|id| id == kind.id())?;
+            Some((at, grounds.about(*kind)))
+        })
+        .collect::<std::collections::BTreeMap<_, _>>()
+        .into_values()
+        .collect()
+}
+
+impl Grounds<'_> {
+    fn about(&self, kind: &dyn EffectKind) -> Hypothesis {
+        let id = kind.id();
+        let mut answer = match self.best(id) {
+            Some(g) => self.judged(g),
+            None => self.listed(kind),
+        };
+        answer.id = id.to_owned();
+        answer.added = self.effects.iter().any(|e| e.id == id);
+        answer.finding = finding(&answer);
+        answer
+    }
+
+    /// The form of an effect that was added, or that gains most.
+    fn best(&self, id: &str) -> Option<usize> {
+        let found = self.found;
+        let chosen = &found.selection.chosen;
+        let judged = &found.selection.judged;
+        (0..found.candidates.len())
+            .filter(|&g| found.candidates[g].id() == id && judged[g].observable)
+            .max_by(|&a, &b| {
+                let key = |g: usize| (chosen.contains(&g), judged[g].delta_loglik);
+                let (a, b) = (key(a), key(b));
+                a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))
+            })
+    }
+
+    /// An effect with columns in this data.
+    fn judged(&self, g: usize) -> Hypothesis {
+        let found = self.found;
+        let candidate = found.candidates[g].as_ref();
+        let judged = &found.selection.judged[g];
+        let chosen = found.selection.chosen.contains(&g);
+        let mut answer = Hypothesis {
+            selectors: candidate
+                .selectors()
+                .iter()
+                .map(|(k, v)| (k.clone(), Selector::from(v.as_str())))
+                .collect(),
+            significant: judged.stands(),
+            observable: true,
+            delta_loglik: Some(judged.delta_loglik),
+            p_value: Some(judged.p_value),
+            ..Hypothesis::default()
+        };
+        let fits = &found.fitted.fits;
+        let others: Vec<usize> = found
+            .selection
+            .chosen
+            .iter()
+            .copied()
+            .filter(|&c| c != g)
+            .collect();
+        let without = columns_of(&found.fitted.groups, &others);
+        let mut with = without.clone();
+        with.extend(&found.fitted.groups[g].columns);
+        let (Some(estimate), Some(e0), Some(e1), Some(variance)) = (
+            fits.estimate(&with),
+            fits.error(&without),
+            fits.error(&with),
+            fits.variance(&with),
+        ) else {
+            return answer;
+        };
+        let own = without.len();
+        let taken = (e0 - e1).max(0.0);
+        let p = with.len() - own;
+        let widening = (own..with.len())
+            .map(|i| estimate.sigma(i).powi(2) / estimate.white[(i, i)])
+            .fold(1.0, f64::max);
+        let chi2 = ChiSquared::new(p as f64).map_or(0.0, |law| law.inverse_cdf(0.95));
+        let most = (taken.sqrt() + (widening * variance * chi2).sqrt()).powi(2);
+        answer.variance_share = Some(taken / e0);
+        answer.variance_share_at_most = Some((most / e0).min(1.0));
+        let first: usize = found.candidates[..g]
+            .iter()
+            .map(|c| c.coefficients().len())
+            .sum();
+        answer.sizes = found.fitted.groups[g]
+            .columns
+            .iter()
+            .enumerate()
+            .map(|(k, &column)| self.size(candidate, column, column - first, &estimate, own + k))
+            .collect();
+        if chosen {
+            for size in &mut answer.sizes {
+                size.needed = None;
+                size.needed_is_plausible = None;
+            }
+        }
+        answer
+    }
+
+    /// The sizes of coefficient `j` of a candidate, whose estimate is number `at`.
+    fn size(
+        &self,
+        candidate: &dyn Candidate,
+        column: usize,
+        j: usize,
+        estimate: &Estimate,
+        at: usize,
+    ) -> HypothesisSize {
+        let coefficient = &candidate.coefficients()[j];
+        let told = Told::of(candidate, j, &self.surroundings);
+        let (value, sigma) = (estimate.value[at], estimate.sigma(at));
+        let information = (self.information)(column);
+        let needed = |excess: Option<f64>| {
+            excess
+                .filter(|_| information > 0.0)
+                .map(|e| (e / information).sqrt())
+        };
+        let [left, alone] = [needed(self.left), needed(self.alone)];
+        HypothesisSize {
+            parameter: told.name.clone(),
+            unit: told.unit.clone(),
+            value: Some(told.size(value)),
+            sigma: Some(0.5 * (told.size(value + sigma) - told.size(value - sigma))),
+            detectable: Some(told.size(SEEN * sigma)),
+            needed: left.map(|n| told.size(n)),
+            needed_alone: alone.map(|n| told.size(n)),
+            plausible: coefficient
+                .plausible
+                .is_finite()
+                .then(|| told.size(coefficient.plausible)),
+            needed_is_plausible: left
+                .or(alone)
+                .map(|n| n <= PLAUSIBLE * coefficient.plausible),
+        }
+    }
+
+    /// An effect without columns: it acts on images or on the noise, or is not to be seen.
+    fn listed(&self, kind: &dyn EffectKind) -> Hypothesis {
+        let id = kind.id();
+        if let Some(effect) = self.effects.iter().find(|e| e.id == id) {
+            return Hypothesis {
+                selectors: effect.selectors.clone(),
+                significant: true,
+                observable: true,
+                delta_loglik: Some(effect.delta_loglik),
+                p_value: Some(effect.p_value),
+                variance_share: effect.variance_explained,
+                sizes: effect
+                    .parameters
+                    .iter()
+                    .map(|(name, e)| HypothesisSize {
+                        parameter: name.clone(),
+                        unit: e.unit.clone(),
+                        value: Some(e.value),
+                        sigma: e.sigma,
+                        detectable: e.sigma.map(|s| SEEN * s),
+                        ..HypothesisSize::default()
+                    })
+                    .collect(),
+                ..Hypothesis::default()
+            };
+        }
+        if let Some(c) = self.considered.iter().find(|c| c.id == id && c.observable) {
+            return Hypothesis {
+                observable: true,
+                delta_loglik: c.delta_loglik,
+                p_value: c.p_value,
+                sizes: c
+                    .parameter
+                    .iter()
+                    .map(|parameter| HypothesisSize {
+                        parameter: parameter.clone(),
+                        unit: c.unit.clone().unwrap_or_default(),
+                        detectable: c.detectable,
+                        needed: c.needed.filter(|_| self.left.is_some()),
+                        ..HypothesisSize::default()
+                    })
+                    .collect(),
+                ..Hypothesis::default()
+            };
+        }
+        let candidates: Vec<usize> = (0..self.found.candidates.len())
+            .filter(|&g| self.found.candidates[g].id() == id)
+            .collect();
+        let reason = if !self.resolved && kind.needs().contains("the samples resolve") {
+            "the motion between the samples is not known: they do not predict each other".to_owned()
+        } else if candidates.is_empty() {
+            format!("the bundle lacks what it needs: {}", kind.needs())
+        } else if candidates
+            .iter()
+            .all(|&g| self.found.fitted.groups[g].columns.is_empty())
+        {
+            "in this motion it shifts nothing, or only what the declared unknowns (misalignment, \
+             attitude, distortion) take up"
+                .to_owned()
+        } else {
+            "in this motion it cannot be told from what was added".to_owned()
+        };
+        Hypothesis {
+            reason: Some(reason),
+            ..Hypothesis::default()
+        }
+    }
+}
+
+/// The parameter by which a coefficient is told.
+struct Told<'a> {
+    candidate: &'a dyn Candidate,
+    surroundings: &'a Surroundings<'a>,
+    j: usize,
+    name: String,
+    unit: String,
+    /// Position among the effect's parameters; `None`: the coefficient is its own parameter.
+    parameter: Option<usize>,
+}
+
+impl<'a> Told<'a> {
+    fn of(candidate: &'a dyn Candidate, j: usize, surroundings: &'a Surroundings<'a>) -> Self {
+        let coefficient = &candidate.coefficients()[j];
+        let mut told = Self {
+            candidate,
+            surroundings,
+            j,
+            name: coefficient.name.clone(),
+            unit: coefficient.unit.to_owned(),
+            parameter: None,
+        };
+        let typical = if coefficient.plausible.is_finite() {
+            coefficient.plausible
+        } else {
+            1.0
+        };
+        if let (Some(small), Some(large)) = (told.realised(0.5 * typical), told.realised(typical)) {
+            let moved = small
+                .iter()
+                .zip(&large)
+                .position(|(a, b)| a.unit != "rad" && (a.value - b.value).abs() > 0.0);
+            if let Some(k) = moved {
+                told.name.clone_from(&large[k].name);
+                told.unit = large[k].unit.to_owned();
+                told.parameter = Some(k);
+            }
+        }
+        told
+    }
+
+    fn realised(&self, value: f64) -> Option<Vec<effects::Parameter>> {
+        let mut values = vec![0.0; self.candidate.coefficients().len()];
+        values[self.j] = value;
+        let effect = self.candidate.realise(&values, self.surroundings).ok()?;
+        Some(effect.parameters())
+    }
+
+    /// A value of the coefficient as the parameter; below its physical range it is 0.
+    fn size(&self, value: f64) -> f64 {
+        let value = value.max(self.candidate.coefficients()[self.j].lower);
+        let told = self
+            .parameter
+            .and_then(|k| Some(self.realised(value)?.get(k)?.value));
+        told.unwrap_or(value)
+    }
+}
+
+/// Three digits, the way a sentence wants them.
+pub(crate) fn short(value: f64) -> String {
+    let size = value.abs();
+    if !value.is_finite() {
+        return "unknown".to_owned();
+    }
+    if size == 0.0 {
+        return "0".to_owned();
+    }
+    if (1e-3..1e4).contains(&size) {
+        let steps = [1e-2, 1e-1, 1.0, 10.0, 100.0];
+        let digits = 5 - steps.iter().filter(|s| size >= **s).count();
+        let text = format!("{value:.digits$}");
+        return match text.contains('.') {
+            true => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
+            false => text,
+        };
+    }
+    format!("{value:.2e}")
+}
+
+fn with_unit(value: f64, unit: &str) -> String {
+    let between = if unit.is_empty() { "" } else { " " };
+    format!("{}{between}{unit}", short(value))
+}
+
+/// The answer in a sentence or three.
+fn finding(h: &Hypothesis) -> String {
+    if let Some(reason) = &h.reason {
+        return format!("not observable: {reason}");
+    }
+    let mut said = Vec::new();
+    said.push(match (h.added, h.significant, h.p_value) {
+        (true, _, Some(p)) => format!("added: it predicts the residual out of fold (p = {p:.1e})"),
+        (true, _, None) => "added".to_owned(),
+        (false, true, Some(p)) => {
+            format!("significant (p = {p:.1e}), but not worth its parameters beside what was added")
+        }
+        (false, false, Some(p)) => format!("not significant (p = {p:.2})"),
+        (false, _, None) => "not significant".to_owned(),
+    });
+    // of several sizes, the one that would have to grow least
+    let reach = |s: &HypothesisSize| {
+        let needed = s.needed.or(s.needed_alone)?;
+        Some(needed / s.plausible.or(s.detectable)?)
+    };
+    let told = h.sizes.iter().min_by(|a, b| {
+        let key = |s: &HypothesisSize| reach(s).unwrap_or(f64::INFINITY);
+        key(a).total_cmp(&key(b))
+    });
+    if let Some(size) = told {
+        said.extend(told_size(h, size));
+    }
+    if let Some(most) = h.variance_share_at_most {
+        said.push(format!(
+            "it accounts for at most {} % of the squared residual",
+            short(100.0 * most)
+        ));
+    }
+    said.join("; ")
+}
+
+fn told_size(h: &Hypothesis, size: &HypothesisSize) -> Vec<String> {
+    let (name, unit) = (&size.parameter, &size.unit);
+    let mut said = Vec::new();
+    if let (true, Some(value), Some(sigma)) = (h.added, size.value, size.sigma) {
+        said.push(format!(
+            "{name} = {} +- {}",
+            short(value),
+            with_unit(sigma, unit)
+        ));
+    }
+    if let Some(d) = size.detectable {
+        said.push(format!(
+            "{name} = {} would have shown at 5 sigma",
+            with_unit(d, unit)
+        ));
+    }
+    let plausible = size.plausible.map_or_else(String::new, |p| {
+        let judged = match size.needed_is_plausible {
+            Some(true) => "plausible",
+            _ => "not plausible",
+        };
+        format!(
+            ", {judged} beside {} (1 sigma of what nature makes)",
+            with_unit(p, unit)
+        )
+    });
+    match (size.needed, size.needed_alone) {
+        (Some(n), _) => {
+            said.push(format!(
+                "to explain what is left beyond the noise by itself it would have to be {}{plausible}",
+                with_unit(n, unit)
+            ));
+            said.push(match size.detectable {
+                Some(d) if n > d => {
+                    "so it is not the cause of what is left: at that size it would have shown"
+                        .to_owned()
+                }
+                _ => "so it could be the cause: this data would not have shown that size".to_owned(),
+            });
+        }
+        (None, Some(n)) if h.added => said.push(format!(
+            "to explain by itself all that the declared model leaves beyond the noise it would have to be {}{plausible}",
+            with_unit(n, unit)
+        )),
+        (None, _) if !h.added => {
+            said.push("nothing is left beyond the noise that it could explain".to_owned());
+        }
+        _ => {}
+    }
+    said
+}

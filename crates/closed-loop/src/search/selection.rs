@@ -1,0 +1,241 @@
+//! Which effects the data supports: forward selection out of fold.
+//!
+//! Every candidate group is tried beside those already chosen. It is eligible
+//! if its out-of-fold log-likelihood gain is positive and its p-value, times what
+//! the search costs it, is below [`FAMILY_ALPHA`]. The whole search is paid for:
+//! of `n_k` groups of each kind k one pays
+//!
+//! ```text
+//! sqrt(n_k) sum over kinds j of sqrt(n_j)
+//! ```
+//!
+//! whose inverses add up to 1 (weighted Bonferroni). That is between paying by
+//! groups, with which a scale of one column would pay for hundreds of warm
+//! pixels, and by kinds, with which these would pay alone. Of the eligible ones the largest gain
+//! after a price per parameter wins, so that a flexible wrong effect does not
+//! beat a stiff right one:
+//!
+//! ```text
+//! rank = delta loglik - (p/2) ln n
+//! ```
+//!
+//! A group whose estimate is of a size that nature does not make is not eligible:
+//! its columns are a proxy for something else.
+//!
+//! After each addition all chosen groups are judged again beside the others and
+//! those that no longer stand are dropped.
+//!
+//! Source: Schwarz 1978 for the price of a parameter; Genovese, Roeder & Wasserman 2006
+//! for weights of p-values.
+
+use std::collections::BTreeMap;
+
+use block_regression::{Fits, OutOfFold};
+
+/// Chance that a bundle which follows its model gets any effect at all.
+pub(crate) const FAMILY_ALPHA: f64 = 0.01;
+
+/// Candidate columns that enter or leave together.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Group {
+    /// Positions among the candidate columns; those that the data cannot show are
+    /// not among them.
+    pub(crate) columns: Vec<usize>,
+    /// Least and largest credible amplitude of each of `columns`.
+    pub(crate) bounds: Vec<[f64; 2]>,
+    /// Choices among discrete forms that the group stands for, each paid for like
+    /// a parameter.
+    pub(crate) choices: usize,
+    /// Parameters that the columns follow non-linearly, found by scanning.
+    pub(crate) shapes: usize,
+    /// Groups of one family are forms of one cause: at most one is chosen.
+    pub(crate) family: String,
+    /// Groups of one kind are one effect, whatever it acts on.
+    pub(crate) kind: &'static str,
+}
+
+/// One group's standing beside the chosen ones.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Judgement {
+    /// Gain in out-of-fold log-likelihood, nats.
+    pub(crate) delta_loglik: f64,
+    /// Times what the search costs the group, at most 1.
+    pub(crate) p_value: f64,
+    /// The amplitudes are of a size that nature makes.
+    pub(crate) credible: bool,
+    /// The columns can be told from the nuisance and from the chosen.
+    pub(crate) observable: bool,
+}
+
+impl Judgement {
+    /// Nothing can be said of it.
+    pub(crate) const UNSEEN: Self = Self {
+        delta_loglik: 0.0,
+        p_value: 1.0,
+        credible: false,
+        observable: false,
+    };
+
+    /// It may be claimed.
+    pub(crate) fn stands(&self) -> bool {
+        self.observable && self.credible && self.delta_loglik > 0.0 && self.p_value < FAMILY_ALPHA
+    }
+}
+
+/// The outcome of the search.
+#[derive(Clone, Debug)]
+pub(crate) struct Selection {
+    /// Indices of groups in the order added.
+    pub(crate) chosen: Vec<usize>,
+    /// Standing of every group beside (for a chosen one: within) the final set.
+    pub(crate) judged: Vec<Judgement>,
+}
+
+/// All candidate columns of `chosen`, in order.
+pub(crate) fn columns_of(groups: &[Group], chosen: &[usize]) -> Vec<usize> {
+    chosen
+        .iter()
+        .flat_map(|&g| groups[g].columns.iter().copied())
+        .collect()
+}
+
+/// Runs the search. `scalars` is the number of independent scalars in the data;
+/// only groups that `may` be chosen are, and only they are paid for.
+pub(crate) fn select(fits: &Fits, groups: &[Group], may: &[bool], scalars: f64) -> Selection {
+    let cost = costs(groups, may);
+    let mut chosen: Vec<usize> = Vec::new();
+    // Each round adds one or stops; a group dropped by the backward check may
+    // not return, so the search ends.
+    let mut banned = vec![false; groups.len()];
+    loop {
+        let may: Vec<bool> = (0..groups.len()).map(|g| may[g] && !banned[g]).collect();
+        let ranked = ranked(fits, groups, &may, &chosen, scalars, &cost);
+        let Some(&added) = ranked.first() else { break };
+        chosen.push(added);
+        prune(fits, groups, &mut chosen, &mut banned, &cost);
+    }
+    let judged = judged(fits, groups, &chosen, &cost);
+    Selection { chosen, judged }
+}
+
+/// What the p-value of each group is multiplied by where those that `may` be chosen are tried.
+pub(crate) fn costs(groups: &[Group], may: &[bool]) -> Vec<f64> {
+    let mut of_kind: BTreeMap<&str, f64> = BTreeMap::new();
+    let tried = groups.iter().zip(may);
+    for (group, _) in tried.filter(|(g, may)| **may && !g.columns.is_empty()) {
+        *of_kind.entry(group.kind).or_default() += 1.0;
+    }
+    let all: f64 = of_kind.values().map(|n| n.sqrt()).sum();
+    let root = |g: &Group| of_kind.get(g.kind).map_or(1.0, |n| n.sqrt());
+    groups.iter().map(|g| root(g) * all.max(1.0)).collect()
+}
+
+/// Groups that may be added to `chosen`, best first: by the gain out of fold after
+/// the price of their parameters and choices.
+pub(crate) fn ranked(
+    fits: &Fits,
+    groups: &[Group],
+    may: &[bool],
+    chosen: &[usize],
+    scalars: f64,
+    cost: &[f64],
+) -> Vec<usize> {
+    let Some(base) = out_of_fold(fits, groups, chosen) else {
+        return Vec::new();
+    };
+    let mut standing: Vec<(usize, f64)> = (0..groups.len())
+        .filter(|&g| may[g] && !chosen.contains(&g))
+        .filter(|&g| chosen.iter().all(|&c| groups[c].family != groups[g].family))
+        .filter_map(|g| {
+            let judgement = judge(fits, groups, chosen, g, &base, cost);
+            let rank = judgement.delta_loglik - price(&groups[g], scalars);
+            judgement.stands().then_some((g, rank))
+        })
+        .collect();
+    standing.sort_by(|a, b| b.1.total_cmp(&a.1));
+    standing.into_iter().map(|(g, _)| g).collect()
+}
+
+/// What a group pays for its parameters and choices, nats.
+pub(crate) fn price(group: &Group, scalars: f64) -> f64 {
+    (group.columns.len() + group.choices) as f64 * each(scalars)
+}
+
+/// What a parameter costs, nats.
+pub(crate) fn each(scalars: f64) -> f64 {
+    0.5 * scalars.max(2.0).ln()
+}
+
+/// Standing of every group beside (for a chosen one: within) `chosen`.
+pub(crate) fn judged(
+    fits: &Fits,
+    groups: &[Group],
+    chosen: &[usize],
+    cost: &[f64],
+) -> Vec<Judgement> {
+    (0..groups.len())
+        .map(|g| {
+            let others: Vec<usize> = chosen.iter().copied().filter(|&c| c != g).collect();
+            match out_of_fold(fits, groups, &others) {
+                Some(base) => judge(fits, groups, &others, g, &base, cost),
+                None => Judgement::UNSEEN,
+            }
+        })
+        .collect()
+}
+
+/// Drops chosen groups that no longer stand beside the others.
+fn prune(
+    fits: &Fits,
+    groups: &[Group],
+    chosen: &mut Vec<usize>,
+    banned: &mut [bool],
+    cost: &[f64],
+) {
+    loop {
+        let fallen = chosen.iter().copied().find(|&g| {
+            let others: Vec<usize> = chosen.iter().copied().filter(|&c| c != g).collect();
+            out_of_fold(fits, groups, &others).is_some_and(|base| {
+                let judgement = judge(fits, groups, &others, g, &base, cost);
+                !judgement.stands()
+            })
+        });
+        let Some(g) = fallen else { return };
+        banned[g] = true;
+        chosen.retain(|&c| c != g);
+    }
+}
+
+fn out_of_fold(fits: &Fits, groups: &[Group], chosen: &[usize]) -> Option<OutOfFold> {
+    fits.out_of_fold(&columns_of(groups, chosen))
+}
+
+fn judge(
+    fits: &Fits,
+    groups: &[Group],
+    others: &[usize],
+    g: usize,
+    base: &OutOfFold,
+    cost: &[f64],
+) -> Judgement {
+    let mut set = columns_of(groups, others);
+    let first = set.len();
+    set.extend(&groups[g].columns);
+    if set.len() == first {
+        return Judgement::UNSEEN;
+    }
+    let which: Vec<usize> = (first..set.len()).collect();
+    let (Some(with), Some(estimate)) = (fits.out_of_fold(&set), fits.estimate(&set)) else {
+        return Judgement::UNSEEN;
+    };
+    Judgement {
+        delta_loglik: with.total_loglik() - base.total_loglik(),
+        credible: groups[g]
+            .bounds
+            .iter()
+            .zip(&which)
+            .all(|([low, high], &i)| (*low..=*high).contains(&estimate.value[i])),
+        p_value: (estimate.p_value(&which) * cost[g]).min(1.0),
+        observable: true,
+    }
+}

@@ -1,0 +1,34 @@
+//! Stars as the measurement: centroids against catalogue and reference, or against themselves.
+//!
+//! ```text
+//! run             the order of the steps, from bundle to report
+//! data            centroids beside what the declared model says of them
+//! directions      directions and attitudes from the centroids alone, where nothing else tells them
+//! frame_rotation  the rotation that the stars of a frame agree on
+//! nuisance        what the declared model leaves unknown, as columns with priors
+//! weights         how much each star counts
+//! columns         all columns of a fit, row by row
+//! moments         their products, in one pass, for every fit at every noise
+//! evidence        data, noise and products as what the search asks of a measurement
+//! settling        the declared model at its best, and the outliers beside it
+//! search          the search where the reference itself may err
+//! reference_wander, own_attitude    two things to tell beside the effects
+//! ```
+//!
+//! Not physics: the contents of a folder.
+
+pub(crate) mod columns;
+pub(crate) mod data;
+mod directions;
+pub(crate) mod evidence;
+pub(crate) mod frame_rotation;
+mod moments;
+pub(crate) mod nuisance;
+mod own_attitude;
+mod reference_wander;
+mod run;
+pub(crate) mod search;
+mod settling;
+pub(crate) mod weights;
+
+pub(crate) use run::run;

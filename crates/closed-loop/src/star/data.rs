@@ -1,0 +1,612 @@
+//! Star measurements beside what the declared model says of them.
+//!
+//! For every row: the projected position of the star (reference attitude or the
+//! frame's own, catalogue direction or the solved one), its velocity and
+//! acceleration across the detector, and the declared pixel-phase error. The
+//! residual is
+//!
+//! ```text
+//! r = (measured - projected - declared centroid error) * arcsec per pixel
+//! ```
+//!
+//! All regressors are evaluated at the *modelled* position, projection +
+//! misalignment + distortion, never at the measured one: regressing on measured
+//! positions explains noise by shrinking everything, and the triangle evaluated
+//! at the raw projection raises false alarms. The modelled position is improved
+//! once the first fit has given misalignment and distortion.
+//!
+//! Source: [M23] Fig. 4 for the order of the terms.
+
+use std::collections::HashMap;
+use std::ops::Range;
+use std::sync::Arc;
+
+use centroid::CentroidError;
+use effects::{Effect, StarRows};
+use focal_plane::{
+    ARCSEC_PER_RAD, AttitudeSeries, AttitudeSource, Camera, Pixel, Points, PointsMut, StarFrames,
+    Vectors,
+};
+use nalgebra::{UnitQuaternion, Vector3};
+use star_tracker::{Disturbance, Pbm, Rows, Scratch};
+use telemetry::WindowTable;
+
+use spectra::robust;
+
+use crate::evidence::Residuals;
+use crate::star::directions;
+use crate::star::frame_rotation::{rotation_of, rotation_row};
+
+/// A star with fewer rows has no scatter of its own: the median deviation of so many
+/// is uncertain by a quarter.
+const FEW_ROWS: usize = 10;
+/// A star that moves by less of the detector's width than this is where it was, to
+/// a declared distortion of the usual order.
+const NEAR_SHARE: f64 = 1.0 / 16.0;
+/// Frames with a smaller share of stars that stayed are unrelated.
+const SAME_SHARE: f64 = 0.1;
+/// Light that falls this far off has another pixel phase: by a fifth of a radian.
+const ELSEWHERE_PX: f64 = 0.03;
+
+/// What is known of one star.
+#[derive(Clone, Debug)]
+pub(crate) struct Star {
+    pub(crate) id: i64,
+    /// Magnitude and colour; NaN where unknown.
+    pub(crate) mag: f64,
+    pub(crate) bv: f64,
+    /// Unit vector, inertial, at the bundle's epoch.
+    pub(crate) direction: Vector3<f64>,
+}
+
+/// Rows of star measurements, structure of arrays, frames contiguous.
+#[derive(Clone, Debug)]
+pub(crate) struct StarData {
+    pub(crate) camera: Camera,
+    /// The measurements (times, ids, slots, centroids); rows outside the
+    /// reference are already gone.
+    pub(crate) frames: StarFrames,
+    pub(crate) stars: Vec<Star>,
+    /// Index into `stars`, a row.
+    pub(crate) star: Vec<usize>,
+    /// Time of the frame, a row, s.
+    pub(crate) t_s: Vec<f64>,
+    /// Magnitude and colour, a row.
+    pub(crate) mag: Vec<f64>,
+    pub(crate) bv: Vec<f64>,
+    /// Usual flux of the star, a row, as a logarithm to base 10; NaN where unknown. That of
+    /// the row shares its noise with the centroid.
+    pub(crate) log_flux: Vec<f64>,
+    /// Middle of the window, a row, px; NaN where unknown.
+    pub(crate) window_px: [Vec<f64>; 2],
+    /// Attitude of each frame.
+    pub(crate) attitude: Vec<UnitQuaternion<f64>>,
+    /// Projected position, px.
+    pub(crate) projected: [Vec<f64>; 2],
+    /// Modelled position, px: where regressors are evaluated.
+    pub(crate) modelled: [Vec<f64>; 2],
+    /// Where the light falls, px, where effects that were found shift it by much.
+    landed: Option<[Vec<f64>; 2]>,
+    /// Velocity and acceleration of the image, px/s and px/s^2; zero where the
+    /// motion is not known.
+    pub(crate) velocity: [Vec<f64>; 2],
+    pub(crate) acceleration: [Vec<f64>; 2],
+    /// Declared centroid error where the light falls, px.
+    pub(crate) phase_error: [Vec<f64>; 2],
+    /// Rows left out of every fit and figure.
+    pub(crate) outlier: Vec<bool>,
+    /// No reference: every frame's attitude is an unknown of its own.
+    pub(crate) free_attitude: bool,
+    /// No catalogue: every star's direction is an unknown constant.
+    pub(crate) free_directions: bool,
+    /// Star rows that had to be set aside because the reference does not cover them.
+    pub(crate) outside_reference: usize,
+}
+
+/// What [`StarData::prepare`] starts from.
+pub(crate) struct Inputs<'a> {
+    pub(crate) camera: &'a Camera,
+    pub(crate) frames: &'a StarFrames,
+    pub(crate) reference: Option<&'a AttitudeSeries>,
+    /// Direction, magnitude and colour by star id, if there is a catalogue.
+    pub(crate) catalogue: Option<&'a dyn Fn(i64) -> Option<Star>>,
+    pub(crate) phase: &'a CentroidError,
+    /// Effects that the model declares: they move the projection.
+    pub(crate) effects: &'a [Arc<dyn Effect>],
+}
+
+impl StarData {
+    /// Joins measurements, reference and catalogue. Frames outside the
+    /// reference, and frames without a solvable attitude, are set aside.
+    pub(crate) fn prepare(inputs: &Inputs<'_>) -> Self {
+        let mut stars: Vec<Star> = Vec::new();
+        let mut index_of = std::collections::BTreeMap::new();
+        let mut star = Vec::with_capacity(inputs.frames.rows());
+        for (row, &id) in inputs.frames.star_id.iter().enumerate() {
+            let index = *index_of.entry(id).or_insert_with(|| {
+                let known = inputs.catalogue.and_then(|find| find(id));
+                let mag = inputs.frames.mag.as_ref().map_or(f64::NAN, |m| m[row]);
+                stars.push(known.unwrap_or(Star {
+                    id,
+                    mag,
+                    bv: f64::NAN,
+                    direction: Vector3::zeros(),
+                }));
+                stars.len() - 1
+            });
+            star.push(index);
+        }
+        let free_directions = inputs.catalogue.is_none();
+        let (attitude, free_attitude) = Self::solve(inputs, &star, &mut stars, free_directions);
+        let mut data = Self::keep(inputs, &star, stars, &attitude);
+        data.free_attitude = free_attitude;
+        data.free_directions = free_directions;
+        data.project();
+        data.disturb(inputs.reference, inputs.effects);
+        data.modelled = data.projected.clone();
+        data.update_phase(inputs.phase);
+        data.log_flux = data.fluxes();
+        data
+    }
+
+    /// Marks rows that stand out of `axes`, residuals of every row, and says how many.
+    ///
+    /// A row is held against the rows of its star, or of all stars that have too few for
+    /// a scatter of their own (snapshots of the sky hardly see a star twice). Where a
+    /// frame's attitude comes from its own stars, one that was mistaken for another pulls
+    /// all others off as well: of such a frame only the worst goes at a time.
+    pub(crate) fn mark_outliers(&mut self, axes: &[Vec<f64>]) -> usize {
+        let mut rows = vec![0_usize; self.stars.len()];
+        for &s in &self.star {
+            rows[s] += 1;
+        }
+        let few = self.stars.len();
+        let of = |&s: &usize| if rows[s] < FEW_ROWS { few } else { s };
+        let group: Vec<usize> = self.star.iter().map(of).collect();
+        let mut marked = self.outlier.clone();
+        for axis in axes {
+            robust::mark_outliers(axis, &group, few + 1, &mut marked);
+        }
+        let size = |r: usize| axes.iter().map(|a| a[r] * a[r]).sum::<f64>();
+        let mut added = 0;
+        for frame in 0..self.frames.frames() {
+            let rows = self.frames.rows_of(frame);
+            let mut new: Vec<usize> = rows.filter(|&r| marked[r] && !self.outlier[r]).collect();
+            if self.free_attitude {
+                let worst = new
+                    .iter()
+                    .copied()
+                    .max_by(|&a, &b| size(a).total_cmp(&size(b)));
+                new = worst.into_iter().collect();
+            }
+            added += new.len();
+            for r in new {
+                self.outlier[r] = true;
+            }
+        }
+        added
+    }
+
+    /// Whether each frame is a picture of its own: its attitude is free, and hardly a
+    /// star is where it was in the frame before. Then nothing that changes slowly over
+    /// the detector or with time makes the noise of neighbouring frames alike.
+    pub(crate) fn frames_are_unrelated(&self) -> bool {
+        let near = NEAR_SHARE * 2.0 * self.camera.half_size_px()[0];
+        let (mut same, mut all) = (0_usize, 0_usize);
+        let mut last = vec![[f64::INFINITY; 2]; self.stars.len()];
+        for frame in 0..self.frames.frames() {
+            let rows = self.frames.rows_of(frame);
+            if frame > 0 {
+                all += rows.len();
+                let here = |&r: &usize| [self.modelled[0][r], self.modelled[1][r]];
+                same += rows
+                    .clone()
+                    .filter(|r| {
+                        let ([x, y], [u, v]) = (here(r), last[self.star[*r]]);
+                        (x - u).hypot(y - v) < near
+                    })
+                    .count();
+            }
+            last.fill([f64::INFINITY; 2]);
+            for r in rows {
+                last[self.star[r]] = [self.modelled[0][r], self.modelled[1][r]];
+            }
+        }
+        self.free_attitude && (same as f64) < SAME_SHARE * all as f64
+    }
+
+    /// Measured fluxes, see [`log_flux`](Self::log_flux).
+    fn fluxes(&self) -> Vec<f64> {
+        let Some(flux) = &self.frames.flux else {
+            return vec![f64::NAN; self.t_s.len()];
+        };
+        let mut of_star = vec![Vec::new(); self.stars.len()];
+        for (&star, flux) in self.star.iter().zip(flux) {
+            of_star[star].push(flux.log10());
+        }
+        let usual: Vec<f64> = of_star
+            .iter_mut()
+            .map(|own| {
+                own.retain(|f| f.is_finite());
+                robust::median(own).unwrap_or(f64::NAN)
+            })
+            .collect();
+        self.star.iter().map(|&star| usual[star]).collect()
+    }
+
+    /// Takes the middles of the windows from their table.
+    pub(crate) fn see_windows(&mut self, table: &WindowTable) {
+        let half = table.size.map(|n| 0.5 * (n as f64 - 1.0));
+        let at: HashMap<(u64, i32), usize> = (0..table.len())
+            .map(|k| ((table.t_s[k].to_bits(), table.slot[k]), k))
+            .collect();
+        for row in 0..self.t_s.len() {
+            let key = (self.t_s[row].to_bits(), self.frames.slot[row]);
+            if let Some(&k) = at.get(&key) {
+                self.window_px[0][row] = table.x0_px[k] + half[0];
+                self.window_px[1][row] = table.y0_px[k] + half[1];
+            }
+        }
+    }
+
+    /// Attitude of each frame, and directions where they are unknown.
+    fn solve(
+        inputs: &Inputs<'_>,
+        star: &[usize],
+        stars: &mut [Star],
+        free_directions: bool,
+    ) -> (Vec<Option<UnitQuaternion<f64>>>, bool) {
+        let (camera, frames) = (inputs.camera, inputs.frames);
+        let Some(reference) = inputs.reference else {
+            if free_directions {
+                let solved = directions::solve(camera, frames, star, stars.len());
+                for (s, u) in stars.iter_mut().zip(&solved.direction) {
+                    s.direction = *u;
+                }
+                return (solved.attitude, true);
+            }
+            let known: Vec<_> = stars.iter().map(|s| Some(s.direction)).collect();
+            return (directions::attitudes(camera, frames, star, &known), true);
+        };
+        let attitude: Vec<_> = frames.t_s.iter().map(|&t| reference.attitude(t)).collect();
+        if free_directions {
+            let mut sum = vec![Vector3::zeros(); stars.len()];
+            for (k, q) in attitude.iter().enumerate() {
+                if let Some(q) = q {
+                    for row in frames.rows_of(k) {
+                        let at = Pixel {
+                            x: frames.x_px[row],
+                            y: frames.y_px[row],
+                        };
+                        sum[star[row]] += q.inverse() * camera.direction(at);
+                    }
+                }
+            }
+            for (s, u) in stars.iter_mut().zip(&sum) {
+                s.direction = u.try_normalize(0.0).unwrap_or_else(Vector3::z);
+            }
+        }
+        (attitude, false)
+    }
+
+    /// The rows whose frame has an attitude.
+    fn keep(
+        inputs: &Inputs<'_>,
+        star: &[usize],
+        stars: Vec<Star>,
+        attitude: &[Option<UnitQuaternion<f64>>],
+    ) -> Self {
+        let from = inputs.frames;
+        let mut rows = Vec::new();
+        let mut frames = StarFrames::new();
+        let mut kept_attitude = Vec::new();
+        for (k, q) in attitude.iter().enumerate() {
+            if let Some(q) = q {
+                kept_attitude.push(*q);
+                frames.t_s.push(from.t_s[k]);
+                rows.extend(from.rows_of(k));
+                frames.first_row.push(rows.len());
+            }
+        }
+        let pick = |values: &[f64]| rows.iter().map(|&r| values[r]).collect::<Vec<f64>>();
+        frames.slot = rows.iter().map(|&r| from.slot[r]).collect();
+        frames.star_id = rows.iter().map(|&r| from.star_id[r]).collect();
+        frames.x_px = pick(&from.x_px);
+        frames.y_px = pick(&from.y_px);
+        frames.mag = from.mag.as_ref().map(|m| pick(m));
+        frames.flux = from.flux.as_ref().map(|m| pick(m));
+        let star: Vec<usize> = rows.iter().map(|&r| star[r]).collect();
+        let n = rows.len();
+        let t_s = (0..frames.frames())
+            .flat_map(|k| std::iter::repeat_n(frames.t_s[k], frames.rows_of(k).len()))
+            .collect();
+        let pair = || [vec![0.0; n], vec![0.0; n]];
+        Self {
+            camera: inputs.camera.clone(),
+            mag: star.iter().map(|&s| stars[s].mag).collect(),
+            bv: star.iter().map(|&s| stars[s].bv).collect(),
+            log_flux: vec![f64::NAN; n],
+            window_px: [vec![f64::NAN; n], vec![f64::NAN; n]],
+            outside_reference: from.rows() - n,
+            frames,
+            stars,
+            star,
+            t_s,
+            attitude: kept_attitude,
+            projected: pair(),
+            modelled: pair(),
+            landed: None,
+            velocity: pair(),
+            acceleration: pair(),
+            phase_error: pair(),
+            outlier: vec![false; n],
+            free_attitude: false,
+            free_directions: false,
+        }
+    }
+
+    /// Projected positions.
+    fn project(&mut self) {
+        for k in 0..self.frames.frames() {
+            for row in self.frames.rows_of(k) {
+                let u = self.stars[self.star[row]].direction;
+                let centre = self.position(&self.attitude[k], &u);
+                self.projected[0][row] = centre[0];
+                self.projected[1][row] = centre[1];
+            }
+        }
+    }
+
+    /// Velocity and acceleration across the detector, from `motion` at three
+    /// instants around each frame; zero where there is none.
+    pub(crate) fn follow(&mut self, motion: Option<&dyn AttitudeSource>) {
+        // Short against any motion that the samples resolve, long against the
+        // rounding of a difference of positions.
+        let h = 0.05 * robust::median_step(&self.frames.t_s).unwrap_or(1.0);
+        for k in 0..self.frames.frames() {
+            let t = self.frames.t_s[k];
+            let around =
+                motion.and_then(|m| Some([m.attitude(t - h)?, m.attitude(t)?, m.attitude(t + h)?]));
+            for row in self.frames.rows_of(k) {
+                let u = self.stars[self.star[row]].direction;
+                let path = around
+                    .as_ref()
+                    .map(|a| a.each_ref().map(|q| self.position(q, &u)));
+                for axis in 0..2 {
+                    let [v, a] = path.as_ref().map_or([0.0; 2], |[p, c, q]| {
+                        [
+                            (q[axis] - p[axis]) / (2.0 * h),
+                            (q[axis] - 2.0 * c[axis] + p[axis]) / (h * h),
+                        ]
+                    });
+                    self.velocity[axis][row] = v;
+                    self.acceleration[axis][row] = a;
+                }
+            }
+        }
+    }
+
+    /// The motion that the frames' own attitudes describe.
+    pub(crate) fn own_motion(&self) -> Option<AttitudeSeries> {
+        AttitudeSeries::new(self.frames.t_s.clone(), self.attitude.clone(), None).ok()
+    }
+
+    /// Adds what the declared effects do to the projected positions. Rows whose
+    /// exposure leaves the known motion are set aside.
+    fn disturb(&mut self, reference: Option<&AttitudeSeries>, effects: &[Arc<dyn Effect>]) {
+        if effects.is_empty() {
+            return;
+        }
+        let own = self.own_motion();
+        let Some(motion) = reference.or(own.as_ref()) else {
+            return;
+        };
+        let mut tracker = Pbm::new(self.camera.clone());
+        for effect in effects {
+            let disturbance: Arc<dyn Disturbance> = effect.clone();
+            tracker = tracker.with_disturbance(disturbance);
+        }
+        let component = |axis: usize| -> Vec<f64> {
+            self.star
+                .iter()
+                .map(|&s| self.stars[s].direction[axis])
+                .collect()
+        };
+        let (x, y, z) = (component(0), component(1), component(2));
+        let [px, py] = &mut self.projected;
+        tracker.positions_into(
+            motion,
+            Rows {
+                t_s: &self.frames.t_s,
+                first_row: &self.frames.first_row,
+                slot: &self.frames.slot,
+                star_id: &self.frames.star_id,
+                mag: &self.mag,
+                bv: &self.bv,
+                direction: Vectors {
+                    x: &x,
+                    y: &y,
+                    z: &z,
+                },
+            },
+            &mut Scratch::default(),
+            PointsMut { x: px, y: py },
+        );
+        for row in 0..self.t_s.len() {
+            if !self.projected[0][row].is_finite() && !self.outlier[row] {
+                self.outlier[row] = true;
+                self.outside_reference += 1;
+            }
+        }
+    }
+
+    fn position(&self, q: &UnitQuaternion<f64>, u: &Vector3<f64>) -> [f64; 2] {
+        self.camera
+            .project(&(q * u))
+            .map_or([f64::NAN; 2], |p| [p.x, p.y])
+    }
+
+    /// Turns each frame's own attitude by what its stars still agree on, once `shift` (arcsec,
+    /// what the fitted unknowns move each row by) is out. The first attitudes know neither the
+    /// unknowns nor the declared effects: under a lens that bends by pixels they are off by
+    /// pixels, and with them every phase.
+    pub(crate) fn turn_frames(&mut self, shift: &[Vec<f64>]) {
+        let measured = self.measured_residual();
+        let left: Vec<Vec<f64>> = measured
+            .iter()
+            .zip(shift)
+            .map(|(m, s)| m.iter().zip(s).map(|(m, s)| m - s).collect())
+            .collect();
+        let scale = self.camera.arcsec_per_px();
+        for frame in 0..self.frames.frames() {
+            let Some(theta) = rotation_of(self, frame, &left) else {
+                continue;
+            };
+            let turn = UnitQuaternion::from_scaled_axis(theta / ARCSEC_PER_RAD);
+            self.attitude[frame] = turn * self.attitude[frame];
+            // pixels within the field: the square of the turn is nothing
+            for row in self.frames.rows_of(frame) {
+                let jacobian = rotation_row(self, row);
+                for axis in 0..2 {
+                    self.projected[axis][row] +=
+                        Vector3::from(jacobian[axis]).dot(&theta) / scale[axis];
+                }
+            }
+        }
+    }
+
+    /// Moves the modelled positions to projection + what `residual` was modelled by (the fitted
+    /// misalignment, distortion and directions), and evaluates the declared centroid error there.
+    /// Takes its change out of `residual`; returns the sum of its squares, arcsec^2.
+    pub(crate) fn move_modelled(&mut self, residual: &mut Residuals, phase: &CentroidError) -> f64 {
+        let scale = self.camera.arcsec_per_px();
+        let known = self.phase_error.clone();
+        for axis in 0..2 {
+            for row in 0..self.t_s.len() {
+                self.modelled[axis][row] = self.shifted(axis, row, &residual.modelled);
+            }
+        }
+        self.update_phase(phase);
+        let mut squares = 0.0;
+        for axis in 0..2 {
+            for (row, known) in known[axis].iter().enumerate() {
+                let change = (self.phase_error[axis][row] - known) * scale[axis];
+                residual.axes[axis][row] -= change;
+                if !self.outlier[row] {
+                    squares += change * change;
+                }
+            }
+        }
+        squares
+    }
+
+    /// Where this takes a row from its projection, px.
+    fn shifted(&self, axis: usize, row: usize, shift_arcsec: &[Vec<f64>]) -> f64 {
+        self.projected[axis][row] + shift_arcsec[axis][row] / self.camera.arcsec_per_px()[axis]
+    }
+
+    /// Where the light falls, as far as is known, px.
+    pub(crate) fn landed(&self) -> [&[f64]; 2] {
+        let at = self.landed.as_ref().unwrap_or(&self.modelled);
+        at.each_ref().map(Vec::as_slice)
+    }
+
+    /// Some rows, as candidates see them.
+    pub(crate) fn rows<'a>(
+        &'a self,
+        rows: Range<usize>,
+        motion: Option<&'a dyn AttitudeSource>,
+    ) -> StarRows<'a> {
+        StarRows {
+            t_s: &self.t_s[rows.clone()],
+            x_px: &self.modelled[0][rows.clone()],
+            y_px: &self.modelled[1][rows.clone()],
+            landed_px: self.landed().map(|p| &p[rows.clone()]),
+            vx_px_s: &self.velocity[0][rows.clone()],
+            vy_px_s: &self.velocity[1][rows.clone()],
+            ax_px_s2: &self.acceleration[0][rows.clone()],
+            ay_px_s2: &self.acceleration[1][rows.clone()],
+            mag: &self.mag[rows.clone()],
+            bv: &self.bv[rows.clone()],
+            log_flux: &self.log_flux[rows.clone()],
+            window_px: self.window_px.each_ref().map(|w| &w[rows.clone()]),
+            slot: &self.frames.slot[rows.clone()],
+            star_id: &self.frames.star_id[rows],
+            attitude: motion,
+        }
+    }
+
+    /// Takes the light to fall where it is modelled.
+    pub(crate) fn lands_as_modelled(&mut self) {
+        self.landed = None;
+    }
+
+    /// Whether `shift_arcsec`, with the effects that were found, takes the light off from where it was
+    /// taken to fall by enough for its pixel phase to be another one.
+    pub(crate) fn lands_elsewhere(&self, shift_arcsec: &[Vec<f64>]) -> bool {
+        let known = self.landed();
+        let (mut squares, mut count) = (0.0, 0.0);
+        for row in (0..self.t_s.len()).filter(|&r| !self.outlier[r]) {
+            for axis in 0..2 {
+                let at = self.shifted(axis, row, shift_arcsec);
+                squares += (at - known[axis][row]).powi(2);
+            }
+            count += 2.0;
+        }
+        squares > ELSEWHERE_PX * ELSEWHERE_PX * count
+    }
+
+    /// Evaluates the declared centroid error where `shift_arcsec` takes the light. Columns of what moves
+    /// the image are those where that motion starts from: projection + `fitted_arcsec`, without it.
+    pub(crate) fn land(
+        &mut self,
+        fitted_arcsec: &[Vec<f64>],
+        shift_arcsec: &[Vec<f64>],
+        phase: &CentroidError,
+    ) {
+        if self.free_attitude {
+            self.turn_frames(shift_arcsec);
+        }
+        let rows = 0..self.t_s.len();
+        let moved = |by: &[Vec<f64>]| {
+            [0, 1].map(|axis| {
+                rows.clone()
+                    .map(|row| self.shifted(axis, row, by))
+                    .collect()
+            })
+        };
+        let (modelled, landed) = (moved(fitted_arcsec), moved(shift_arcsec));
+        self.modelled = modelled;
+        self.landed = Some(landed);
+        self.update_phase(phase);
+    }
+
+    fn update_phase(&mut self, phase: &CentroidError) {
+        let [x, y] = &mut self.phase_error;
+        let landed = self.landed.as_ref().unwrap_or(&self.modelled);
+        let at = Points {
+            x: &landed[0],
+            y: &landed[1],
+        };
+        phase
+            .scaled(self.camera.arcsec_per_px().map(|s| 1.0 / s))
+            .error_into(at, self.camera.pixel_centre(), PointsMut { x, y });
+    }
+
+    /// The residual of the measured centroids, arcsec.
+    pub(crate) fn measured_residual(&self) -> [Vec<f64>; 2] {
+        self.residual_arcsec(self.frames.positions())
+    }
+
+    /// The residual of centroids `x_px, y_px` (the measured ones, or others
+    /// formed anew), arcsec.
+    pub(crate) fn residual_arcsec(&self, measured: Points<'_>) -> [Vec<f64>; 2] {
+        let scale = self.camera.arcsec_per_px();
+        let axis = |i: usize, measured: &[f64]| {
+            (0..measured.len())
+                .map(|r| (measured[r] - self.projected[i][r] - self.phase_error[i][r]) * scale[i])
+                .collect()
+        };
+        [axis(0, measured.x), axis(1, measured.y)]
+    }
+}

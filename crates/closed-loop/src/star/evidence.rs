@@ -1,0 +1,240 @@
+//! Star measurements as evidence, at one noise.
+//!
+//! Where every frame's attitude is a free unknown, its three angles are eliminated
+//! exactly (a Schur complement, [`crate::star::moments`]); where the reference has a
+//! slow error, the rotations that the stars share are weighed by it.
+//!
+//! Source: [M23] Fig. 4 for what a residual is.
+
+use std::sync::Arc;
+
+use block_regression::{BlockGrams, Folds};
+use coloured_noise::CommonNoise;
+use effects::Candidate;
+use focal_plane::AttitudeSource;
+use nalgebra::{DVector, Vector3};
+use rayon::prelude::*;
+
+use crate::bins::Bins;
+use crate::evidence::{Amplitudes, Evidence, Residuals};
+use crate::situation::Situation;
+use crate::star::columns::{CHUNK_FRAMES, Filled, StarColumns};
+use crate::star::data::StarData;
+use crate::star::frame_rotation::{rotation_of, rotation_row};
+use crate::star::moments::{Keep, MOST_BINS, StarMoments};
+use crate::star::nuisance::StarNuisance;
+use crate::star::weights;
+
+/// Star measurements as evidence.
+#[derive(Clone)]
+pub(crate) struct StarEvidence<'a> {
+    pub(crate) data: &'a StarData,
+    pub(crate) nuisance: StarNuisance,
+    /// Residual variants: one, or one a fold and a last one for all data.
+    pub(crate) residuals: Arc<Vec<[Vec<f64>; 2]>>,
+    pub(crate) motion: Option<&'a dyn AttitudeSource>,
+    /// First guess of the noise of a centroid, per axis, arcsec.
+    pub(crate) sigma_guess_arcsec: f64,
+    /// Noise that the stars of a frame share; `None`: white.
+    pub(crate) noise: Option<CommonNoise>,
+    /// Weight of each row.
+    pub(crate) weight: Arc<Vec<f64>>,
+    /// What is in every fit, described but not named: nuisance without a prior.
+    pub(crate) kept: Vec<Arc<dyn Candidate>>,
+}
+
+impl<'a> StarEvidence<'a> {
+    /// `residuals` against the declared model, under white noise.
+    pub(crate) fn new(
+        data: &'a StarData,
+        situation: &Situation<'_>,
+        residuals: Vec<[Vec<f64>; 2]>,
+        motion: Option<&'a dyn AttitudeSource>,
+    ) -> Self {
+        let temporal = situation.model.noise.temporal_arcsec.filter(|s| *s > 0.0);
+        Self {
+            data,
+            nuisance: StarNuisance::declared(situation.model, data),
+            residuals: Arc::new(residuals),
+            motion,
+            // circular to per axis
+            sigma_guess_arcsec: temporal.map_or(1.0, |s| s / std::f64::consts::SQRT_2),
+            noise: None,
+            // where windows are sent, centroids are formed anew, with another noise
+            weight: Arc::new(if situation.bundle.images.is_some() {
+                vec![1.0; data.t_s.len()]
+            } else {
+                weights::of(data)
+            }),
+            kept: Vec::new(),
+        }
+    }
+
+    /// Whether the centroids were learned outside each fold.
+    pub(crate) fn learned(&self) -> bool {
+        self.residuals.len() > 1
+    }
+
+    /// The same evidence under a noise that frames share.
+    pub(crate) fn with_noise(&self, noise: &CommonNoise) -> Self {
+        Self {
+            sigma_guess_arcsec: 1.0,
+            noise: Some(*noise),
+            ..self.clone()
+        }
+    }
+
+    /// The same evidence with `kept` in every fit.
+    pub(crate) fn keeping(&self, kept: &[Arc<dyn Candidate>]) -> Self {
+        Self {
+            kept: kept.to_vec(),
+            ..self.clone()
+        }
+    }
+
+    /// What is kept, then `candidates`.
+    fn all<'b>(&'b self, candidates: &[&'b dyn Candidate]) -> Vec<&'b dyn Candidate> {
+        let kept = self.kept.iter().map(AsRef::as_ref);
+        kept.chain(candidates.iter().copied()).collect()
+    }
+
+    /// One pass over the data that serves every noise.
+    pub(crate) fn moments(&self, folds: &Folds, candidates: &[&dyn Candidate]) -> StarMoments {
+        let bins = Bins::cut(&self.data.frames.t_s, folds, MOST_BINS);
+        let all = self.all(candidates);
+        StarMoments::accumulate(&self.columns(&all), folds, Keep::Bins(&bins))
+    }
+
+    fn columns<'b>(&'b self, candidates: &'b [&'b dyn Candidate]) -> StarColumns<'b> {
+        StarColumns {
+            data: self.data,
+            nuisance: &self.nuisance,
+            candidates,
+            residuals: &self.residuals,
+            motion: self.motion,
+            weight: &self.weight,
+        }
+    }
+
+    /// The residual variant of a fold.
+    fn residual(&self, fold: usize) -> &[Vec<f64>; 2] {
+        &self.residuals[if self.residuals.len() == 1 { 0 } else { fold }]
+    }
+}
+
+impl Evidence for StarEvidence<'_> {
+    fn precision(&self) -> Vec<f64> {
+        let mut all = self.nuisance.precision();
+        let kept: usize = self.kept.iter().map(|c| c.coefficients().len()).sum();
+        all.extend(std::iter::repeat_n(0.0, kept));
+        all
+    }
+
+    fn residual_columns(&self) -> usize {
+        self.residuals.len()
+    }
+
+    fn variance_guess(&self) -> f64 {
+        self.sigma_guess_arcsec * self.sigma_guess_arcsec
+    }
+
+    fn grams(&self, folds: &Folds, candidates: &[&dyn Candidate]) -> BlockGrams {
+        if let Some(noise) = &self.noise {
+            let moments = self.moments(folds, candidates);
+            let all: Vec<usize> = (0..moments.width()).collect();
+            return moments.under(&all, noise);
+        }
+        let keep = if self.data.free_attitude {
+            Keep::Free
+        } else {
+            Keep::None
+        };
+        let all = self.all(candidates);
+        StarMoments::accumulate(&self.columns(&all), folds, keep).white()
+    }
+
+    fn residuals(
+        &self,
+        folds: &Folds,
+        candidates: &[&dyn Candidate],
+        amplitudes: &Amplitudes,
+    ) -> Residuals {
+        let data = self.data;
+        let all = self.all(candidates);
+        let columns = StarColumns {
+            residuals: &[],
+            ..self.columns(&all)
+        };
+        let layout = columns.layout();
+        let rows = data.t_s.len();
+        let mut out = Residuals {
+            axes: vec![vec![0.0; rows]; 2],
+            modelled: vec![vec![0.0; rows]; 2],
+        };
+        let whole: Vec<DVector<f64>> = (0..folds.count)
+            .map(|f| {
+                let (nuisance, candidate) = (&amplitudes.nuisance[f], &amplitudes.candidates[f]);
+                DVector::from_iterator(
+                    nuisance.len() + candidate.len(),
+                    nuisance.iter().chain(candidate.iter()).copied(),
+                )
+            })
+            .collect();
+        let chunks: Vec<_> = folds
+            .fold_ranges()
+            .into_iter()
+            .enumerate()
+            .flat_map(|(fold, frames)| {
+                let end = frames.end;
+                frames
+                    .step_by(CHUNK_FRAMES)
+                    .map(move |at| (fold, at..(at + CHUNK_FRAMES).min(end)))
+            })
+            .collect();
+        let shifts: Vec<[DVector<f64>; 2]> = chunks
+            .par_iter()
+            .map_init(Filled::default, |filled, (fold, frames)| {
+                columns.fill(frames.clone(), &layout, filled);
+                columns.shift(frames.clone(), &layout, filled, &whole[*fold])
+            })
+            .collect();
+        for ((fold, frames), shift) in chunks.into_iter().zip(shifts) {
+            let first = data.frames.first_row[frames.start];
+            for axis in 0..2 {
+                for (i, s) in shift[axis].iter().enumerate() {
+                    out.modelled[axis][first + i] = *s;
+                    out.axes[axis][first + i] = self.residual(fold)[axis][first + i] - s;
+                }
+            }
+            if data.free_attitude {
+                for frame in frames {
+                    remove_attitude(data, frame, &mut out.axes);
+                }
+            }
+        }
+        out
+    }
+
+    fn distance(&self, one: &dyn Candidate, other: &dyn Candidate, values: &[f64]) -> f64 {
+        let both = [one, other];
+        let columns = StarColumns {
+            residuals: &[],
+            ..self.columns(&both)
+        };
+        columns.distance(values) / self.noise.map_or(1.0, |n| n.centroid * n.centroid)
+    }
+}
+
+/// Takes from a frame's residuals the rotation that its stars (outliers aside)
+/// agree on; a frame whose attitude cannot be solved has no residual: NaN.
+fn remove_attitude(data: &StarData, frame: usize, residual: &mut [Vec<f64>]) {
+    let theta = rotation_of(data, frame, residual);
+    for row in data.frames.rows_of(frame) {
+        let jacobian = rotation_row(data, row);
+        for axis in 0..2 {
+            residual[axis][row] = theta.map_or(f64::NAN, |t| {
+                residual[axis][row] - Vector3::from(jacobian[axis]).dot(&t)
+            });
+        }
+    }
+}

@@ -1,0 +1,395 @@
+//! One pass over the stars, for every fit at every noise.
+//!
+//! Noise that the stars of a frame share shows in the rotation that they agree on and
+//! nowhere else. So the pass keeps, block by block, the products of all columns, and
+//! for short bins of frames what turns them into the mean rotation of each column,
+//!
+//! ```text
+//! G = sum c c^T          N_b = sum A^T A    M_b = sum A^T c    theta_b = N_b^-1 M_b
+//! R = G - sum_b M_b^T N_b^-1 M_b                        what no rotation of a bin explains
+//! ```
+//!
+//! Under white noise a fit needs G; with a free attitude in every frame, R with frames
+//! for bins; under a slow error of the reference, `R / sigma^2` and the products of the
+//! innovations of theta ([`coloured_noise::CommonNoise`]). Sums go in the order of the data
+//! within blocks: the numbers do not depend on the threads.
+//!
+//! Source: the partitioned normal equations of bundle adjustment (Brown 1958).
+
+mod sums;
+#[cfg(test)]
+mod tests;
+
+use std::ops::Range;
+use std::sync::{Arc, OnceLock};
+
+use block_regression::{BlockGrams, Folds, Gram, add_products};
+use coloured_noise::{CommonNoise, Filter, Rotations};
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+use rayon::prelude::*;
+
+use self::sums::Sums;
+use crate::bins::Bins;
+use crate::star::columns::StarColumns;
+
+/// About as many bins as the rotations are averaged over at most.
+pub(crate) const MOST_BINS: usize = 1200;
+
+/// A pivot below this share of its diagonal is rounding.
+const SINGULAR: f64 = 1e-12;
+
+/// Which rotations are kept apart.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Keep<'a> {
+    /// None: white noise alone.
+    None,
+    /// Every frame's own, to be thrown away: its attitude is free.
+    Free,
+    /// Means over bins.
+    Bins(&'a Bins),
+}
+
+/// What the pass keeps of a block.
+#[derive(Clone, Debug)]
+struct Block {
+    /// R; G where no rotation is kept apart.
+    rest: Arc<DMatrix<f64>>,
+    /// Products of the rows of bins without an attitude; they are not in R.
+    lost: Option<DMatrix<f64>>,
+    /// Scalars of G and of R.
+    scalars: f64,
+    rest_scalars: f64,
+    /// Mean rotations, three rows a bin.
+    theta: DMatrix<f64>,
+    /// Inverse of N of each bin; `None`: no attitude there, and no rotation.
+    inverse: Vec<Option<Matrix3<f64>>>,
+}
+
+impl Block {
+    /// G of some columns.
+    fn gram(&self, columns: &[usize]) -> Gram {
+        let rest = match &self.lost {
+            Some(lost) => Arc::new(pick(&self.rest, columns) + pick(lost, columns)),
+            None => shared(&self.rest, columns),
+        };
+        Gram::new(1.0, rest, self.whitened(columns))
+    }
+
+    /// Rows whose products are what the rotations take out of G.
+    fn whitened(&self, columns: &[usize]) -> DMatrix<f64> {
+        let mut whitened = self.theta.select_columns(columns);
+        for (bin, inverse) in self.inverse.iter().enumerate() {
+            let root = inverse.and_then(|v| v.cholesky()?.l().try_inverse());
+            let part = whitened.fixed_rows::<3>(3 * bin).into_owned();
+            whitened
+                .fixed_rows_mut::<3>(3 * bin)
+                .copy_from(&(root.unwrap_or_else(Matrix3::zeros) * part));
+        }
+        whitened
+    }
+
+    /// Scalars of R and of the bins' rotations.
+    fn solved_scalars(&self) -> f64 {
+        self.rest_scalars + 3.0 * self.inverse.iter().flatten().count() as f64
+    }
+
+    /// The block with every bin's rotation thrown away.
+    fn freed(self) -> Self {
+        Self {
+            lost: None,
+            scalars: self.rest_scalars,
+            theta: DMatrix::zeros(0, self.rest.ncols()),
+            inverse: Vec::new(),
+            ..self
+        }
+    }
+}
+
+/// See the module.
+#[derive(Clone, Debug)]
+pub(crate) struct StarMoments {
+    blocks: Vec<Block>,
+    /// Mean time of the bins, s.
+    t_s: Vec<f64>,
+    /// Frames of each bin.
+    frames: Vec<usize>,
+    /// Sums over the blocks, once they are asked for: of R, and of the products under white noise.
+    rest: OnceLock<DMatrix<f64>>,
+    rest_by_fold: OnceLock<Arc<Vec<DMatrix<f64>>>>,
+    white: OnceLock<DMatrix<f64>>,
+    fold_of_block: Vec<usize>,
+}
+
+impl StarMoments {
+    /// One pass over `columns`.
+    pub(crate) fn accumulate(columns: &StarColumns<'_>, folds: &Folds, keep: Keep<'_>) -> Self {
+        let blocks = (0..folds.blocks.len())
+            .into_par_iter()
+            .map(|b| {
+                let frames = folds.blocks[b].clone();
+                match keep {
+                    Keep::None => Sums::over(columns, frames, None).block(),
+                    Keep::Free => {
+                        let own: Vec<Range<usize>> = frames.clone().map(|k| k..k + 1).collect();
+                        Sums::over(columns, frames, Some(&own)).block().freed()
+                    }
+                    Keep::Bins(bins) => {
+                        let own = &bins.rows[bins.folds.blocks[b].clone()];
+                        Sums::over(columns, frames, Some(own)).block()
+                    }
+                }
+            })
+            .collect();
+        let (t_s, frames) = match keep {
+            Keep::Bins(bins) => (
+                bins.t_s.clone(),
+                bins.rows.iter().map(ExactSizeIterator::len).collect(),
+            ),
+            _ => (Vec::new(), Vec::new()),
+        };
+        Self {
+            blocks,
+            t_s,
+            frames,
+            rest: OnceLock::new(),
+            rest_by_fold: OnceLock::new(),
+            fold_of_block: folds.fold_of_block.clone(),
+            white: OnceLock::new(),
+        }
+    }
+
+    /// The products under white noise, of a pass that kept no rotation apart.
+    pub(crate) fn white(self) -> BlockGrams {
+        let (gram, scalars) = self
+            .blocks
+            .into_iter()
+            .map(|b| {
+                debug_assert!(b.inverse.is_empty(), "rotations are in no block");
+                (Gram::whole(b.rest), b.scalars)
+            })
+            .unzip();
+        BlockGrams {
+            gram,
+            scalars,
+            log_scale: 0.0,
+            known: None,
+        }
+    }
+
+    /// The sum over the blocks of the products under white noise, of some of the columns.
+    pub(crate) fn white_in_all(&self, columns: &[usize]) -> BlockGrams {
+        let white = self.white.get_or_init(|| {
+            let mut sum = self.rest().clone();
+            let all: Vec<usize> = (0..self.width()).collect();
+            for block in &self.blocks {
+                if let Some(lost) = &block.lost {
+                    sum += lost;
+                }
+                add_products(1.0, &block.whitened(&all), &mut sum);
+            }
+            sum.fill_upper_triangle_with_lower_triangle();
+            sum
+        });
+        BlockGrams {
+            gram: vec![Gram::whole(pick(white, columns))],
+            scalars: vec![self.blocks.iter().map(|b| b.scalars).sum()],
+            log_scale: 0.0,
+            known: None,
+        }
+    }
+
+    /// The sums of R over the blocks of each fold, where all columns are asked for.
+    fn known(&self, columns: &[usize]) -> Option<Arc<Vec<DMatrix<f64>>>> {
+        is_all(columns, self.width()).then(|| self.rest_by_fold().clone())
+    }
+
+    fn rest_by_fold(&self) -> &Arc<Vec<DMatrix<f64>>> {
+        self.rest_by_fold.get_or_init(|| {
+            let width = self.width();
+            let folds = 0..self.fold_of_block.iter().map(|f| f + 1).max().unwrap_or(0);
+            let of = |f| {
+                let own = self.blocks.iter().zip(&self.fold_of_block);
+                let own = own.filter(|(_, of)| **of == f);
+                own.fold(DMatrix::zeros(width, width), |sum, (b, _)| sum + &*b.rest)
+            };
+            Arc::new(folds.into_par_iter().map(of).collect())
+        })
+    }
+
+    /// The sum over the blocks of R.
+    fn rest(&self) -> &DMatrix<f64> {
+        self.rest.get_or_init(|| {
+            let width = self.width();
+            let parts = self.rest_by_fold().iter();
+            parts.fold(DMatrix::zeros(width, width), |sum, part| sum + part)
+        })
+    }
+
+    /// The products of some of the columns under white noise.
+    pub(crate) fn white_of(&self, columns: &[usize]) -> BlockGrams {
+        BlockGrams {
+            gram: self.blocks.par_iter().map(|b| b.gram(columns)).collect(),
+            scalars: self.blocks.iter().map(|b| b.scalars).collect(),
+            log_scale: 0.0,
+            known: self
+                .known(columns)
+                .filter(|_| self.blocks.iter().all(|b| b.lost.is_none())),
+        }
+    }
+
+    /// Columns of the pass.
+    pub(crate) fn width(&self) -> usize {
+        self.blocks.first().map_or(0, |b| b.rest.ncols())
+    }
+
+    /// The products of `columns` under `noise`: of scalars of unit variance.
+    pub(crate) fn under(&self, columns: &[usize], noise: &CommonNoise) -> BlockGrams {
+        let weight = noise.centroid.powi(-2);
+        let (log_scale, innovations) = self.innovations(columns, noise);
+        let gram = self
+            .blocks
+            .par_iter()
+            .zip(innovations)
+            .map(|(k, e)| Gram::new(weight, shared(&k.rest, columns), e))
+            .collect();
+        BlockGrams {
+            gram,
+            scalars: self.blocks.iter().map(Block::solved_scalars).collect(),
+            log_scale,
+            known: self.known(columns),
+        }
+    }
+
+    /// The sum over the blocks of [`under`](Self::under).
+    pub(crate) fn under_in_all(&self, columns: &[usize], noise: &CommonNoise) -> BlockGrams {
+        let weight = noise.centroid.powi(-2);
+        let (log_scale, innovations) = self.innovations(columns, noise);
+        let mut gram = pick(self.rest(), columns) * weight;
+        for e in innovations {
+            gram.gemm(1.0, &e.transpose(), &e, 1.0);
+        }
+        BlockGrams {
+            gram: vec![Gram::whole(gram)],
+            scalars: vec![self.blocks.iter().map(Block::solved_scalars).sum()],
+            log_scale,
+            known: None,
+        }
+    }
+
+    /// Whitened innovations of the rotations, block by block, and what the log-likelihood of scalars
+    /// under `noise` lacks.
+    fn innovations(&self, columns: &[usize], noise: &CommonNoise) -> (f64, Vec<DMatrix<f64>>) {
+        let inverse: Vec<Option<Matrix3<f64>>> = self
+            .blocks
+            .iter()
+            .flat_map(|b| b.inverse.iter().copied())
+            .collect();
+        let filter = Filter::new(noise, &self.t_s, &self.frames, &inverse);
+        let mut log_scale = filter.log_scale;
+        let mut first = 0;
+        let mut out = Vec::with_capacity(self.blocks.len());
+        let mut state = vec![Vector3::zeros(); columns.len()];
+        for k in &self.blocks {
+            let steps = first..first + k.inverse.len();
+            first = steps.end;
+            log_scale -= k.rest_scalars * noise.centroid.ln();
+            out.push(filter.innovations(steps, &k.theta, columns, &mut state));
+        }
+        (log_scale, out)
+    }
+
+    /// Rotations of the last of `columns` less `beta` times the others; `freedom` is
+    /// what was fitted. `None` where hardly any frame has an attitude of its own.
+    pub(crate) fn rotations(
+        &self,
+        columns: &[usize],
+        beta: &DVector<f64>,
+        freedom: usize,
+    ) -> Option<Rotations> {
+        let (&residual, fitted) = columns.split_last()?;
+        let left = DVector::from_iterator(
+            columns.len(),
+            beta.iter().map(|b| -b).chain(std::iter::once(1.0)),
+        );
+        let sse = left.dot(&(pick(self.rest(), columns) * &left));
+        let mut rest = 0.0;
+        let mut mean: [Vec<f64>; 3] = std::array::from_fn(|_| Vec::with_capacity(self.t_s.len()));
+        let mut count = mean.clone();
+        for kept in &self.blocks {
+            rest += kept.rest_scalars;
+            let mut theta = kept.theta.column(residual).into_owned();
+            for (&column, b) in fitted.iter().zip(beta.iter()) {
+                theta.axpy(-b, &kept.theta.column(column), 1.0);
+            }
+            for (bin, inverse) in kept.inverse.iter().enumerate() {
+                for axis in 0..3 {
+                    mean[axis].push(theta[3 * bin + axis]);
+                    count[axis].push(inverse.map_or(0.0, |v| v[(axis, axis)].recip()));
+                }
+            }
+        }
+        let freedom = rest - freedom as f64;
+        (freedom > 0.0).then(|| {
+            let frames = self.frames.iter().sum::<usize>();
+            Rotations::new(
+                self.t_s.clone(),
+                mean,
+                count,
+                (sse.max(0.0) / freedom).sqrt(),
+                frames as f64 / self.t_s.len().max(1) as f64,
+            )
+        })
+    }
+}
+
+/// Rows and columns `columns` of a matrix.
+fn pick(matrix: &DMatrix<f64>, columns: &[usize]) -> DMatrix<f64> {
+    DMatrix::from_fn(columns.len(), columns.len(), |i, j| {
+        matrix[(columns[i], columns[j])]
+    })
+}
+
+fn is_all(columns: &[usize], width: usize) -> bool {
+    columns.len() == width && columns.iter().enumerate().all(|(i, &c)| i == c)
+}
+
+/// As [`pick`], without a copy where that is all.
+fn shared(matrix: &Arc<DMatrix<f64>>, columns: &[usize]) -> Arc<DMatrix<f64>> {
+    if is_all(columns, matrix.ncols()) {
+        matrix.clone()
+    } else {
+        Arc::new(pick(matrix, columns))
+    }
+}
+
+impl Block {
+    /// Takes the rotations of bins with these M and N out of R.
+    fn keep_apart(&mut self, mut moments: DMatrix<f64>, normals: &[Matrix3<f64>]) {
+        let mut whitened = DMatrix::zeros(moments.nrows(), moments.ncols());
+        for (bin, normal) in normals.iter().enumerate() {
+            let solved = normal
+                .cholesky()
+                .filter(|c| {
+                    let pivots = c.l_dirty().diagonal();
+                    (0..3).all(|k| pivots[k].powi(2) > SINGULAR * normal[(k, k)])
+                })
+                .and_then(|c| Some((c.l().try_inverse()?, c.inverse())));
+            let part = moments.fixed_rows::<3>(3 * bin).into_owned();
+            let mut theta = moments.fixed_rows_mut::<3>(3 * bin);
+            if let Some((root, whole)) = solved {
+                theta.copy_from(&(whole * &part));
+                let mut whitened = whitened.fixed_rows_mut::<3>(3 * bin);
+                whitened.copy_from(&(root * &part));
+                self.rest_scalars -= 3.0;
+                self.inverse.push(Some(whole));
+            } else {
+                theta.fill(0.0);
+                self.inverse.push(None);
+            }
+        }
+        let rest = Arc::make_mut(&mut self.rest);
+        add_products(-1.0, &whitened, rest);
+        rest.fill_upper_triangle_with_lower_triangle();
+        self.theta = moments;
+    }
+}

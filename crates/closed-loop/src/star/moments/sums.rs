@@ -1,0 +1,509 @@
+//! The sums of one block, in one pass over its rows.
+//!
+//! Columns are filled a few frames at a time and turned over, so that the columns of one
+//! row lie side by side; those that are zero there are left out. What turns the camera
+//! acts through the moments of a frame alone, axis by axis,
+//!
+//! ```text
+//! M_k = A_k^T c     T^T A^T c = sum over axes and frames of T_k M_k     A^T A T = N_k T_k
+//! ```
+//!
+//! Source: matrix products by blocks.
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use nalgebra::{DMatrix, DMatrixView, DMatrixViewMut, DVector, Dyn, Matrix3, Vector3};
+
+use super::{Block, pick};
+use crate::star::columns::{Filled, Layout, StarColumns};
+use crate::star::frame_rotation::rotation_row;
+
+/// Frames whose columns are filled at once: enough for the matrix product to
+/// dominate, few enough to stay in cache.
+const CHUNK_FRAMES: usize = 16;
+/// Frames whose turns are multiplied at once.
+const TURN_FRAMES: usize = 4 * CHUNK_FRAMES;
+/// Columns of a product that are formed at once: a product of columns with themselves
+/// needs only what lies below the diagonal.
+const PANEL: usize = 48;
+/// Columns that are turned over at once.
+const TURNED: usize = 8;
+/// Two stars give four numbers for three angles; one gives none to spare.
+const SOLVING: usize = 2;
+
+/// Sums of one block; columns stand in the order of [`Layout::places`].
+pub(super) struct Sums {
+    layout: Layout,
+    /// D^T D, below the diagonal.
+    shared: DMatrix<f64>,
+    /// [D^T X; D^T Y].
+    cross: DMatrix<f64>,
+    /// X^T X + Y^T Y, below the diagonal.
+    own: DMatrix<f64>,
+    /// Products of all columns with T.
+    turn: DMatrix<f64>,
+    scalars: usize,
+    /// M of each bin, three columns a bin, and N.
+    bins: Option<(DMatrix<f64>, Vec<Matrix3<f64>>)>,
+    /// Products of the rows of bins that have no attitude, and how many scalars.
+    lost: Option<(DMatrix<f64>, usize)>,
+}
+
+/// Scratch of the inner loop.
+struct Scratch {
+    filled: Filled,
+    jacobian: Vec<[[f64; 3]; 2]>,
+    /// N of each frame.
+    normal: Vec<Matrix3<f64>>,
+    axes: [Compact; 2],
+    /// M about each axis, a column a frame, of the last frames; and their T.
+    moments: [DMatrix<f64>; 3],
+    turn: DMatrix<f64>,
+    held: usize,
+    /// What one frame adds to M.
+    frame: [Vec<f64>; 3],
+    turns: Compact,
+    product: Vec<f64>,
+}
+
+impl Default for Scratch {
+    fn default() -> Self {
+        let empty = || DMatrix::zeros(0, 0);
+        Self {
+            filled: Filled::default(),
+            jacobian: Vec::new(),
+            normal: Vec::new(),
+            axes: Default::default(),
+            moments: [empty(), empty(), empty()],
+            turn: empty(),
+            held: 0,
+            frame: Default::default(),
+            turns: Compact::default(),
+            product: Vec::new(),
+        }
+    }
+}
+
+/// Columns that are not all zero, turned over: a column a row of the data.
+#[derive(Default)]
+struct Compact {
+    active: Vec<usize>,
+    values: Vec<f64>,
+}
+
+impl Compact {
+    /// Of the first `rows` entries of each of `columns`, which are `stride` long.
+    fn fill(&mut self, columns: &[f64], stride: usize, rows: usize) {
+        let column = |c: usize| &columns[c * stride..c * stride + rows];
+        let count = columns.len().checked_div(stride).unwrap_or(0);
+        self.active.clear();
+        self.active
+            .extend((0..count).filter(|&c| !is_zero(column(c))));
+        let width = self.active.len();
+        self.values.clear();
+        self.values.resize(width * rows, 0.0);
+        for at in (0..width).step_by(TURNED) {
+            let some = at..(at + TURNED).min(width);
+            for i in 0..rows {
+                let line = &mut self.values[i * width + some.start..i * width + some.end];
+                for (out, &c) in line.iter_mut().zip(&self.active[some.clone()]) {
+                    *out = columns[c * stride + i];
+                }
+            }
+        }
+    }
+
+    /// A row of the data is a column.
+    fn turned(&self) -> DMatrixView<'_, f64> {
+        let width = self.active.len();
+        let rows = self.values.len().checked_div(width).unwrap_or(0);
+        DMatrixView::from_slice(&self.values, width, rows)
+    }
+
+    /// Some of the columns as they were.
+    fn columns(&self, which: Range<usize>) -> DMatrixView<'_, f64, Dyn, Dyn> {
+        let width = self.active.len();
+        let rows = self.values.len() / width;
+        let values = &self.values[which.start..];
+        DMatrixView::from_slice_with_strides(values, rows, which.len(), width, 1)
+    }
+}
+
+/// Whether all are zero, of either sign.
+fn is_zero(values: &[f64]) -> bool {
+    const LANES: usize = 8;
+    let mut chunks = values.chunks_exact(LANES);
+    let bits = |values: &[f64]| values.iter().fold(0, |all, v| all | v.to_bits());
+    chunks.all(|some| bits(some) << 1 == 0) && bits(chunks.remainder()) << 1 == 0
+}
+
+/// A matrix of what was in `space`.
+fn matrix(space: &mut Vec<f64>, rows: usize, columns: usize) -> DMatrixViewMut<'_, f64> {
+    space.resize((rows * columns).max(space.len()), 0.0);
+    DMatrixViewMut::from_slice(space, rows, columns)
+}
+
+impl Sums {
+    pub(super) fn over(
+        columns: &StarColumns<'_>,
+        frames: Range<usize>,
+        bins: Option<&[Range<usize>]>,
+    ) -> Self {
+        let layout = columns.layout();
+        let (shared, own, turn) = (layout.shared, layout.own.len(), layout.turn.len());
+        let width = layout.width();
+        let mut sums = Self {
+            shared: DMatrix::zeros(shared, shared),
+            cross: DMatrix::zeros(2 * shared, own),
+            own: DMatrix::zeros(own, own),
+            turn: DMatrix::zeros(width, turn),
+            scalars: 0,
+            bins: bins.map(|b| {
+                (
+                    DMatrix::zeros(width, 3 * b.len()),
+                    vec![Matrix3::zeros(); b.len()],
+                )
+            }),
+            lost: None,
+            layout,
+        };
+        let used = |frame: usize| {
+            let rows = columns.data.frames.rows_of(frame);
+            rows.filter(|&r| !columns.data.outlier[r]).count()
+        };
+        let without: Vec<bool> = bins.map_or_else(Vec::new, |ranges| {
+            let stars = |r: &Range<usize>| r.clone().map(used).sum::<usize>();
+            ranges.iter().map(|r| stars(r) < SOLVING).collect()
+        });
+        let mut scratch = Scratch::default();
+        let mut at = frames.start;
+        let mut bin = 0;
+        while at < frames.end {
+            let chunk = at..(at + CHUNK_FRAMES).min(frames.end);
+            at = chunk.end;
+            columns.fill(chunk.clone(), &sums.layout, &mut scratch.filled);
+            sums.scalars += 2 * columns.weigh(chunk.clone(), &mut scratch.filled);
+            sums.add_rows(&mut scratch);
+            if bins.is_none() && turn == 0 {
+                continue;
+            }
+            let held = scratch.moments(columns, chunk.clone(), &sums.layout);
+            if turn > 0 && (scratch.held + CHUNK_FRAMES > TURN_FRAMES || at == frames.end) {
+                sums.add_turns(&mut scratch);
+            }
+            if turn == 0 {
+                scratch.held = 0;
+            }
+            let Some(ranges) = bins else { continue };
+            for (k, frame) in chunk.enumerate() {
+                while ranges[bin].end <= frame {
+                    bin += 1;
+                }
+                if without[bin] {
+                    sums.lose(columns, frame, k, &scratch);
+                } else if let Some((kept, normals)) = &mut sums.bins {
+                    for (axis, moments) in scratch.moments.iter().enumerate() {
+                        let mut kept = kept.column_mut(3 * bin + axis);
+                        kept += moments.column(held + k);
+                    }
+                    normals[bin] += scratch.normal[k];
+                }
+            }
+        }
+        sums
+    }
+
+    /// Adds the products of D, X and Y.
+    fn add_rows(&mut self, scratch: &mut Scratch) {
+        let Scratch {
+            filled,
+            axes,
+            product,
+            ..
+        } = scratch;
+        let shared = &filled.shared;
+        let n = shared.nrows();
+        let flipped = shared.transpose();
+        for start in (0..n).step_by(PANEL) {
+            let panel = start..(start + PANEL).min(n);
+            let left = shared.rows(start, n - start);
+            self.shared
+                .view_mut((start, start), (n - start, panel.len()))
+                .gemm(1.0, &left, &flipped.columns(start, panel.len()), 1.0);
+        }
+        for (axis, (own, compact)) in filled.own.iter().zip(axes).enumerate() {
+            compact.fill(own.as_slice(), own.nrows(), own.nrows());
+            let (turned, width) = (compact.turned(), compact.active.len());
+            if width == 0 {
+                continue;
+            }
+            let mut cross = matrix(product, n, width);
+            cross.gemm(1.0, shared, &compact.columns(0..width), 0.0);
+            for (from, &to) in cross.column_iter().zip(&compact.active) {
+                let mut into = self.cross.view_mut((axis * n, to), (n, 1));
+                into += from;
+            }
+            for start in (0..width).step_by(PANEL) {
+                let panel = start..(start + PANEL).min(width);
+                let below = &compact.active[start..];
+                let mut product = matrix(product, below.len(), panel.len());
+                let left = turned.rows(start, below.len());
+                product.gemm(1.0, &left, &compact.columns(panel.clone()), 0.0);
+                for (from, &to) in product.column_iter().zip(&compact.active[panel]) {
+                    let mut into = self.own.column_mut(to);
+                    for (from, &row) in from.iter().zip(below) {
+                        into[row] += from;
+                    }
+                }
+            }
+        }
+    }
+
+    /// Adds the products of all columns with T.
+    fn add_turns(&mut self, scratch: &mut Scratch) {
+        let Scratch {
+            moments,
+            turn,
+            held,
+            turns,
+            product,
+            ..
+        } = scratch;
+        let columns = turn.ncols() / 3;
+        for (axis, moments) in moments.iter().enumerate() {
+            let stride = turn.nrows();
+            let own = axis * columns * stride..(axis + 1) * columns * stride;
+            turns.fill(&turn.as_slice()[own], stride, *held);
+            let width = turns.active.len();
+            if width == 0 {
+                continue;
+            }
+            let moments = moments.columns(0, *held);
+            let mut product = matrix(product, moments.nrows(), width);
+            product.gemm(1.0, &moments, &turns.columns(0..width), 0.0);
+            for (from, &to) in product.column_iter().zip(&turns.active) {
+                let mut into = self.turn.column_mut(to);
+                into += from;
+            }
+        }
+        *held = 0;
+    }
+
+    /// Puts the rows of frame `k` of the chunk among those of no rotation.
+    fn lose(&mut self, columns: &StarColumns<'_>, frame: usize, k: usize, scratch: &Scratch) {
+        let data = columns.data;
+        let width = self.layout.width();
+        let (lost, scalars) = self
+            .lost
+            .get_or_insert_with(|| (DMatrix::zeros(width, width), 0));
+        let (shared, own) = (self.layout.shared, self.layout.own.len());
+        let filled = &scratch.filled;
+        let first = data.frames.first_row[frame - k];
+        for row in data.frames.rows_of(frame).filter(|&r| !data.outlier[r]) {
+            let jacobian = weighed_rotation(columns, row);
+            let i = row - first;
+            for axis in 0..2 {
+                let mut line = DVector::zeros(width);
+                line.rows_mut(axis * shared, shared)
+                    .copy_from(&filled.shared.column(i));
+                line.rows_mut(2 * shared, own)
+                    .tr_copy_from(&filled.own[axis].row(i));
+                let turned = filled.turn.fixed_rows::<3>(3 * k);
+                for (j, t) in turned.column_iter().enumerate() {
+                    line[2 * shared + own + j] = Vector3::from(jacobian[axis]).dot(&t);
+                }
+                lost.ger(1.0, &line, &line, 1.0);
+            }
+            *scalars += 2;
+        }
+    }
+
+    /// The products, in the order of the Gram matrix.
+    fn product(&self, places: &[usize]) -> DMatrix<f64> {
+        let (shared, own, width) = (
+            2 * self.layout.shared,
+            self.layout.own.len(),
+            self.layout.width(),
+        );
+        let mut out = DMatrix::zeros(width, width);
+        let mut put = |i: usize, j: usize, value: f64| {
+            out[(places[i], places[j])] = value;
+            out[(places[j], places[i])] = value;
+        };
+        for axis in [0, self.layout.shared] {
+            for j in 0..self.layout.shared {
+                for i in j..self.layout.shared {
+                    put(axis + i, axis + j, self.shared[(i, j)]);
+                }
+            }
+        }
+        for j in 0..own {
+            for i in j..own {
+                put(shared + i, shared + j, self.own[(i, j)]);
+            }
+            for i in 0..shared {
+                put(i, shared + j, self.cross[(i, j)]);
+            }
+        }
+        for j in 0..self.layout.turn.len() {
+            for i in 0..width {
+                put(i, shared + own + j, self.turn[(i, j)]);
+            }
+        }
+        out
+    }
+
+    pub(super) fn block(self) -> Block {
+        let places = self.layout.places();
+        let mut order = vec![0; places.len()];
+        for (from, &to) in places.iter().enumerate() {
+            order[to] = from;
+        }
+        let mut rest = self.product(&places);
+        let lost = self.lost.as_ref().map(|(lost, _)| pick(lost, &order));
+        let mut scalars = self.scalars;
+        if let (Some((_, count)), Some(lost)) = (&self.lost, &lost) {
+            rest -= lost;
+            scalars -= count;
+        }
+        let width = order.len();
+        let mut block = Block {
+            rest: Arc::new(rest),
+            lost,
+            scalars: self.scalars as f64,
+            rest_scalars: scalars as f64,
+            theta: DMatrix::zeros(0, width),
+            inverse: Vec::new(),
+        };
+        if let Some((moments, normals)) = self.bins {
+            let moments = moments.select_rows(&order).transpose();
+            block.keep_apart(moments, &normals);
+        }
+        block
+    }
+}
+
+impl Scratch {
+    /// M of every frame and column, about each axis, and N of every frame; returns where the first
+    /// frame is held.
+    fn moments(
+        &mut self,
+        columns: &StarColumns<'_>,
+        frames: Range<usize>,
+        layout: &Layout,
+    ) -> usize {
+        let data = columns.data;
+        let held = self.held;
+        self.held += frames.len();
+        let first = data.frames.first_row[frames.start];
+        let last = data.frames.first_row[frames.end];
+        self.jacobian.clear();
+        self.jacobian
+            .extend((first..last).map(|row| weighed_rotation(columns, row)));
+        let (shared, own) = (layout.shared, layout.own.len());
+        let turns = layout.turn.len();
+        if self.turn.shape() != (TURN_FRAMES, 3 * turns) {
+            self.turn = DMatrix::zeros(TURN_FRAMES, 3 * turns);
+        }
+        for (axis, moments) in self.moments.iter_mut().enumerate() {
+            if moments.nrows() != layout.width() {
+                *moments = DMatrix::zeros(layout.width(), TURN_FRAMES);
+            }
+            moments.columns_mut(held, frames.len()).fill(0.0);
+            for (j, from) in self.filled.turn.column_iter().enumerate() {
+                let mut into = self.turn.column_mut(axis * turns + j);
+                for k in 0..frames.len() {
+                    into[held + k] = from[3 * k + axis];
+                }
+            }
+        }
+        self.normal.clear();
+        for (k, frame) in frames.enumerate() {
+            let rows = data.frames.rows_of(frame);
+            let rows = rows.start - first..rows.end - first;
+            let mut normal = Matrix3::zeros();
+            for a in self.jacobian[rows.clone()].iter().flatten() {
+                let a = Vector3::from(*a);
+                normal += a * a.transpose();
+            }
+            for (axis, compact) in self.axes.iter().enumerate() {
+                let turns = self.jacobian[rows.clone()].iter().map(|j| j[axis]);
+                let polynomials = &self.filled.shared.as_slice()[rows.start * shared..];
+                let [x, y, z] = &mut self.frame;
+                weigh(turns.clone(), polynomials, shared, [x, y, z]);
+                for (moments, sums) in self.moments.iter_mut().zip(&self.frame) {
+                    let from = (held + k) * layout.width() + axis * shared;
+                    moments.as_mut_slice()[from..from + shared].copy_from_slice(sums);
+                }
+                let width = compact.active.len();
+                let values = &compact.values[rows.start * width..];
+                let [x, y, z] = &mut self.frame;
+                weigh(turns, values, width, [x, y, z]);
+                for (moments, sums) in self.moments.iter_mut().zip(&self.frame) {
+                    let mut moments = moments.column_mut(held + k);
+                    for (sum, &place) in sums.iter().zip(&compact.active) {
+                        moments[2 * shared + place] += sum;
+                    }
+                }
+            }
+            for (j, turn) in self.filled.turn.column_iter().enumerate() {
+                let turned = normal * turn.fixed_rows::<3>(3 * k);
+                for about in 0..3 {
+                    self.moments[about][(2 * shared + own + j, held + k)] = turned[about];
+                }
+            }
+            self.normal.push(normal);
+        }
+        held
+    }
+}
+
+/// Rotation columns of a row, times its weight.
+fn weighed_rotation(columns: &StarColumns<'_>, row: usize) -> [[f64; 3]; 2] {
+    let weight = columns.weight_of(row);
+    if weight > 0.0 {
+        rotation_row(columns.data, row).map(|axis| axis.map(|a| weight * a))
+    } else {
+        [[0.0; 3]; 2]
+    }
+}
+
+/// Sums of rows of `values`, each `width` long, with the three weights of each row.
+fn weigh(
+    weights: impl Iterator<Item = [f64; 3]> + Clone,
+    values: &[f64],
+    width: usize,
+    out: [&mut Vec<f64>; 3],
+) {
+    // as many as registers hold
+    const LANES: usize = 8;
+    let [x, y, z] = out.map(|out| {
+        out.clear();
+        out.resize(width, 0.0);
+        &mut out[..]
+    });
+    let whole = width - width % LANES;
+    for at in (0..whole).step_by(LANES) {
+        let mut sums = [[0.0; LANES]; 3];
+        for (i, w) in weights.clone().enumerate() {
+            let row = &values[i * width + at..i * width + at + LANES];
+            for l in 0..LANES {
+                sums[0][l] += w[0] * row[l];
+                sums[1][l] += w[1] * row[l];
+                sums[2][l] += w[2] * row[l];
+            }
+        }
+        x[at..at + LANES].copy_from_slice(&sums[0]);
+        y[at..at + LANES].copy_from_slice(&sums[1]);
+        z[at..at + LANES].copy_from_slice(&sums[2]);
+    }
+    for at in whole..width {
+        for (i, w) in weights.clone().enumerate() {
+            let value = values[i * width + at];
+            x[at] += w[0] * value;
+            y[at] += w[1] * value;
+            z[at] += w[2] * value;
+        }
+    }
+}

@@ -1,0 +1,80 @@
+//! The tracker's own attitude beside its stars.
+//!
+//! ```text
+//! error = log(q_meas q_ref^-1) - the rotation that the modelled shifts of the frame's stars amount to
+//! ```
+//!
+//! Source: \[M23\] Fig. 4 for what a residual is.
+
+use std::collections::BTreeMap;
+
+use block_regression::Folds;
+use focal_plane::rotation_vector;
+use spectra::robust;
+use telemetry::AttitudeResiduals;
+
+use crate::evidence::Residuals;
+use crate::situation::Situation;
+use crate::star::data::StarData;
+use crate::star::frame_rotation::rotation_of;
+use crate::star::settling::Settled;
+
+/// The tracker's own attitude beside the stars: its error against the reference,
+/// less the rotation that the modelled star shifts amount to.
+pub(crate) fn residuals(
+    situation: &Situation<'_>,
+    data: &StarData,
+    folds: &Folds,
+    settled: &Settled,
+    after: &Residuals,
+) -> Option<AttitudeResiduals> {
+    let table = situation.bundle.attitude.as_ref()?;
+    if data.free_attitude {
+        return None;
+    }
+    let scale = data.camera.arcsec_per_px();
+    let shift = |residual: &Residuals, phase_error: &[Vec<f64>; 2]| -> Vec<Vec<f64>> {
+        (0..2)
+            .map(|a| {
+                (0..data.t_s.len())
+                    .map(|r| residual.modelled[a][r] + phase_error[a][r] * scale[a])
+                    .collect()
+            })
+            .collect()
+    };
+    let declared = settled.phase_error.as_ref().unwrap_or(&data.phase_error);
+    let shift_before = shift(&settled.before, declared);
+    let shift_after = shift(after, &data.phase_error);
+    let fold = folds.column();
+    let own: BTreeMap<u64, usize> = table
+        .t_s
+        .iter()
+        .enumerate()
+        .map(|(k, t)| (t.to_bits(), k))
+        .collect();
+    let mut out = AttitudeResiduals::default();
+    for k in 0..data.frames.frames() {
+        let Some(&at) = own.get(&data.frames.t_s[k].to_bits()) else {
+            continue;
+        };
+        let theta = rotation_vector(&table.q[at], &data.attitude[k]) * focal_plane::ARCSEC_PER_RAD;
+        let (Some(b), Some(a)) = (
+            rotation_of(data, k, &shift_before),
+            rotation_of(data, k, &shift_after),
+        ) else {
+            continue;
+        };
+        out.t_s.push(data.frames.t_s[k]);
+        for axis in 0..3 {
+            out.before_arcsec[axis].push(theta[axis] - b[axis]);
+            out.after_arcsec[axis].push(theta[axis] - a[axis]);
+        }
+        out.fold.push(fold[k]);
+    }
+    out.outlier = vec![false; out.t_s.len()];
+    let group = vec![0; out.t_s.len()];
+    for axis in 0..3 {
+        robust::mark_outliers(&out.before_arcsec[axis], &group, 1, &mut out.outlier);
+    }
+    (!out.t_s.is_empty()).then_some(out)
+}

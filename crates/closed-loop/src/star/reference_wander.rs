@@ -1,0 +1,110 @@
+//! The reference's slow error as a finding of its own.
+//!
+//! ```text
+//! delta loglik   gain over a reference with white noise alone, less one nat a
+//!                parameter: what the same noise would gain on other data (Akaike)
+//! ```
+//!
+//! It lowers no residual: it says what part of the residual is not the tracker's.
+//!
+//! Source: Akaike 1974; effects.md of the design notes (`reference_error`).
+
+use std::collections::BTreeMap;
+
+use spectra::robust::median_step;
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+use telemetry::report::{ConsideredEffect, Estimate, FoundEffect};
+use telemetry::{EffectEntry, EffectValue};
+
+use crate::star::data::StarData;
+use crate::star::frame_rotation::rotation_of;
+use crate::star::search::{WIDENING, Wander};
+
+/// Identity in the catalogue.
+pub(crate) const REFERENCE_ERROR: &str = "reference_error";
+const NAMES: [[&str; 2]; 3] = [
+    ["sigma_x_arcsec", "tau_x_s"],
+    ["sigma_y_arcsec", "tau_y_s"],
+    ["sigma_z_arcsec", "tau_z_s"],
+];
+
+/// Correlation time for which a size that would have shown is given, s.
+const TYPICAL_TAU_S: f64 = 20.0;
+const SEEN: f64 = 5.0;
+
+/// What this data would have shown of a wander that was not claimed: `left` is the residual, `excess`
+/// its square beyond the noise. `None` without a reference, or with too few attitudes.
+///
+/// ```text
+/// var(s^2) = w^4 (1 - r^2) / (N r^2)      r = exp(-dt/tau): information of the correlations alone
+/// ```
+pub(crate) fn consider(
+    data: &StarData,
+    left: &[Vec<f64>],
+    excess: f64,
+) -> Option<ConsideredEffect> {
+    if data.free_attitude {
+        return None;
+    }
+    let theta: Vec<f64> = (0..data.frames.frames())
+        .filter_map(|frame| Some(rotation_of(data, frame, left)?.x))
+        .collect();
+    let step_s = median_step(&data.frames.t_s)?;
+    let pairs = theta.len().checked_sub(1).filter(|n| *n > 1)?;
+    let squares: f64 = theta.windows(2).map(|w| (w[1] - w[0]).powi(2)).sum();
+    let white = squares / (2.0 * pairs as f64);
+    let decay = (-step_s / TYPICAL_TAU_S).exp();
+    let sigma = white * ((1.0 - decay * decay) / (theta.len() as f64 * decay * decay)).sqrt();
+    let rows = data.outlier.iter().filter(|o| !**o).count().max(1) as f64;
+    Some(ConsideredEffect {
+        id: REFERENCE_ERROR.to_owned(),
+        delta_loglik: None,
+        p_value: None,
+        observable: true,
+        detectable: Some((SEEN * sigma).sqrt()),
+        // about X and Y alike
+        needed: (excess > 0.0).then(|| (0.5 * excess / rows).sqrt()),
+        parameter: Some(NAMES[0][0].to_owned()),
+        unit: Some("arcsec".to_owned()),
+    })
+}
+
+/// The effect, where at least one axis is beyond doubt.
+pub(crate) fn effect(wander: &Wander) -> Option<(FoundEffect, EffectEntry)> {
+    let axes: Vec<usize> = (0..3).filter(|&a| wander.axes()[a]).collect();
+    if axes.is_empty() {
+        return None;
+    }
+    let mut parameters = BTreeMap::new();
+    let mut written = BTreeMap::new();
+    for &axis in &axes {
+        let slow = wander.noise.reference[axis];
+        let sigma = wander.rotations.slow_sigma(&wander.noise, axis);
+        let values = [(slow.slow, "arcsec"), (slow.tau_s, "s")];
+        for (k, (value, unit)) in values.into_iter().enumerate() {
+            let name = NAMES[axis][k].to_owned();
+            written.insert(name.clone(), EffectValue::Number(value));
+            let estimate = Estimate {
+                value,
+                sigma: sigma.map(|s| s[k] * value),
+                unit: unit.to_owned(),
+                interval: None,
+            };
+            parameters.insert(name, estimate);
+        }
+    }
+    let ratio: f64 = axes.iter().map(|&a| wander.ratio[a]).sum();
+    let freedom = 2.0 * axes.len() as f64;
+    let p = ChiSquared::new(freedom).map_or(1.0, |law| law.sf(ratio / WIDENING));
+    let found = FoundEffect {
+        id: REFERENCE_ERROR.to_owned(),
+        selectors: BTreeMap::new(),
+        parameters,
+        delta_loglik: 0.5 * ratio - freedom,
+        // three axes were looked at
+        p_value: (3.0 * p).min(wander.p_value()),
+        variance_explained: None,
+        confusable_with: Vec::new(),
+    };
+    Some((found, EffectEntry::new(REFERENCE_ERROR, written)))
+}

@@ -1,0 +1,636 @@
+//! The loop at star level: centroids against catalogue and reference, or against
+//! themselves.
+//!
+//! Where raw windows are there, what is left is traced to the detector first:
+//! centroids are formed anew with a dark map learned outside each fold, and the
+//! rival explanation, a function of pixel phase, is tried on the same footing.
+//!
+//! Not physics: the order of the steps.
+
+use block_regression::Folds;
+use effects::{Scene, StarFacts, StarRows};
+use focal_plane::{AttitudeSource, Points};
+use nalgebra::DVector;
+use spectra::robust::median_step;
+use star_images::Formed;
+use telemetry::report::{Errors, FoundEffect, Report, Rows};
+use telemetry::{DarkMap, Model, StarResiduals};
+
+use crate::causes::commonness::Slow;
+use crate::causes::description::{self, Described};
+use crate::causes::{self, Named, Quest};
+use crate::close::{Closed, catalogue_candidates};
+use crate::declared;
+use crate::error::CloseError;
+use crate::evidence::{Evidence, Residuals};
+use crate::figures;
+use crate::image_level::{self, ImageLevel, Side};
+use crate::motion::resolved_motion;
+use crate::motion::{self, Around};
+use crate::noise_effects;
+use crate::questions::confusion;
+use crate::questions::hypothesis::{self, Grounds};
+use crate::questions::manoeuvre::stars::Sky;
+use crate::search::instants;
+use crate::search::selection::columns_of;
+use crate::search::{Found, amplitudes_as, fit};
+use crate::situation::Situation;
+use crate::star::data::{Inputs, Star, StarData};
+use crate::star::evidence::StarEvidence;
+use crate::star::own_attitude;
+use crate::star::reference_wander::{self, REFERENCE_ERROR};
+use crate::star::search::Wander;
+use crate::star::settling::{Settled, settle};
+use crate::unexplained::leftover;
+use crate::unexplained::pattern::{self, Rotation, less_rotation};
+use crate::unexplained::star_series;
+
+/// Fewest frames: every fold needs data to be predicted from.
+const MIN_FRAMES: usize = 2;
+/// How often rows that only the effects found make stand out are set aside.
+const OUTLIER_ROUNDS: usize = 2;
+/// Searches after which the light is taken to fall where what was found takes it.
+const LANDINGS: usize = 2;
+
+pub(crate) fn run(
+    situation: &Situation<'_>,
+    progress: &dyn Fn(&str),
+) -> Result<Closed, CloseError> {
+    let frames = situation
+        .bundle
+        .stars
+        .as_ref()
+        .ok_or(CloseError::NothingToCompare("no stars"))?;
+    progress("joining stars, reference and catalogue");
+    let phase = declared::centroid_error(situation.model);
+    let find = |id: i64| -> Option<Star> { situation.star(id) };
+    let mut data = StarData::prepare(&Inputs {
+        camera: &situation.camera,
+        frames,
+        reference: situation.reference.as_ref(),
+        catalogue: situation
+            .bundle
+            .catalog
+            .is_some()
+            .then_some(&find as &dyn Fn(i64) -> Option<Star>),
+        phase: &phase,
+        effects: &declared::effects(situation)?,
+    });
+    if data.frames.frames() < MIN_FRAMES {
+        return Err(CloseError::TooFewFrames {
+            frames: data.frames.frames(),
+            need: MIN_FRAMES,
+            why: "the others lie outside the reference, or have no two stars to solve an attitude from",
+        });
+    }
+    if let Some(windows) = &situation.bundle.images {
+        data.see_windows(windows);
+    }
+    let unrelated = data.frames_are_unrelated();
+    let folds = if unrelated {
+        Folds::unrelated(data.frames.frames())
+    } else {
+        Folds::cut(data.frames.frames())
+    };
+    for _ in 0..OUTLIER_ROUNDS {
+        let closed = trace(&mut data, situation, &phase, &folds, progress)?;
+        // a star mistaken for another hides in the residual of a lens that nobody calibrated
+        let left = closed.stars.as_ref().filter(|_| unrelated);
+        if left.is_none_or(|s| data.mark_outliers(&s.after_arcsec) == 0) {
+            return Ok(closed);
+        }
+    }
+    trace(&mut data, situation, &phase, &folds, progress)
+}
+
+/// From the residual of the declared model to the report.
+fn trace(
+    data: &mut StarData,
+    situation: &Situation<'_>,
+    phase: &centroid::CentroidError,
+    folds: &Folds,
+    progress: &dyn Fn(&str),
+) -> Result<Closed, CloseError> {
+    progress("residuals of the declared model");
+    data.lands_as_modelled();
+    let mut settled = settle(data, situation, phase, folds)?;
+    let mut landings = LANDINGS;
+    loop {
+        let last = landings == 0;
+        let [fitted, whole] = match explain(data, situation, folds, &settled, last, progress)? {
+            Explained::Closed(closed) => return Ok(*closed),
+            Explained::Elsewhere(moved) => moved,
+        };
+        landings -= 1;
+        // the declared model knows nothing of where the light falls
+        settled
+            .phase_error
+            .get_or_insert_with(|| data.phase_error.clone());
+        data.land(&fitted, &whole, phase);
+    }
+}
+
+/// What a search ends with.
+enum Explained {
+    Closed(Box<Closed>),
+    /// What was found shifts the light to another pixel phase than the fits assumed: what the
+    /// nuisance shifts rows by, and with it all, arcsec.
+    Elsewhere([Vec<Vec<f64>>; 2]),
+}
+
+/// From the declared model at its best to the report, or to where the light falls.
+fn explain(
+    data: &mut StarData,
+    situation: &Situation<'_>,
+    folds: &Folds,
+    settled: &Settled,
+    last: bool,
+    progress: &dyn Fn(&str),
+) -> Result<Explained, CloseError> {
+    let around: Option<Box<dyn AttitudeSource>> = match &situation.reference {
+        Some(_) => resolved_motion(situation, &data.frames.t_s),
+        None => data
+            .own_motion()
+            .filter(|_| motion::resolved(&data.attitude))
+            .map(|own| Box::new(Around::new(&own, &data.frames.t_s)) as Box<dyn AttitudeSource>),
+    };
+    let motion = around.as_deref();
+    data.follow(motion);
+    let data = &*data;
+    let measured = StarEvidence::new(data, situation, vec![data.measured_residual()], motion);
+
+    let formed = match &situation.bundle.images {
+        Some(windows) => {
+            progress("dark map from the raw windows");
+            image_level::form(data, windows, folds)
+        }
+        None => None,
+    };
+    let anew = |variants: &[[Vec<f64>; 2]], zero_px: &[[f64; 2]]| {
+        let residuals = variants
+            .iter()
+            .map(|c| data.residual_arcsec(Points { x: &c[0], y: &c[1] }))
+            .collect();
+        let evidence = StarEvidence::new(data, situation, residuals, motion);
+        StarEvidence {
+            nuisance: evidence.nuisance.with_zeros(data, zero_px),
+            ..evidence
+        }
+    };
+    let sides = formed.as_ref().map(|f| {
+        [&f.without_map, &f.with_map].map(|c| Side {
+            moments: anew(&c.moments, &c.zero_px),
+            unbiased: anew(&c.unbiased, &c.zero_px),
+            fitted: anew(&c.fitted, &c.zero_px),
+            gaussian: anew(&c.gaussian, &c.zero_px),
+            followed: (!c.followed.is_empty()).then(|| anew(&c.followed, &c.zero_px)),
+        })
+    });
+
+    progress("searching for causes");
+    let facts: Vec<StarFacts> = data
+        .stars
+        .iter()
+        .map(|s| StarFacts {
+            star_id: s.id,
+            mag: s.mag,
+            bv: s.bv,
+        })
+        .collect();
+    let rows = data.rows(0..data.t_s.len(), motion);
+    let scene = scene(situation, data, &facts, &rows);
+    let image = match &sides {
+        Some(sides) => {
+            let mut others = catalogue_candidates(&scene);
+            others.retain(|c| c.acts_on_stars());
+            let phase: Vec<_> = others
+                .extract_if(.., |c| c.id() == "pixel_phase_harmonics")
+                .collect();
+            let beside = [phase.as_slice(), &others];
+            Some(image_level::compare(&measured, sides, beside, folds, data)?)
+        }
+        None => None,
+    };
+    let own = image.as_ref().zip(formed.as_ref());
+    let own = own.and_then(|(image, formed)| image.level(formed));
+    let own = own.map(|(variants, zero_px)| anew(variants, &zero_px));
+    let level = own.as_ref().unwrap_or(&measured);
+    let candidates = || {
+        let mut list = catalogue_candidates(&scene);
+        // With raw windows a warm pixel is the dark map's business.
+        list.retain(|c| c.acts_on_stars() && !(formed.is_some() && c.id() == "hot_pixel"));
+        list
+    };
+    let quest = Quest {
+        candidates: &candidates,
+        terms: &|| description::terms(situation, data),
+        ways: &description::ways(situation, data),
+    };
+    let Named {
+        searched,
+        described,
+        slow,
+    } = causes::run(level, folds, &quest)?;
+    let mut searched = searched;
+    if situation.questions.empirical {
+        description::offer(
+            searched.evidence.as_ref().unwrap_or(level),
+            folds,
+            &mut searched.found,
+            &described.follows(1.0),
+            description::terms(situation, data),
+            &situation.surroundings(),
+        )?;
+    }
+    let whole = Finish {
+        situation,
+        data,
+        folds,
+        measured: &measured,
+        level: searched.evidence.as_ref().unwrap_or(level),
+        found: &searched.found,
+        described: &described,
+        slow,
+        wander: searched.wander.as_ref(),
+        settled,
+        image: image.as_ref().zip(formed.as_ref()),
+    };
+    let after = whole.residuals(&searched.found.selection.chosen)?;
+    if !last && formed.is_none() && data.lands_elsewhere(&after.modelled) {
+        return Ok(Explained::Elsewhere([whole.fitted()?, after.modelled]));
+    }
+    progress("figures");
+    Ok(Explained::Closed(Box::new(finish(&whole, after)?)))
+}
+
+fn scene<'a>(
+    situation: &'a Situation<'_>,
+    data: &StarData,
+    facts: &'a [StarFacts],
+    rows: &'a StarRows<'a>,
+) -> Scene<'a> {
+    Scene {
+        surroundings: situation.surroundings(),
+        has_stars: true,
+        has_catalogue: !data.free_directions,
+        has_reference: !data.free_attitude,
+        has_attitude: situation.bundle.attitude.is_some(),
+        stars: facts,
+        exposure_s: situation.exposure_s(),
+        step_s: median_step(&data.frames.t_s).unwrap_or(f64::INFINITY),
+        rows: Some(rows),
+    }
+}
+
+/// What the report is made of.
+struct Finish<'a> {
+    situation: &'a Situation<'a>,
+    data: &'a StarData,
+    folds: &'a Folds,
+    measured: &'a StarEvidence<'a>,
+    level: &'a StarEvidence<'a>,
+    found: &'a Found,
+    described: &'a Described,
+    slow: Option<Slow>,
+    wander: Option<&'a Wander>,
+    settled: &'a Settled,
+    image: Option<(&'a ImageLevel, &'a Formed)>,
+}
+
+impl Finish<'_> {
+    fn residuals(&self, chosen: &[usize]) -> Result<Residuals, CloseError> {
+        let only = self.found.only(chosen);
+        let amplitudes = amplitudes_as(&self.found.fitted, self.folds, chosen, |beta| {
+            only.spread(beta)
+        })
+        .ok_or(CloseError::Singular)?;
+        Ok(self
+            .level
+            .residuals(self.folds, &only.candidates, &amplitudes))
+    }
+
+    /// What the nuisance shifts each row by beside the chosen effects, arcsec.
+    fn fitted(&self) -> Result<Vec<Vec<f64>>, CloseError> {
+        let chosen = &self.found.selection.chosen;
+        let none = |_: &_| DVector::zeros(0);
+        let amplitudes = amplitudes_as(&self.found.fitted, self.folds, chosen, none)
+            .ok_or(CloseError::Singular)?;
+        Ok(self.level.residuals(self.folds, &[], &amplitudes).modelled)
+    }
+
+    fn power(&self, residual: &Residuals) -> f64 {
+        figures::star_rms(residual, self.data)
+            .iter()
+            .map(|v| v * v)
+            .sum()
+    }
+
+    /// `model` is the declared one, or that with what was added.
+    fn errors(
+        &self,
+        model: &Model,
+        residual: &Residuals,
+        loglik: Option<f64>,
+        attitude: Option<[f64; 3]>,
+    ) -> Errors {
+        let declared = self
+            .situation
+            .model
+            .noise
+            .temporal_arcsec
+            .filter(|s| *s > 0.0);
+        let rms = figures::star_rms(residual, self.data);
+        Errors {
+            star_rms_arcsec: Some(rms),
+            attitude_rms_arcsec: attitude,
+            log_psd_cost: None,
+            // with free attitudes three of each frame's numbers are spent
+            chi2_per_dof: declared.and_then(|_| {
+                let situation = self.situation.believing(model);
+                let square = noise_effects::in_declared_sigmas(&situation, self.data, residual)?;
+                Some(square / self.found.fitted.scalars)
+            }),
+            loglik_per_frame: loglik.map(|l| l / self.data.frames.frames() as f64),
+        }
+    }
+}
+
+/// `plain`: what the chosen effects leave.
+fn finish(f: &Finish<'_>, plain: Residuals) -> Result<Closed, CloseError> {
+    let chosen = &f.found.selection.chosen;
+    let whole = f.power(&f.settled.before);
+    let mut explained = Vec::new();
+    let mut last = f.power(&f.residuals(&[])?);
+    for k in 1..=chosen.len() {
+        let now = if k == chosen.len() {
+            f.power(&plain)
+        } else {
+            f.power(&f.residuals(&chosen[..k])?)
+        };
+        explained.push((last - now) / whole);
+        last = now;
+    }
+    let surroundings = f.situation.surroundings();
+    // what is left is judged before a term without a cause is added
+    let mut unattributed = f.described.follows(last / whole);
+
+    let questions = f.situation.questions;
+    let mut added = chosen.clone();
+    let mut after = None;
+    if questions.empirical
+        && let Some(g) = figures::best_empirical(f.found, &unattributed, &surroundings)
+    {
+        added.push(g);
+        let with_term = f.residuals(&added)?;
+        explained.push((last - f.power(&with_term)) / whole);
+        after = Some(with_term);
+    }
+    let (mut effects, mut entries) =
+        figures::effects_found(f.found, &added, &explained, &surroundings, questions)?;
+    tell_apart(f, &mut effects);
+    instants::complete(
+        f.level,
+        f.folds,
+        f.found,
+        &surroundings,
+        median_step(&f.data.frames.t_s).unwrap_or(1.0),
+        &mut effects,
+    )?;
+    if let Some((level, formed)) = f.image {
+        for (at, (effect, entry)) in image_level::effects(level, formed).into_iter().enumerate() {
+            effects.insert(at, effect);
+            entries.insert(at, entry);
+        }
+    }
+    let mut model = f.situation.model.clone();
+    let declared = model.effects.iter().any(|e| e.id == REFERENCE_ERROR);
+    let wander = f
+        .wander
+        .filter(|_| !declared)
+        .and_then(reference_wander::effect);
+    if let Some((effect, entry)) = wander {
+        effects.push(effect);
+        entries.push(entry);
+    }
+    let inside = noise_effects::in_sample(f.level, f.found);
+    let residual = inside.as_deref().unwrap_or(&plain.axes);
+    let weight = &f.level.weight;
+    let both = [residual[0].as_slice(), &residual[1]];
+    let turned = |rotation| less_rotation(f.data, both, weight, rotation);
+    let known = turned(Rotation::Known);
+    let (noise, ((leftover, own), pattern)) = rayon::join(
+        || noise_effects::claim(f.situation, f.level, residual, f.folds),
+        || {
+            let order = f.situation.model.noise.distortion_order;
+            rayon::join(
+                || {
+                    // frames whose attitudes are free have turned already
+                    let alone = (!f.data.free_attitude).then(|| turned(Rotation::Whole));
+                    let [own, alone] = match &alone {
+                        Some(alone) => [known.as_slice(), alone],
+                        None => [residual, residual],
+                    };
+                    (
+                        leftover::describe(&leftover::star_tracks(f.data, residual, weight)),
+                        star_series::search(f.data, own, alone, weight),
+                    )
+                },
+                || {
+                    let own = known.each_ref().map(Vec::as_slice);
+                    let learned = f.level.learned();
+                    pattern::search(f.data, residual, own, weight, f.folds, order, learned)
+                },
+            )
+        },
+    );
+    let mut noise = noise?;
+    let mut noise_left = noise_effects::NoiseFollows::default();
+    if f.image.is_some_and(|(level, _)| level.new_noise()) {
+        noise = noise.without_magnitude();
+    }
+    if f.image.is_none() && !f.data.frames_are_unrelated() {
+        let of = description::of_noise(f.situation, f.data);
+        let claimed = &noise;
+        noise_left =
+            noise_effects::noise_follows(f.situation, f.level, residual, f.folds, claimed, &of)?;
+    }
+    effects.extend(noise.effects.iter().cloned());
+    entries.extend(noise.entries.iter().cloned());
+    model.effects.extend(entries);
+
+    leftover.tell(&mut unattributed);
+    if let Some(pattern) = pattern {
+        pattern.tell(&mut unattributed, last / whole);
+    }
+    if let Some(slow) = f.slow {
+        slow.tell(&mut unattributed, last / whole);
+    }
+    // a learned spot errs by where the star lies, and so slowly
+    if !f.level.learned() {
+        own.tell(&mut unattributed, last / whole);
+    }
+    noise_left.tell(&mut unattributed);
+    let excess = excess(f, last);
+    let mut considered = figures::considered(f.found, excess);
+    considered.retain(|c| !effects.iter().any(|e| e.id == c.id));
+    let unit = f.level.noise.map_or(1.0, |n| n.centroid);
+    let squares = excess * unit * unit;
+    noise.need(f.situation, f.data, squares)?;
+    noise.tell(&mut considered);
+    if let Some(wander) = reference_wander::consider(f.data, &plain.axes, squares) {
+        considered
+            .iter_mut()
+            .filter(|c| c.id == wander.id)
+            .for_each(|c| c.clone_from(&wander));
+    }
+    if let Some((level, _)) = f.image {
+        for (id, step) in [
+            (image_level::DARK_MAP, &level.dark_map),
+            (image_level::EFFECTIVE_PSF, &level.effective_psf),
+        ] {
+            considered.retain(|c| !(step.stands && c.id == id));
+            for entry in considered.iter_mut().filter(|c| c.id == id) {
+                entry.delta_loglik = Some(step.delta_loglik);
+                entry.p_value = Some(step.p_value);
+                entry.observable = true;
+            }
+        }
+    }
+
+    let fits = &f.found.fitted.fits;
+    let hypotheses = hypothesis::answer(
+        f.situation.questions,
+        &Grounds {
+            found: f.found,
+            surroundings,
+            information: &|c| fits.information(c),
+            alone: remarkable(f, whole),
+            left: remarkable(f, last),
+            resolved: f.level.motion.is_some(),
+            effects: &effects,
+            considered: &considered,
+        },
+    );
+
+    let after = after.unwrap_or(plain);
+    let attitude = own_attitude::residuals(f.situation, f.data, f.folds, f.settled, &after);
+    let attitude_rms = |series: &[Vec<f64>; 3], outlier: &[bool]| {
+        std::array::from_fn(|a| figures::rms(&series[a], outlier).unwrap_or(f64::NAN))
+    };
+    let before_loglik = match f.settled.loglik {
+        Some(known) => Some(known),
+        None => {
+            let fitted = fit(f.measured, f.folds, &[])?;
+            fitted.fits.out_of_fold(&[]).map(|o| o.total_loglik())
+        }
+    };
+    let set = columns_of(&f.found.fitted.groups, &added);
+    let after_loglik = f
+        .found
+        .fitted
+        .fits
+        .out_of_fold(&set)
+        .map(|o| o.total_loglik() + f.found.fitted.log_scale);
+    let outliers = f.data.outlier.iter().filter(|o| **o).count();
+    let report = Report {
+        format: telemetry::report::REPORT_FORMAT.to_owned(),
+        verdict: figures::verdict(&effects, unattributed.present),
+        folds: f.folds.count,
+        rows: Rows {
+            used: f.data.t_s.len() - outliers,
+            outliers,
+            outside_reference: f.data.outside_reference,
+        },
+        before: f.errors(
+            f.situation.model,
+            &f.settled.before,
+            before_loglik,
+            attitude
+                .as_ref()
+                .map(|a| attitude_rms(&a.before_arcsec, &a.outlier)),
+        ),
+        after: f.errors(
+            &model,
+            &after,
+            after_loglik,
+            attitude
+                .as_ref()
+                .map(|a| attitude_rms(&a.after_arcsec, &a.outlier)),
+        ),
+        effects,
+        considered,
+        hypotheses,
+        unattributed,
+    };
+    let [ax, ay]: [Vec<f64>; 2] = after.axes.try_into().unwrap_or_default();
+    let [bx, by]: [Vec<f64>; 2] = f.settled.before.axes.clone().try_into().unwrap_or_default();
+    let fold_of_frame = f.folds.column();
+    let frames = &f.data.frames;
+    let fold = (0..frames.frames())
+        .flat_map(|k| std::iter::repeat_n(fold_of_frame[k], frames.rows_of(k).len()))
+        .collect();
+    Ok(Closed {
+        report,
+        model,
+        stars: Some(StarResiduals {
+            t_s: f.data.t_s.clone(),
+            slot: frames.slot.clone(),
+            star_id: frames.star_id.clone(),
+            x_px: frames.x_px.clone(),
+            y_px: frames.y_px.clone(),
+            before_arcsec: [bx, by],
+            after_arcsec: [ax, ay],
+            fold,
+            outlier: f.data.outlier.clone(),
+        }),
+        attitude,
+        dark_map: f
+            .image
+            .filter(|(level, _)| level.dark_map.stands)
+            .map(|(_, formed)| DarkMap {
+                x_px: formed.map.pixels.iter().map(|p| p.x_px).collect(),
+                y_px: formed.map.pixels.iter().map(|p| p.y_px).collect(),
+                dn: formed.map.pixels.iter().map(|p| p.dn).collect(),
+                sigma_dn: formed.map.pixels.iter().map(|p| p.sigma_dn).collect(),
+            }),
+        rivals: f
+            .image
+            .map(|(level, _)| level.rivals.clone())
+            .unwrap_or_default(),
+    })
+}
+
+/// What else each effect could have been, and the motion that would tell.
+fn tell_apart(f: &Finish<'_>, effects: &mut [FoundEffect]) {
+    let confusion = confusion::compare(f.found, effects);
+    let set = columns_of(&f.found.fitted.groups, &f.found.selection.chosen);
+    let sky = f.found.fitted.fits.variance(&set).and_then(|variance| {
+        let noise = f.wander.filter(|_| f.level.noise.is_some());
+        Sky::of(f.data, f.situation.model, variance, noise.map(|w| w.noise))
+    });
+    if let (Some(sky), Some(&start)) = (sky, f.data.frames.t_s.first())
+        && !confusion.is_empty()
+    {
+        confusion.tell(effects, start, sky.attitude(), &|flown| {
+            sky.fly(flown, &confusion.candidates)
+        });
+    }
+}
+
+/// Squared residual over what the declared noise accounts for, in the unit of the
+/// fit's scalars (arcsec, or the centroids' noise where they are whitened); 0 where no noise is declared.
+fn excess(f: &Finish<'_>, power: f64) -> f64 {
+    let rows = f.data.outlier.iter().filter(|o| !**o).count() as f64;
+    f.situation.model.noise.temporal_arcsec.map_or(0.0, |s| {
+        let unit = f.level.noise.map_or(1.0, |n| n.centroid);
+        (rows * power - 0.5 * s * s * f.found.fitted.scalars).max(0.0) / (unit * unit)
+    })
+}
+
+/// [`excess`] where it stands out of the noise.
+fn remarkable(f: &Finish<'_>, power: f64) -> Option<f64> {
+    let sigma = f.situation.model.noise.temporal_arcsec?;
+    let unit = f.level.noise.map_or(1.0, |n| n.centroid);
+    let variance = 0.5 * sigma * sigma / (unit * unit);
+    hypothesis::beyond(excess(f, power), variance, f.found.fitted.scalars)
+}

@@ -1,0 +1,518 @@
+//! What remains in time: lines and jumps of what all rows of a frame share.
+//!
+//! Series of one number a frame (rotations, growth and shears of the image, attitude axes) are
+//! whitened by the noise that suits them best ([`coloured_noise`]) and searched for a sinusoid,
+//!
+//! ```text
+//! z(f) = power of the best sinusoid at f / mean power around f,    P = M (1 + z/n)^-n
+//! ```
+//!
+//! with M frequencies on a grid four times finer than 1/span, and n independent ones
+//! around f that the mean is of: noise whose density is smooth there passes P < alpha
+//! that rarely, whatever its colour. What is found is refined to the top of z, taken out
+//! of the series as it was before whitening, and the search goes on. Steps then,
+//!
+//! ```text
+//! P = M chi2_1 of 2 (L(step, its best noise) - L(best noise)) / 1.3
+//! ```
+//!
+//! with M instants. alpha is 1 % over all series, lines and jumps together.
+//!
+//! Source: Scargle 1982 (periodogram), the F law of a ratio of two mean powers; Wilks 1938.
+
+use block_regression::Folds;
+use coloured_noise::Coloured;
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3, Vector4};
+use rayon::prelude::*;
+use spectra::robust::median_step;
+use spectra::{LombScargle, LombScargleSettings, robust};
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+
+use crate::attitude::spatial_errors::SpatialErrors;
+use crate::bins::{self, Bins};
+use crate::search::selection::FAMILY_ALPHA;
+use crate::star::data::StarData;
+use crate::star::frame_rotation::rotation_row;
+use crate::star::search::WIDENING;
+use telemetry::report::Unattributed;
+
+#[cfg(test)]
+mod tests;
+
+/// Fewest points of a series that is searched.
+const MIN_POINTS: usize = 60;
+/// Grid points in 1/span.
+const FINER: usize = 4;
+/// Independent frequencies on each side that the mean power is of.
+const AROUND: usize = 15;
+/// Nearer ones hold the line's own power.
+const GUARD: usize = 2;
+/// Fewer cycles in the span are no line but a trend.
+const MIN_CYCLES: f64 = 3.0;
+/// Points of a series beyond which neighbours are averaged.
+const MOST_POINTS: usize = 4800;
+/// Lines, and jumps, of one series.
+const MOST: usize = 5;
+/// Instants tried before the neighbours of the best are.
+const MOST_STEPS: usize = 1200;
+/// Points that a level on each side of a jump is of.
+const MIN_SIDE: usize = 5;
+
+/// What the image can do besides turning: x and y of a shift per x and y of the place. It grows,
+/// or is sheared either way.
+const STRETCHES: [[[f64; 2]; 2]; 3] = [
+    [[1.0, 0.0], [0.0, 1.0]],
+    [[1.0, 0.0], [0.0, -1.0]],
+    [[0.0, 1.0], [1.0, 0.0]],
+];
+/// Least share of a stretch that is no rotation.
+const LEAST_INFORMATION: f64 = 1e-6;
+
+/// One number a frame.
+#[derive(Clone, Debug)]
+pub(crate) struct Track {
+    pub(crate) t_s: Vec<f64>,
+    /// Value, arcsec.
+    pub(crate) value: Vec<f64>,
+    /// Weight: the white variance is in inverse proportion; 0 does not count.
+    pub(crate) weight: Vec<f64>,
+    /// Jumps that the declared model makes on this axis.
+    pub(crate) changes: Option<(SpatialErrors, usize)>,
+}
+
+/// Lines and jumps of one bundle.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Leftover {
+    pub(crate) lines_hz: Vec<f64>,
+    pub(crate) jumps_s: Vec<f64>,
+}
+
+impl Leftover {
+    /// Writes them where they are reported: something is left then.
+    pub(crate) fn tell(self, unattributed: &mut Unattributed) {
+        unattributed.present |= !(self.lines_hz.is_empty() && self.jumps_s.is_empty());
+        unattributed.lines_hz = self.lines_hz;
+        unattributed.jumps_s = self.jumps_s;
+    }
+}
+
+/// Searches `tracks`.
+pub(crate) fn describe(tracks: &[Track]) -> Leftover {
+    let alpha = FAMILY_ALPHA / (2.0 * tracks.len().max(1) as f64);
+    let thinned: Vec<Track> = tracks
+        .par_iter()
+        .map(Track::thinned)
+        .filter(|track| track.t_s.len() >= MIN_POINTS)
+        .collect();
+    // most series have the same times, and one plan serves them
+    let first = |k: usize| thinned[..k].iter().position(|t| t.t_s == thinned[k].t_s);
+    let plans: Vec<Option<LombScargle>> = (0..thinned.len())
+        .into_par_iter()
+        .map(|k| first(k).is_none().then(|| thinned[k].plan())?)
+        .collect();
+    let each: Vec<_> = (0..thinned.len())
+        .into_par_iter()
+        .map(|k| {
+            let mut track = thinned[k].clone();
+            let lines = track.lines(alpha, plans[first(k).unwrap_or(k)].as_ref());
+            let jumps = track.jumps(alpha);
+            (track, lines, jumps)
+        })
+        .collect();
+    let mut out = Leftover::default();
+    for (track, lines, jumps) in each {
+        let span = track.span();
+        for f in lines {
+            // the same line in two series is one
+            if out.lines_hz.iter().all(|g| (f - g).abs() > 1.0 / span) {
+                out.lines_hz.push(f);
+            }
+        }
+        let step = median_step(&track.t_s).unwrap_or(0.0);
+        for t in jumps {
+            if out.jumps_s.iter().all(|s| (t - s).abs() > 2.5 * step) {
+                out.jumps_s.push(t);
+            }
+        }
+    }
+    out.lines_hz.sort_by(f64::total_cmp);
+    out.jumps_s.sort_by(f64::total_cmp);
+    out
+}
+
+/// What the stars of a frame share, of residuals (arcsec, per axis over all rows) of this
+/// `weight`: the rotation where it is held against a reference, and the growth and both shears
+/// of the image, arcsec at the edge.
+pub(crate) fn star_tracks(data: &StarData, residual: &[Vec<f64>], weight: &[f64]) -> Vec<Track> {
+    let frames = data.frames.frames();
+    let empty = || Track {
+        t_s: data.frames.t_s.clone(),
+        value: vec![0.0; frames],
+        weight: vec![0.0; frames],
+        changes: None,
+    };
+    let mut tracks = vec![empty(); 3 + STRETCHES.len()];
+    let half = data.camera.half_size_px();
+    for frame in 0..frames {
+        let rows: Vec<usize> = data
+            .frames
+            .rows_of(frame)
+            .filter(|&r| !data.outlier[r] && residual.iter().all(|a| a[r].is_finite()))
+            .collect();
+        let (mut normal, mut moment) = (Matrix3::zeros(), Vector3::zeros());
+        let mut stretch = [(Vector4::zeros(), 0.0); STRETCHES.len()];
+        for &r in &rows {
+            let w = weight[r] * weight[r];
+            let at = [0, 1].map(|a| data.modelled[a][r] / half[a]);
+            for (axis, turn) in rotation_row(data, r).into_iter().enumerate() {
+                let turn = Vector3::from(turn);
+                normal += turn * turn.transpose() * w;
+                moment += turn * (w * residual[axis][r]);
+                for (sum, by) in stretch.iter_mut().zip(STRETCHES) {
+                    let g = by[axis][0] * at[0] + by[axis][1] * at[1];
+                    sum.0 += Vector4::new(turn[0], turn[1], turn[2], g) * (w * g);
+                    sum.1 += w * g * residual[axis][r];
+                }
+            }
+        }
+        let Some(inverse) = normal.try_inverse().filter(|_| rows.len() >= 2) else {
+            continue;
+        };
+        let rotation = inverse * moment;
+        if !data.free_attitude {
+            for axis in 0..3 {
+                tracks[axis].value[frame] = rotation[axis];
+                tracks[axis].weight[frame] = 1.0 / inverse[(axis, axis)];
+            }
+        }
+        // each beside the rotation
+        for (track, (cross, score)) in tracks[3..].iter_mut().zip(&stretch) {
+            let turned = cross.fixed_rows::<3>(0).into_owned();
+            let information = cross[3] - turned.dot(&(inverse * turned));
+            if rows.len() >= 3 && information > LEAST_INFORMATION * cross[3] {
+                track.value[frame] = (score - turned.dot(&rotation)) / information;
+                track.weight[frame] = information;
+            }
+        }
+    }
+    tracks.retain(|t| t.weight.iter().any(|w| *w > 0.0));
+    tracks
+}
+
+/// Attitude residuals (arcsec) of three axes.
+pub(crate) fn attitude_tracks(
+    t_s: &[f64],
+    axes: &[Vec<f64>],
+    outlier: &[Vec<bool>; 3],
+    changes: Option<SpatialErrors>,
+) -> Vec<Track> {
+    axes.iter()
+        .zip(outlier)
+        .enumerate()
+        .map(|(axis, (value, outlier))| Track {
+            changes: changes.map(|c| (c, axis)),
+            t_s: t_s.to_vec(),
+            value: value.clone(),
+            weight: outlier.iter().map(|o| f64::from(u8::from(!o))).collect(),
+        })
+        .collect()
+}
+
+impl Track {
+    fn span(&self) -> f64 {
+        self.t_s
+            .last()
+            .zip(self.t_s.first())
+            .map_or(0.0, |(l, f)| l - f)
+    }
+
+    /// Points that count, about their mean, without spikes, averaged where they are too many.
+    fn thinned(&self) -> Self {
+        let folds = Folds::whole(self.t_s.len());
+        let size = self.t_s.len().div_ceil(MOST_POINTS).max(1);
+        let mut spike: Vec<bool> = self.weight.iter().map(|w| *w <= 0.0).collect();
+        robust::mark_outliers(&self.value, &vec![0; spike.len()], 1, &mut spike);
+        let mut rows: Vec<std::ops::Range<usize>> = Vec::new();
+        if size == 1 {
+            rows.extend((0..self.t_s.len()).map(|k| k..k + 1));
+        } else {
+            rows = Bins::cut(&self.t_s, &folds, bins::MOST).rows;
+        }
+        let mut out = Self {
+            t_s: Vec::new(),
+            value: Vec::new(),
+            weight: Vec::new(),
+            changes: self.changes,
+        };
+        for rows in rows {
+            let (mut t, mut v, mut w) = (0.0, 0.0, 0.0);
+            for k in rows.filter(|&k| !spike[k]) {
+                t += self.weight[k] * self.t_s[k];
+                v += self.weight[k] * self.value[k];
+                w += self.weight[k];
+            }
+            if w > 0.0 {
+                out.t_s.push(t / w);
+                out.value.push(v / w);
+                out.weight.push(w);
+            }
+        }
+        // a weight of the usual point: sigmas stay those of a point
+        let usual = out.weight.iter().sum::<f64>() / out.weight.len().max(1) as f64;
+        for w in &mut out.weight {
+            *w /= usual;
+        }
+        out.centre();
+        out
+    }
+
+    fn centre(&mut self) {
+        let total: f64 = self.weight.iter().sum();
+        let mean = self
+            .value
+            .iter()
+            .zip(&self.weight)
+            .map(|(v, w)| v * w)
+            .sum::<f64>()
+            / total;
+        for v in &mut self.value {
+            *v -= mean;
+        }
+    }
+
+    fn noise(&self) -> Coloured {
+        Coloured::fit(&self.t_s, &self.value, &self.weight)
+    }
+
+    fn whitened(&self, noise: &Coloured, series: &[f64]) -> Vec<f64> {
+        let mut out = series.to_vec();
+        noise.whiten(&self.t_s, &self.weight, &mut [&mut out]);
+        out
+    }
+
+    /// Least squares of `columns` under `noise`: amplitudes, and what they leave.
+    fn take_out(&self, noise: &Coloured, columns: &[Vec<f64>]) -> Option<(Vec<f64>, Self)> {
+        let n = self.t_s.len();
+        let white: Vec<Vec<f64>> = columns.iter().map(|c| self.whitened(noise, c)).collect();
+        let y = self.whitened(noise, &self.value);
+        let design = DMatrix::from_fn(n, white.len(), |i, j| white[j][i]);
+        let normal = design.transpose() * &design;
+        let beta = normal
+            .cholesky()?
+            .solve(&(design.transpose() * DVector::from_vec(y)));
+        let mut left = self.clone();
+        for (column, b) in columns.iter().zip(beta.iter()) {
+            for (v, c) in left.value.iter_mut().zip(column) {
+                *v -= b * c;
+            }
+        }
+        Some((beta.iter().copied().collect(), left))
+    }
+
+    /// Frequencies of lines that the declared model does not make; all are taken out of the series.
+    fn lines(&mut self, alpha: f64, plan: Option<&LombScargle>) -> Vec<f64> {
+        let mut found: Vec<f64> = Vec::new();
+        let whole = self.clone();
+        while found.len() < MOST {
+            let Some(f) = plan.and_then(|plan| self.strongest_line(alpha, plan)) else {
+                break;
+            };
+            found.push(f);
+            let noise = self.noise();
+            let Some((_, left)) = whole.take_out(&noise, &whole.sinusoids(&found)) else {
+                found.pop();
+                break;
+            };
+            *self = left;
+        }
+        // once more each, without what the others left in it
+        for k in 0..found.len() {
+            let others: Vec<f64> = (0..found.len())
+                .filter(|&j| j != k)
+                .map(|j| found[j])
+                .collect();
+            let noise = self.noise();
+            if let Some((_, left)) = whole.take_out(&noise, &whole.sinusoids(&others)) {
+                let step = 1.0 / (FINER as f64 * self.span());
+                found[k] = left.top(&left.whitened(&noise, &left.value), found[k], step);
+            }
+        }
+        if let Some((size, left)) = whole.take_out(&self.noise(), &whole.sinusoids(&found)) {
+            *self = left;
+            let declared = self.changes.map_or(0.0, |(c, axis)| c.slow_arcsec[axis]);
+            let rms = |k: usize| size[1 + 2 * k].hypot(size[2 + 2 * k]) / std::f64::consts::SQRT_2;
+            let each = found.into_iter().enumerate();
+            found = each
+                .filter(|(k, _)| rms(*k) > declared)
+                .map(|(_, f)| f)
+                .collect();
+        }
+        found
+    }
+
+    fn sinusoids(&self, frequencies: &[f64]) -> Vec<Vec<f64>> {
+        let mut columns = vec![vec![1.0; self.t_s.len()]];
+        for f in frequencies {
+            let phase = |t: &f64| std::f64::consts::TAU * f * (t - self.t_s[0]);
+            columns.push(self.t_s.iter().map(|t| phase(t).cos()).collect());
+            columns.push(self.t_s.iter().map(|t| phase(t).sin()).collect());
+        }
+        columns
+    }
+
+    /// Frequencies at which lines are looked for; `None` where the span is too short for any.
+    fn plan(&self) -> Option<LombScargle> {
+        let span = self.span();
+        let highest = 0.5 / median_step(&self.t_s)?;
+        let step = 1.0 / (FINER as f64 * span);
+        let first = MIN_CYCLES / span;
+        let bins = ((highest - first) / step).floor();
+        if bins.is_nan() || bins < (4 * FINER * AROUND) as f64 {
+            return None;
+        }
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a positive number of grid points, limited by the number of samples"
+        )]
+        let bins = bins as usize;
+        let settings = LombScargleSettings {
+            first_hz: first,
+            step_hz: step,
+            bins,
+            floating_mean: true,
+            fs_hz: 1.0,
+        };
+        LombScargle::new(&self.t_s, settings).ok()
+    }
+
+    /// The frequency of the most certain line, if it is beyond doubt.
+    fn strongest_line(&self, alpha: f64, plan: &LombScargle) -> Option<f64> {
+        let (span, bins) = (self.span(), plan.bins());
+        let step = 1.0 / (FINER as f64 * span);
+        let first = MIN_CYCLES / span;
+        let white = self.whitened(&self.noise(), &self.value);
+        let power = plan.process(&white).ok()?.psd;
+        let near = |k: usize| -> (f64, f64) {
+            let (mut sum, mut count) = (0.0, 0.0);
+            for j in GUARD + 1..=GUARD + AROUND {
+                let off = j * FINER;
+                for at in [k.checked_sub(off), Some(k + off)].into_iter().flatten() {
+                    if let Some(p) = power.get(at) {
+                        sum += p;
+                        count += 1.0;
+                    }
+                }
+            }
+            (sum / count, count)
+        };
+        let log_p = |k: usize| {
+            let (mean, n) = near(k);
+            -n * (power[k] / mean / n).ln_1p()
+        };
+        let best = (0..bins).min_by(|&a, &b| log_p(a).total_cmp(&log_p(b)))?;
+        let p = log_p(best) + (bins as f64).ln();
+        (p < alpha.ln()).then(|| self.top(&white, first + best as f64 * step, step))
+    }
+
+    /// The top of the power near `f`, to a thousandth of a grid point.
+    fn top(&self, white: &[f64], f: f64, step: f64) -> f64 {
+        let power = |f: f64| {
+            let settings = LombScargleSettings {
+                first_hz: f,
+                step_hz: 1.0,
+                bins: 1,
+                floating_mean: true,
+                fs_hz: 1.0,
+            };
+            LombScargle::new(&self.t_s, settings)
+                .and_then(|plan| plan.process(white))
+                .map_or(0.0, |psd| psd.psd[0])
+        };
+        let (mut centre, mut width) = (f, step);
+        for _ in 0..12 {
+            let best = [-1.0, -0.5, 0.0, 0.5, 1.0]
+                .map(|s| centre + s * width)
+                .into_iter()
+                .filter(|f| *f > 0.0)
+                .max_by(|a, b| power(*a).total_cmp(&power(*b)));
+            centre = best.unwrap_or(centre);
+            width *= 0.5;
+        }
+        centre
+    }
+
+    /// Instants of jumps: the middle between the points on either side.
+    fn jumps(&mut self, alpha: f64) -> Vec<f64> {
+        let mut found = Vec::new();
+        while found.len() < MOST {
+            let noise = self.noise();
+            let before = self.loglik(&noise);
+            let tried = self.t_s.len() - 2 * MIN_SIDE;
+            let white = Coloured {
+                slow: 0.0,
+                white: noise.white.hypot(noise.slow),
+                tau_s: 1.0,
+            };
+            let best = [noise, white]
+                .iter()
+                .filter_map(|n| self.best_step(n))
+                .filter_map(|at| {
+                    let step: Vec<f64> = (0..self.t_s.len())
+                        .map(|k| f64::from(u8::from(k >= at)))
+                        .collect();
+                    let columns = [vec![1.0; step.len()], step];
+                    let mut its_noise = noise;
+                    let (mut size, mut left) = self.take_out(&white, &columns)?;
+                    for _ in 0..2 {
+                        its_noise = left.noise();
+                        (size, left) = self.take_out(&its_noise, &columns)?;
+                    }
+                    let after = left.loglik(&its_noise);
+                    Some((after, at, size[1], left))
+                })
+                .max_by(|a, b| a.0.total_cmp(&b.0));
+            let Some((after, at, size, left)) = best else {
+                break;
+            };
+            let ratio = 2.0 * (after - before) / WIDENING;
+            let p = ChiSquared::new(1.0).map_or(1.0, |law| law.sf(ratio.max(0.0)));
+            let change = |(c, axis): (SpatialErrors, usize)| c.chance_on(axis, size);
+            if p * tried as f64 >= alpha || self.changes.map_or(0.0, change) >= alpha {
+                break;
+            }
+            found.push(0.5 * (self.t_s[at - 1] + self.t_s[at]));
+            *self = left;
+        }
+        found
+    }
+
+    fn loglik(&self, noise: &Coloured) -> f64 {
+        noise.log_likelihood(&self.t_s, &self.value, &self.weight)
+    }
+
+    /// Where a step beside a constant explains most under `noise`.
+    fn best_step(&self, noise: &Coloured) -> Option<usize> {
+        let n = self.t_s.len();
+        let y = self.whitened(noise, &self.value);
+        let one = self.whitened(noise, &vec![1.0; n]);
+        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        let (oo, oy) = (dot(&one, &one), dot(&one, &y));
+        let score = |at: &[usize]| -> Option<(usize, f64)> {
+            let scores = noise.steps(&self.t_s, &self.weight, at, [&one, &y]);
+            let scores = scores.into_iter().zip(at).map(|([ss, so, sy], &at)| {
+                let ss = ss - so * so / oo;
+                let score = sy - so * oy / oo;
+                (at, if ss > 0.0 { score * score / ss } else { 0.0 })
+            });
+            scores.max_by(|a, b| a.1.total_cmp(&b.1))
+        };
+        // coarse first: a step is seen from near by
+        let stride = n.div_ceil(MOST_STEPS);
+        let all: Vec<usize> = (MIN_SIDE..=n - MIN_SIDE).step_by(stride).collect();
+        let coarse = score(&all)?.0;
+        let first = coarse.saturating_sub(2 * stride).max(MIN_SIDE);
+        let fine: Vec<usize> = (first..=(coarse + 2 * stride).min(n - MIN_SIDE)).collect();
+        score(&fine).map(|(at, _)| at)
+    }
+}

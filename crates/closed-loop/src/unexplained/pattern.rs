@@ -1,0 +1,653 @@
+//! A periodic pattern on the detector, which no effect of the catalogue has.
+//!
+//! What is left of both axes is searched for one wave vector k (cycles/px),
+//!
+//! ```text
+//! r_a(x, y) = c_a cos 2 pi (kx x + ky y) + s_a sin 2 pi (kx x + ky y)      a = x, y
+//! ```
+//!
+//! by a Fourier transform of the residuals on half pixels (x residual real, y residual
+//! imaginary, so that |X|^2 + |Y|^2 = (|F(k)|^2 + |F(-k)|^2) / 2), on a grid twice finer
+//! than 1/extent. The strongest peaks are held against the exact sums at the modelled
+//! positions, and the best is refined there. The half pixels cost a part 1 - sinc^2(kx/2)
+//! sinc^2(ky/2) of the power in the first step alone.
+//!
+//! Rows count by the noise of their star ([`crate::star::weights`]): of fourteen stars alike
+//! in nothing but the wave, equal weights lose a third of its power.
+//!
+//! Every residual is less the mean of its star, so that only what changes along a star's
+//! path counts: a constant of each star is the distortion's and the catalogue's. Whole
+//! cycles per pixel along one axis are pixel phase and are taken out before; waves of the
+//! distortion's length are not looked for. The four scores u (cos and sin, both axes) have
+//!
+//! ```text
+//! T^2 = u' V^-1 u,    V = sum over clusters u_c u_c',    P = 8 (2 Lx Ly) F(T^2 (G-4) / (4 (G-1)); 4, G-4)
+//! ```
+//!
+//! with 2 Lx Ly independent wave vectors in the half plane within one cycle per pixel, 8
+//! for the top between them, and G clusters: frames in one covariance, cells of star and
+//! block of time in another. A third P is that of the power over the mean power around k,
+//! once the wave is taken out. The largest of the three counts.
+//!
+//! Source: Scargle 1982 (periodogram); Hotelling 1931; Liang and Zeger 1986 (clusters).
+
+use std::f64::consts::PI;
+use std::ops::Range;
+
+use block_regression::Folds;
+use nalgebra::{Cholesky, Matrix2, Matrix4, Vector2, Vector4};
+use rayon::prelude::*;
+use statrs::distribution::{ContinuousCDF, FisherSnedecor};
+use telemetry::report::{Dependence, Unattributed};
+
+use crate::search::selection::FAMILY_ALPHA;
+use crate::star::data::StarData;
+
+mod pixel_phase;
+#[cfg(test)]
+mod tests;
+mod transform;
+mod turn;
+
+pub(crate) use turn::{Rotation, less_rotation};
+
+/// Peaks of the transform that are refined.
+const REFINED: usize = 6;
+/// Chances of a top for each independent wave vector.
+const CHANCES: f64 = 8.0;
+/// Waves fewer than this times the distortion's order across the detector are its own.
+const ORDERS: f64 = 1.0;
+/// The order where none is declared.
+const USUAL_ORDER: u32 = 7;
+/// Cycles over the extent within which a wave is one of pixel phase.
+const PHASE_GUARD: f64 = 3.0;
+/// Share of a wave's power that rotations of whole frames must leave: they take a half of a wave at
+/// most, but all of what a slow error of the reference leaves along the stars' paths.
+const LEAST_OWN: f64 = 0.4;
+/// Share of a wave's power that must change along the stars' paths.
+const LEAST_MOTION: f64 = 0.1;
+/// Fewest clusters of a covariance.
+const LEAST_CLUSTERS: usize = 40;
+/// Wave vectors that the mean power around the peak is of.
+const AROUND: usize = 64;
+/// From this many stars a frame on, what the reference turns a frame by is left out.
+const STARS_TO_TURN: usize = 5;
+/// Least extent, px: less holds no waves to speak of.
+const LEAST_EXTENT_PX: f64 = 16.0;
+
+/// Residuals on the detector, the rows of each star together.
+#[derive(Clone, Debug, Default)]
+struct Field {
+    x_px: Vec<f64>,
+    y_px: Vec<f64>,
+    /// Weighted residual of each axis, arcsec, less the mean of its star.
+    residual: [Vec<f64>; 2],
+    frame: Vec<u32>,
+    /// Rows of each star, and the weight of each of them: it is in columns and residuals.
+    stars: Vec<Range<usize>>,
+    weight: Vec<f64>,
+    /// Whether the stars have spots of their own.
+    own_spots: bool,
+}
+
+/// What was found.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Pattern {
+    /// Cycles per pixel.
+    pub(crate) wave: [f64; 2],
+    pub(crate) p_value: f64,
+    /// Squares that the wave takes, in units of each axis' variance.
+    power: f64,
+    /// Out-of-fold share of the residual's variance.
+    pub(crate) explained: f64,
+    /// Extent that the rows cover, px.
+    extent: [f64; 2],
+}
+
+impl Pattern {
+    /// The name of the variable that the residual follows.
+    pub(crate) fn variable(&self) -> &'static str {
+        let cycles = |axis: usize, k: f64| ((self.wave[axis].abs() - k) * self.extent[axis]).abs();
+        if cycles(0, 0.0) < 1.0 {
+            "y_px"
+        } else if cycles(1, 0.0) < 1.0 {
+            "x_px"
+        } else if cycles(0, 1.0) < 1.0 && cycles(1, 1.0) < 1.0 {
+            "pixel_phase_x*pixel_phase_y"
+        } else {
+            "x_px*y_px"
+        }
+    }
+
+    /// Writes it where it is reported: something is left then. `left` is the share of the
+    /// before variance that is left.
+    pub(crate) fn tell(&self, unattributed: &mut Unattributed, left: f64) {
+        let variable = self.variable();
+        let list = &mut unattributed.depends_on;
+        let better =
+            |d: &Dependence| d.variance_explained >= self.explained && d.p_value < FAMILY_ALPHA;
+        unattributed.present = true;
+        let share = unattributed.variance_fraction.unwrap_or(0.0);
+        unattributed.variance_fraction = Some(share.max(self.explained * left));
+        if list.iter().any(|d| d.variable == variable && better(d)) {
+            return;
+        }
+        list.retain(|d| d.variable != variable);
+        list.push(Dependence {
+            variable: variable.to_owned(),
+            variance_explained: self.explained,
+            p_value: self.p_value,
+        });
+        list.sort_by(|a, b| b.variance_explained.total_cmp(&a.variance_explained));
+    }
+}
+
+/// The pattern that `residual` (arcsec, per axis over all rows) follows, if one is beyond
+/// doubt. `own` is it less what is known of its frames' rotations. A star counts by the `weight` of its rows; `order` is the declared distortion's; with `own_spots`
+/// the stars' centroids were learned from windows.
+pub(crate) fn search(
+    data: &StarData,
+    residual: &[Vec<f64>],
+    own: [&[f64]; 2],
+    weight: &[f64],
+    folds: &Folds,
+    order: Option<u32>,
+    own_spots: bool,
+) -> Option<Pattern> {
+    let [rx, ry] = residual else { return None };
+    let frame = data.frames.frame_of_rows();
+    let counts = |r: usize| {
+        !data.outlier[r]
+            && [rx, ry, &data.modelled[0], &data.modelled[1]]
+                .iter()
+                .all(|v| v[r].is_finite())
+    };
+    let mut of_star: Vec<Vec<usize>> = vec![Vec::new(); data.stars.len()];
+    for row in (0..frame.len()).filter(|&r| counts(r)) {
+        of_star[data.star[row]].push(row);
+    }
+    let at = [data.modelled[0].as_slice(), &data.modelled[1]];
+    let field = |residual: [&[f64]; 2]| Field {
+        own_spots,
+        ..Field::new(at, residual, &frame, &of_star, weight)
+    };
+    let as_left = || field([rx, ry]);
+    let turning = data.t_s.len() >= STARS_TO_TURN * data.frames.frames();
+    if !turning {
+        return as_left().pattern(&as_left, folds, order);
+    }
+    let found = field(own).pattern(&as_left, folds, order)?;
+    let [x, y] = less_rotation(data, [rx, ry], weight, Rotation::Whole);
+    let power = field([&x, &y]).power_at(found.wave)?;
+    (power > LEAST_OWN * found.power).then_some(found)
+}
+
+/// Sums of the columns cos and sin, less the mean of each star, with each other and with
+/// both axes.
+#[derive(Clone, Copy, Debug, Default)]
+struct Sums {
+    normal: Matrix2<f64>,
+    score: [Vector2<f64>; 2],
+}
+
+/// Sums over the rows of a star before the means are taken out.
+const RAW: usize = 11;
+/// Rows that are summed in one go.
+const PIECE: usize = 16_384;
+
+fn pieces(rows: &Range<usize>) -> impl Iterator<Item = Range<usize>> + use<> {
+    let end = rows.end;
+    let starts = rows.clone().step_by(PIECE);
+    starts.map(move |at| at..(at + PIECE).min(end))
+}
+
+fn pieces_of(rows: usize) -> usize {
+    rows.div_ceil(PIECE)
+}
+
+/// Cosine and sine of a number of cycles, to 1e-11: of half the angle, which lies within a right angle,
+/// by their series, and doubled.
+fn wave(cycles: f64) -> [f64; 2] {
+    // adding and taking off 1.5 2^52 rounds to a whole number
+    const WHOLE: f64 = 6_755_399_441_055_744.0;
+    let h = PI * (cycles - ((cycles + WHOLE) - WHOLE));
+    let z = h * h;
+    let series = |coefficients: [f64; 9]| coefficients.into_iter().fold(0.0, |sum, c| sum * z + c);
+    let sin = h * series(SIN);
+    let cos = series(COS);
+    [1.0 - 2.0 * sin * sin, 2.0 * sin * cos]
+}
+
+/// `(-1)^k / (2k + 1)!` and `(-1)^k / (2k)!`, last first.
+const SIN: [f64; 9] = factorials(1);
+const COS: [f64; 9] = factorials(0);
+
+const fn factorials(first: u32) -> [f64; 9] {
+    let mut out = [1.0; 9];
+    let (mut k, mut value) = (1, 1.0);
+    while k < 9 {
+        let n = (2 * k + first) as f64;
+        value *= -1.0 / (n * (n - 1.0));
+        out[8 - k as usize] = value;
+        k += 1;
+    }
+    out
+}
+
+impl Sums {
+    /// Of the sums over a star's rows, which are `rows` many, each of this `weight`.
+    fn centred(raw: &[f64; RAW], rows: usize, weight: f64) -> Self {
+        let n = rows as f64;
+        let [c, s, cc, cs, ss, cx, sx, cy, sy, x, y] = *raw;
+        let cs = cs - c * s / n;
+        let normal = Matrix2::new(cc - c * c / n, cs, cs, ss - s * s / n);
+        Self {
+            normal: normal * (weight * weight),
+            // the residuals have theirs
+            score: [
+                Vector2::new(cx - c * x / n, sx - s * x / n) * weight,
+                Vector2::new(cy - c * y / n, sy - s * y / n) * weight,
+            ],
+        }
+    }
+
+    fn add(mut self, other: &Self) -> Self {
+        self.normal += other.normal;
+        self.score[0] += other.score[0];
+        self.score[1] += other.score[1];
+        self
+    }
+
+    /// Amplitudes of cos and sin for each axis.
+    fn amplitudes(&self) -> Option<[Vector2<f64>; 2]> {
+        let inverse = self.normal.try_inverse()?;
+        Some(self.score.map(|s| inverse * s))
+    }
+
+    /// The squares that the wave takes away, in units of each axis' variance.
+    fn power(&self, variance: [f64; 2]) -> f64 {
+        self.amplitudes().map_or(0.0, |beta| {
+            (0..2)
+                .map(|a| beta[a].dot(&self.score[a]) / variance[a])
+                .sum()
+        })
+    }
+}
+
+impl Field {
+    fn new(
+        at: [&[f64]; 2],
+        residual: [&[f64]; 2],
+        frame: &[u32],
+        of_star: &[Vec<usize>],
+        weight: &[f64],
+    ) -> Self {
+        let mut field = Self::default();
+        for rows in of_star.iter().filter(|rows| rows.len() > 1) {
+            let first = field.frame.len();
+            let w = weight[rows[0]];
+            for axis in 0..2 {
+                let mean = rows.iter().map(|&r| residual[axis][r]).sum::<f64>() / rows.len() as f64;
+                let centred = rows.iter().map(|&r| w * (residual[axis][r] - mean));
+                field.residual[axis].extend(centred);
+            }
+            field.weight.push(w);
+            field.x_px.extend(rows.iter().map(|&r| at[0][r]));
+            field.y_px.extend(rows.iter().map(|&r| at[1][r]));
+            field.frame.extend(rows.iter().map(|&r| frame[r]));
+            field.stars.push(first..field.frame.len());
+        }
+        field
+    }
+
+    fn rows(&self) -> usize {
+        self.frame.len()
+    }
+
+    fn extent(&self) -> [f64; 2] {
+        [&self.x_px, &self.y_px].map(|v| {
+            let low = v.iter().copied().fold(f64::INFINITY, f64::min);
+            v.iter().copied().fold(f64::NEG_INFINITY, f64::max) - low
+        })
+    }
+
+    fn variance(&self) -> [f64; 2] {
+        self.residual
+            .each_ref()
+            .map(|r| r.iter().map(|v| v * v).sum::<f64>() / r.len() as f64)
+    }
+
+    /// The power at a wave vector, without a search.
+    fn power_at(mut self, k: [f64; 2]) -> Option<f64> {
+        self.take_out_pixel_phase()?;
+        Some(self.sums(k).power(self.variance()))
+    }
+
+    /// The whole search; amplitudes and the share they explain are those of the field `as_left`.
+    fn pattern(
+        mut self,
+        as_left: &dyn Fn() -> Self,
+        folds: &Folds,
+        order: Option<u32>,
+    ) -> Option<Pattern> {
+        let extent = self.extent();
+        if self.frame.is_empty() || extent.iter().any(|l| *l < LEAST_EXTENT_PX) {
+            return None;
+        }
+        self.take_out_pixel_phase()?;
+        let variance = self.variance();
+        if variance.iter().any(|v| v.is_nan() || *v <= 0.0) {
+            return None;
+        }
+        let own = Own {
+            extent,
+            cycles: ORDERS * f64::from(order.unwrap_or(USUAL_ORDER).max(3)),
+        };
+        let power = |k: [f64; 2]| {
+            let sums = self.sums(k);
+            let moves = sums.normal.trace() / self.rows() as f64;
+            if own.excludes(k) || moves < LEAST_MOTION {
+                0.0
+            } else {
+                sums.power(variance)
+            }
+        };
+        let mut peaks: Vec<(f64, [f64; 2])> = self
+            .peaks(variance, &own)
+            .into_iter()
+            .chain([[1.0, 1.0], [1.0, -1.0]])
+            .map(|k| (power(k), k))
+            .collect();
+        peaks.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let trials = (CHANCES * 2.0 * extent[0] * extent[1]).max(1.0);
+        // chi-square of so little falls short by far, refined or not
+        if 0.5 * peaks.first()?.0 < 0.5 * trials.ln() {
+            return None;
+        }
+        let step = extent.map(|l| 0.25 / l);
+        let best = peaks
+            .into_iter()
+            .take(REFINED)
+            .map(|peak| climb(&power, peak, step, 2))
+            .max_by(|a, b| a.0.total_cmp(&b.0))?;
+        let best = climb(&power, best, step.map(|s| 0.25 * s), 7);
+        let wave = best.1;
+        if own.excludes(wave) {
+            return None;
+        }
+        let chance = self.chance(wave, folds)?;
+        if chance * trials >= FAMILY_ALPHA {
+            return None;
+        }
+        let p_value = trials * chance.max(self.chance_around(wave, variance, extent)?);
+        let explained = as_left().share_out_of_fold(wave, folds)?;
+        (p_value < FAMILY_ALPHA && explained > 0.0).then_some(Pattern {
+            wave,
+            power: best.0,
+            p_value,
+            explained,
+            extent,
+        })
+    }
+
+    /// Weighted columns cos and sin of the rows of one star, less their means.
+    fn columns(&self, star: usize, k: [f64; 2], out: &mut Vec<[f64; 2]>) {
+        let (rows, w) = (&self.stars[star], self.weight[star]);
+        out.clear();
+        let (mut c, mut s) = (0.0, 0.0);
+        for row in rows.clone() {
+            let [cos, sin] = wave(k[0] * self.x_px[row] + k[1] * self.y_px[row]);
+            c += cos;
+            s += sin;
+            out.push([cos, sin]);
+        }
+        let n = rows.len() as f64;
+        for v in out {
+            *v = [w * (v[0] - c / n), w * (v[1] - s / n)];
+        }
+    }
+
+    fn sums(&self, k: [f64; 2]) -> Sums {
+        let pieces: Vec<Range<usize>> = self.stars.iter().flat_map(pieces).collect();
+        let raw: Vec<[f64; RAW]> = pieces.par_iter().map(|p| self.raw_sums(p, k)).collect();
+        let mut raw = raw.iter();
+        let stars = self.stars.iter().zip(&self.weight);
+        stars.fold(Sums::default(), |all, (rows, weight)| {
+            let mut sum = [0.0; RAW];
+            for piece in raw.by_ref().take(pieces_of(rows.len())) {
+                sum.iter_mut().zip(piece).for_each(|(s, p)| *s += p);
+            }
+            all.add(&Sums::centred(&sum, rows.len(), *weight))
+        })
+    }
+
+    /// Sums of cos and sin, of their products, and of both with the residuals.
+    fn raw_sums(&self, rows: &Range<usize>, k: [f64; 2]) -> [f64; RAW] {
+        // side by side
+        const LANES: usize = 4;
+        let of = |x: f64, y: f64, [rx, ry]: [f64; 2]| {
+            let [c, s] = wave(k[0] * x + k[1] * y);
+            [
+                c,
+                s,
+                c * c,
+                c * s,
+                s * s,
+                c * rx,
+                s * rx,
+                c * ry,
+                s * ry,
+                rx,
+                ry,
+            ]
+        };
+        let mut sums = [[0.0; LANES]; RAW];
+        let (x, y) = (&self.x_px[rows.clone()], &self.y_px[rows.clone()]);
+        let [rx, ry] = self.residual.each_ref().map(|r| &r[rows.clone()]);
+        let whole = rows.len() - rows.len() % LANES;
+        for at in (0..whole).step_by(LANES) {
+            let part = at..at + LANES;
+            let (x, y) = (&x[part.clone()], &y[part.clone()]);
+            let (rx, ry) = (&rx[part.clone()], &ry[part]);
+            for l in 0..LANES {
+                let values = of(x[l], y[l], [rx[l], ry[l]]);
+                for n in 0..RAW {
+                    sums[n][l] += values[n];
+                }
+            }
+        }
+        for i in whole..rows.len() {
+            let values = of(x[i], y[i], [rx[i], ry[i]]);
+            for n in 0..RAW {
+                sums[n][0] += values[n];
+            }
+        }
+        sums.map(|lanes| lanes.iter().sum())
+    }
+
+    fn sums_of(&self, first: usize, columns: &[[f64; 2]], counts: impl Fn(usize) -> bool) -> Sums {
+        let (mut cc, mut cs, mut ss) = (0.0, 0.0, 0.0);
+        let mut score = [[0.0; 2]; 2];
+        for (j, &[c, s]) in columns.iter().enumerate() {
+            let row = first + j;
+            if counts(row) {
+                cc += c * c;
+                cs += c * s;
+                ss += s * s;
+                for (score, residual) in score.iter_mut().zip(&self.residual) {
+                    score[0] += c * residual[row];
+                    score[1] += s * residual[row];
+                }
+            }
+        }
+        Sums {
+            normal: Matrix2::new(cc, cs, cs, ss),
+            score: score.map(Vector2::from),
+        }
+    }
+
+    /// The chance of the scores at `k` under both covariances, without a search.
+    fn chance(&self, k: [f64; 2], folds: &Folds) -> Option<f64> {
+        let mut frames: Vec<Vector4<f64>> = Vec::new();
+        let mut cells: Vec<Vector4<f64>> = Vec::new();
+        let block = block_of_frame(folds);
+        frames.resize(block.len(), Vector4::zeros());
+        let mut columns = Vec::new();
+        for (star, rows) in self.stars.iter().enumerate() {
+            self.columns(star, k, &mut columns);
+            let mut last = usize::MAX;
+            for (j, &[c, s]) in columns.iter().enumerate() {
+                let row = rows.start + j;
+                let [x, y] = [self.residual[0][row], self.residual[1][row]];
+                let u = Vector4::new(c * x, s * x, c * y, s * y);
+                let frame = self.frame[row] as usize;
+                frames[frame] += u;
+                let cell = block[frame];
+                if cell != last {
+                    last = cell;
+                    cells.push(Vector4::zeros());
+                }
+                if let Some(cell) = cells.last_mut() {
+                    *cell += u;
+                }
+            }
+        }
+        frames.retain(|u| u.norm_squared() > 0.0);
+        Some(hotelling(&frames)?.max(hotelling(&cells)?))
+    }
+
+    /// The chance of the power at `k` where that around it is usual.
+    fn chance_around(&self, k: [f64; 2], variance: [f64; 2], extent: [f64; 2]) -> Option<f64> {
+        let sums = self.sums(k);
+        let beta = sums.amplitudes()?;
+        let mut left = self.clone();
+        let mut columns = Vec::new();
+        for (star, rows) in self.stars.iter().enumerate() {
+            self.columns(star, k, &mut columns);
+            for (j, &[c, s]) in columns.iter().enumerate() {
+                for (residual, b) in left.residual.iter_mut().zip(&beta) {
+                    residual[rows.start + j] -= b[0] * c + b[1] * s;
+                }
+            }
+        }
+        // a sunflower of wave vectors 3 to 16 cycles over the extent away
+        let golden = PI * (3.0 - 5.0_f64.sqrt());
+        let around: f64 = (0..AROUND)
+            .map(|j| {
+                let r = 3.0 + 13.0 * ((j as f64 + 0.5) / AROUND as f64).sqrt();
+                let (s, c) = (golden * j as f64).sin_cos();
+                let near = [k[0] + r * c / extent[0], k[1] + r * s / extent[1]];
+                left.sums(near).power(variance)
+            })
+            .sum::<f64>()
+            / AROUND as f64;
+        let law = FisherSnedecor::new(4.0, 4.0 * AROUND as f64).ok()?;
+        Some(law.sf(sums.power(variance) / around))
+    }
+
+    /// Share of the variance that the wave explains in each fold with the amplitudes of the others.
+    fn share_out_of_fold(&self, k: [f64; 2], folds: &Folds) -> Option<f64> {
+        let fold = folds.fold_of_frame();
+        let mut each = vec![Sums::default(); folds.count];
+        let mut columns = Vec::new();
+        for (star, rows) in self.stars.iter().enumerate() {
+            self.columns(star, k, &mut columns);
+            for (f, sums) in each.iter_mut().enumerate() {
+                let part = self.sums_of(rows.start, &columns, |row| {
+                    fold[self.frame[row] as usize] == f
+                });
+                *sums = sums.add(&part);
+            }
+        }
+        let whole = each.iter().fold(Sums::default(), Sums::add);
+        let mut gain = 0.0;
+        for own in &each {
+            let others = Sums {
+                normal: whole.normal - own.normal,
+                score: [0, 1].map(|a| whole.score[a] - own.score[a]),
+            };
+            for (b, score) in others.amplitudes()?.iter().zip(&own.score) {
+                gain += 2.0 * b.dot(score) - (own.normal * b).dot(b);
+            }
+        }
+        let total: f64 = self.residual.iter().flatten().map(|r| r * r).sum();
+        Some(gain / total)
+    }
+}
+
+/// The top of `power` near a wave vector, by steps that are halved where none leads higher.
+fn climb(
+    power: &impl Fn([f64; 2]) -> f64,
+    mut best: (f64, [f64; 2]),
+    mut step: [f64; 2],
+    halvings: usize,
+) -> (f64, [f64; 2]) {
+    let mut halved = 0;
+    for _ in 0..4 * halvings {
+        let (start, centre) = best;
+        for (dx, dy) in [(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)] {
+            let k = [centre[0] + dx * step[0], centre[1] + dy * step[1]];
+            let at = power(k);
+            if at > best.0 {
+                best = (at, k);
+            }
+        }
+        if best.0 <= start {
+            step = step.map(|s| 0.5 * s);
+            halved += 1;
+        }
+        if halved == halvings {
+            break;
+        }
+    }
+    best
+}
+
+/// Wave vectors that others own.
+#[derive(Clone, Copy, Debug)]
+struct Own {
+    extent: [f64; 2],
+    /// Cycles over the extent that the distortion may have.
+    cycles: f64,
+}
+
+impl Own {
+    fn excludes(&self, k: [f64; 2]) -> bool {
+        let within = |x: f64, y: f64, cycles: f64| {
+            let (x, y) = (
+                (k[0].abs() - x) * self.extent[0],
+                (k[1].abs() - y) * self.extent[1],
+            );
+            x * x + y * y < cycles * cycles
+        };
+        within(0.0, 0.0, self.cycles)
+            || within(1.0, 0.0, PHASE_GUARD)
+            || within(0.0, 1.0, PHASE_GUARD)
+    }
+}
+
+fn block_of_frame(folds: &Folds) -> Vec<usize> {
+    let mut out = Vec::new();
+    for (b, block) in folds.blocks.iter().enumerate() {
+        out.extend(std::iter::repeat_n(b, block.len()));
+    }
+    out
+}
+
+/// The chance of the sum of independent vectors of mean zero.
+fn hotelling(clusters: &[Vector4<f64>]) -> Option<f64> {
+    if clusters.len() < LEAST_CLUSTERS {
+        return None;
+    }
+    let n = clusters.len() as f64;
+    let sum: Vector4<f64> = clusters.iter().sum();
+    let mean = sum / n;
+    let spread: Matrix4<f64> = clusters
+        .iter()
+        .map(|u| (u - mean) * (u - mean).transpose())
+        .sum();
+    let covariance = spread * (n / (n - 1.0));
+    let square = sum.dot(&Cholesky::new(covariance)?.solve(&sum));
+    let law = FisherSnedecor::new(4.0, n - 4.0).ok()?;
+    Some(law.sf(square * (n - 4.0) / (4.0 * (n - 1.0))))
+}

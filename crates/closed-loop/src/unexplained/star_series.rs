@@ -1,0 +1,359 @@
+//! What each star does by itself in time: lines and steps.
+//!
+//! What all stars of a frame share is looked at elsewhere ([`crate::unexplained::leftover`]). Of what is left
+//! of every star beside its frame's rotation, in sigmas of its own noise, per axis a:
+//!
+//! ```text
+//! z_s(f) = sum over a of power of star s at f / mean power around f      4 F(4, 4 n) / 2
+//! Z(f)   = sum over the stars                                           one line in many stars
+//! T(t0)  = sum over stars and axes of (step at t0)^2 / variance          chi2, 2 a star
+//! ```
+//!
+//! Times the frequencies, and stars, or the instants. A step has to stay one: where the stars are
+//! as slow without it as with it, they wander. And it has to be the stars': what a frame turned by
+//! is known but for its noise, and a reference that wanders leaves a step in all stars alike, so
+//! that one has to be beyond chance at its instant without all that the stars of a frame share, too.
+//!
+//! Source: Scargle 1982 (periodogram); Wilks 1938.
+
+use rayon::prelude::*;
+use spectra::robust::median_step;
+use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
+use telemetry::report::Unattributed;
+
+use crate::causes::commonness::{self, MOSTLY, stars_first};
+use crate::star::data::StarData;
+
+/// Chance that either is told although there is none.
+const ALPHA: f64 = 0.001;
+/// The same of a step that was found, at its instant, without what the stars of a frame share.
+const ALPHA_ALONE: f64 = 0.01;
+/// Points of a star's series, and fewest.
+const MOST_POINTS: usize = 1200;
+const MIN_POINTS: usize = 60;
+/// Stars beyond which only the brightest sums of rows are looked at.
+const MOST_STARS: usize = 64;
+/// Fewer cycles in the span are no line; grid points in 1/span.
+const MIN_CYCLES: f64 = 4.0;
+const FINER: usize = 2;
+/// Independent frequencies on each side that the mean power is of, and nearer ones that hold the
+/// line's own.
+const AROUND: usize = 12;
+const GUARD: usize = 2;
+/// Points on each side of a step.
+const MIN_SIDE: usize = 8;
+/// Sums of squares have wider tails than chi-squared.
+const WIDER: f64 = 1.3;
+/// Share of the stars' slow noise that may be left beside a step.
+const LEFT_SLOW: f64 = 0.5;
+/// Of the span, times on which noise is slow.
+const SLOW_SHARE: f64 = 0.2;
+
+/// What was found.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct OwnSeries {
+    pub(crate) line_hz: Option<f64>,
+    pub(crate) jump_s: Option<f64>,
+    p_value: f64,
+    explained: f64,
+}
+
+impl OwnSeries {
+    /// Writes it where it is reported; the stars' own time is what is left unless it is known what
+    /// they follow. `left` is the share of the before variance that is left.
+    pub(crate) fn tell(&self, unattributed: &mut Unattributed, left: f64) {
+        if self.line_hz.is_none() && self.jump_s.is_none() {
+            return;
+        }
+        unattributed.lines_hz.extend(self.line_hz);
+        unattributed.lines_hz.sort_by(f64::total_cmp);
+        unattributed.jumps_s.extend(self.jump_s);
+        unattributed.jumps_s.sort_by(f64::total_cmp);
+        if !unattributed.present {
+            unattributed.depends_on.clear();
+        }
+        unattributed.present = true;
+        let share = unattributed.variance_fraction.unwrap_or(0.0);
+        unattributed.variance_fraction = Some(share.max(self.explained * left));
+        let list = &mut unattributed.depends_on;
+        let known = list.first().map_or(0.0, |d| d.variance_explained);
+        if self.explained >= MOSTLY * known {
+            stars_first(list, self.explained, self.p_value);
+        }
+    }
+}
+
+/// One star's series in units of its noise, both axes.
+struct Own {
+    t_s: Vec<f64>,
+    value: [Vec<f64>; 2],
+    /// Rows that a point is the mean of: its variance is one over it.
+    count: Vec<f64>,
+    /// Sums of the rows, and of both axes over them, before each point.
+    before: Vec<f64>,
+    running: [Vec<f64>; 2],
+}
+
+/// Searches what every star has of its `own`: residuals (arcsec, per axis over all rows) less what
+/// its frames are known to have turned by; `alone`: less all that the stars of a frame share.
+pub(crate) fn search(
+    data: &StarData,
+    own: &[Vec<f64>],
+    alone: &[Vec<f64>],
+    weight: &[f64],
+) -> OwnSeries {
+    if data.frames_are_unrelated() || data.stars.len() > MOST_STARS {
+        return OwnSeries::default();
+    }
+    let by_itself = series(data, alone, weight);
+    let series = series(data, own, weight);
+    let rows: f64 = series.iter().map(|s| s.count.iter().sum::<f64>()).sum();
+    let mut out = OwnSeries {
+        p_value: 1.0,
+        ..OwnSeries::default()
+    };
+    let (Some(&first), Some(&last)) = (data.frames.t_s.first(), data.frames.t_s.last()) else {
+        return out;
+    };
+    if let Some((f, p, squares)) = line(&series, last - first) {
+        out.line_hz = Some(f);
+        out.p_value = p;
+        out.explained = squares / (2.0 * rows);
+    }
+    if let Some((t, p, square)) = step(&series, &data.frames.t_s)
+        && step_at(&by_itself, t).is_some_and(|(p, _)| p < ALPHA_ALONE)
+        && is_no_wander(data, own, t)
+    {
+        out.jump_s = Some(t);
+        out.p_value = out.p_value.min(p);
+        out.explained = out.explained.max(square / (2.0 * rows));
+    }
+    out
+}
+
+fn series(data: &StarData, own: &[Vec<f64>], weight: &[f64]) -> Vec<Own> {
+    let mut rows_of: Vec<Vec<usize>> = vec![Vec::new(); data.stars.len()];
+    for r in 0..data.t_s.len() {
+        if !data.outlier[r] && own.iter().all(|a| a[r].is_finite()) {
+            rows_of[data.star[r]].push(r);
+        }
+    }
+    let size = data.frames.frames().div_ceil(MOST_POINTS).max(1);
+    let each = rows_of.into_par_iter().filter_map(|rows| {
+        if rows.len() < MIN_POINTS * size {
+            return None;
+        }
+        let n = rows.len() as f64;
+        let value = [0, 1].map(|a| {
+            let mean = rows.iter().map(|&r| own[a][r]).sum::<f64>() / n;
+            let mut left: Vec<f64> = rows.iter().map(|&r| own[a][r] - mean).collect();
+            let mut changes: Vec<f64> = left.windows(2).map(|w| (w[1] - w[0]).abs()).collect();
+            // the median of |x| is 0.6745 sigma, and neighbours differ by sqrt 2 of it
+            let noise = spectra::robust::median(&mut changes).unwrap_or(0.0)
+                / (0.6745 * std::f64::consts::SQRT_2);
+            let noise = if noise > 0.0 {
+                noise
+            } else {
+                1.0 / weight[rows[0]]
+            };
+            left.iter_mut().for_each(|v| *v /= noise);
+            left
+        });
+        let (mut t_s, mut count) = (Vec::new(), Vec::new());
+        let mut means = [Vec::new(), Vec::new()];
+        for at in (0..rows.len()).step_by(size) {
+            let part = at..(at + size).min(rows.len());
+            let k = part.len() as f64;
+            t_s.push(rows[part.clone()].iter().map(|&r| data.t_s[r]).sum::<f64>() / k);
+            for (mean, value) in means.iter_mut().zip(&value) {
+                mean.push(value[part.clone()].iter().sum::<f64>() / k);
+            }
+            count.push(k);
+        }
+        let sums = |of: &dyn Fn(usize) -> f64| -> Vec<f64> {
+            let mut all = vec![0.0];
+            for k in 0..count.len() {
+                all.push(all[k] + of(k));
+            }
+            all
+        };
+        Some(Own {
+            before: sums(&|k| count[k]),
+            running: [0, 1].map(|a| sums(&|k| count[k] * means[a][k])),
+            t_s,
+            value: means,
+            count,
+        })
+    });
+    each.collect()
+}
+
+/// The line that is most certain: its frequency, chance, and the squares that it takes.
+fn line(series: &[Own], span: f64) -> Option<(f64, f64, f64)> {
+    let median = |s: &Own| median_step(&s.t_s).unwrap_or(f64::INFINITY);
+    let step = series.iter().map(median).fold(0.0, f64::max);
+    let grid = 1.0 / (FINER as f64 * span);
+    let first = MIN_CYCLES / span;
+    let bins = ((0.5 / step - first) / grid).floor();
+    // no series, or no time between points
+    if !bins.is_finite() || bins < (4 * FINER * (AROUND + GUARD)) as f64 {
+        return None;
+    }
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a positive number of grid points, limited by the number of points"
+    )]
+    let bins = bins as usize;
+    let power: Vec<Vec<f64>> = series
+        .par_iter()
+        .map(|s| s.powers(first, grid, bins))
+        .collect();
+    // power over what is usual around, and how many it is the mean of
+    let relative = |p: &[f64], k: usize| -> (f64, f64) {
+        let (mut sum, mut count) = (0.0, 0.0);
+        for j in GUARD + 1..=GUARD + AROUND {
+            for at in [k.checked_sub(j * FINER), Some(k + j * FINER)] {
+                if let Some(v) = at.and_then(|at| p.get(at)) {
+                    sum += v;
+                    count += 1.0;
+                }
+            }
+        }
+        (p[k] * count / sum, count)
+    };
+    let chance = |mean: f64, of: f64, around: f64| -> f64 {
+        FisherSnedecor::new(4.0 * of, 4.0 * around).map_or(1.0, |law| law.sf(mean))
+    };
+    let stars = series.len() as f64;
+    let best = (0..bins)
+        .into_par_iter()
+        .map(|k| {
+            let each: Vec<(f64, f64)> = power.iter().map(|p| relative(p, k)).collect();
+            let sum: f64 = each.iter().map(|e| e.0).sum();
+            let around: f64 = each.iter().map(|e| e.1).sum();
+            let one = each
+                .iter()
+                .map(|e| stars * chance(e.0, 1.0, e.1))
+                .fold(1.0, f64::min);
+            let all = chance(sum / stars, stars, around);
+            // both are tried, and the top between grid points
+            let p = 4.0 * bins as f64 * one.min(all);
+            let excess = power.iter().zip(&each).map(|(p, e)| p[k] - p[k] / e.0);
+            let squares = if one < all {
+                excess.fold(0.0, f64::max)
+            } else {
+                excess.sum()
+            };
+            (k, p, squares)
+        })
+        .min_by(|a, b| a.1.total_cmp(&b.1))?;
+    let (k, p, squares) = best;
+    (p < ALPHA).then(|| (first + k as f64 * grid, p, squares.max(0.0)))
+}
+
+/// The step that is most certain: its instant, chance, and the squares that it takes.
+fn step(series: &[Own], t_s: &[f64]) -> Option<(f64, f64, f64)> {
+    let stride = t_s.len().div_ceil(MOST_POINTS).max(1);
+    let instants: Vec<f64> = t_s
+        .windows(2)
+        .step_by(stride)
+        .map(|w| 0.5 * (w[0] + w[1]))
+        .collect();
+    let (t, (p, squares)) = instants
+        .par_iter()
+        .filter_map(|&t| Some((t, step_at(series, t)?)))
+        .min_by(|a, b| a.1.0.total_cmp(&b.1.0))?;
+    let p = p * instants.len() as f64;
+    (p < ALPHA).then_some((t, p, squares))
+}
+
+/// A step of every star at `t`: its chance there, and the squares that it takes.
+fn step_at(series: &[Own], t: f64) -> Option<(f64, f64)> {
+    let (mut square, mut freedom) = (0.0, 0.0);
+    for one in series.iter().filter_map(|s| s.step_square(t)) {
+        square += one;
+        freedom += 2.0;
+    }
+    let law = ChiSquared::new(freedom).ok()?;
+    Some((law.sf(square / WIDER), square - freedom))
+}
+
+/// Whether the stars are less slow beside a step of each at `t`.
+fn is_no_wander(data: &StarData, own: &[Vec<f64>], t: f64) -> bool {
+    let mut beside = own.to_vec();
+    for axis in &mut beside {
+        let mut mean = vec![[(0.0, 0.0); 2]; data.stars.len()];
+        let side = |r: usize| usize::from(data.t_s[r] > t);
+        let counts = |r: usize, v: f64| !data.outlier[r] && v.is_finite();
+        for (r, v) in axis.iter().enumerate().filter(|(r, v)| counts(*r, **v)) {
+            let sum = &mut mean[data.star[r]][side(r)];
+            *sum = (sum.0 + v, sum.1 + 1.0);
+        }
+        for (r, v) in axis.iter_mut().enumerate() {
+            let (sum, n) = mean[data.star[r]][side(r)];
+            *v -= sum / f64::max(n, 1.0);
+        }
+    }
+    let span = data.frames.t_s.last().unwrap_or(&0.0) - data.frames.t_s.first().unwrap_or(&0.0);
+    let slow = |residual: &[Vec<f64>]| {
+        commonness::slow(data, residual, [true; 3], SLOW_SHARE * span).map_or(0.0, |s| s.stars)
+    };
+    slow(&beside) < LEFT_SLOW * slow(own)
+}
+
+impl Own {
+    /// Squares that a step at `t` takes of both axes, in units of the noise.
+    fn step_square(&self, t: f64) -> Option<f64> {
+        let at = self.t_s.partition_point(|v| *v < t);
+        if at < MIN_SIDE || at + MIN_SIDE > self.t_s.len() {
+            return None;
+        }
+        let (n, total) = (self.before[at], self.before[self.t_s.len()]);
+        let square = |running: &Vec<f64>| {
+            let low = running[at];
+            let change = (running[self.t_s.len()] - low) / (total - n) - low / n;
+            n * (total - n) / total * change * change
+        };
+        Some(self.running.iter().map(square).sum())
+    }
+
+    /// Squares that a sinusoid takes of both axes, in units of the noise, at `bins` frequencies from
+    /// `first` on. Phasors of all points are turned from one frequency to the next.
+    fn powers(&self, first: f64, grid: f64, bins: usize) -> Vec<f64> {
+        let phasor = |f: f64| -> Vec<[f64; 2]> {
+            let omega = std::f64::consts::TAU * f;
+            let each = self.t_s.iter().map(|t| omega * (t - self.t_s[0]));
+            each.map(|phase| [phase.cos(), phase.sin()]).collect()
+        };
+        let (mut at, by) = (phasor(first), phasor(grid));
+        let [x, y] = &self.value;
+        let power = |at: &[[f64; 2]]| {
+            let (mut cc, mut cs, mut ss) = (0.0, 0.0, 0.0);
+            let mut score = [[0.0; 2]; 2];
+            for (i, (&[c, s], n)) in at.iter().zip(&self.count).enumerate() {
+                let (c, s, nc, ns) = (c, s, n * c, n * s);
+                cc += nc * c;
+                cs += nc * s;
+                ss += ns * s;
+                score[0][0] += nc * x[i];
+                score[0][1] += ns * x[i];
+                score[1][0] += nc * y[i];
+                score[1][1] += ns * y[i];
+            }
+            let determinant = cc * ss - cs * cs;
+            let square =
+                |[c, s]: [f64; 2]| (ss * c * c - 2.0 * cs * c * s + cc * s * s) / determinant;
+            score.into_iter().map(square).sum()
+        };
+        (0..bins)
+            .map(|_| {
+                let squares = power(&at);
+                for ([c, s], [bc, bs]) in at.iter_mut().zip(&by) {
+                    (*c, *s) = (*c * bc - *s * bs, *s * bc + *c * bs);
+                }
+                squares
+            })
+            .collect()
+    }
+}

@@ -1,0 +1,595 @@
+//! Coloured noise of one series: white plus a first-order
+//! Gauss-Markov process, removed exactly by a whitening filter.
+//!
+//! ```text
+//! y_k = b_k + w_k         w ~ N(0, s_w^2)
+//! b_k+1 = a b_k + n_k     a = exp(-dt/tau),  n ~ N(0, s_b^2 (1 - a^2))
+//! ```
+//!
+//! A row may be the mean of `count` measurements: its white variance is `s_w^2/count`.
+//! The scalar Kalman filter of this model turns the series into independent
+//! unit-variance innovations, at any spacing and across gaps. It is linear and
+//! its gains depend on the times alone, so that regressors go through the same
+//! filter and ordinary least squares afterwards is generalised least squares.
+//! Without it, the slow error of a reference turns into trends, lines and steps.
+//!
+//! The three numbers are those of greatest likelihood,
+//!
+//! ```text
+//! ln L = -1/2 sum_k ( ln(2 pi S_k) + e_k^2 / S_k )
+//! ```
+//!
+//! Source: Brown & Hwang 2012, ch. 4 (Gauss-Markov process, scalar filter).
+
+use argmin::core::{CostFunction, Executor};
+use argmin::solver::neldermead::NelderMead;
+use rayon::prelude::*;
+
+/// White plus first-order Gauss-Markov noise of one axis.
+///
+/// A series is given by the times `t_s` of its rows in ascending order, s, its values, and the `count` of
+/// measurements that each row is the mean of; 0 leaves a row out. All three have one length.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Coloured {
+    /// Standard deviation of the white part of one measurement, in the unit of the series.
+    pub white: f64,
+    /// Standard deviation of the slow part, in the unit of the series.
+    pub slow: f64,
+    /// Correlation time of the slow part, s.
+    pub tau_s: f64,
+}
+
+impl Coloured {
+    /// Nothing known: measurements count alike and stay as they are.
+    pub const WHITE: Self = Self {
+        white: 1.0,
+        slow: 0.0,
+        tau_s: 1.0,
+    };
+
+    /// The filter's decay, gain and 1/sqrt(innovation variance) at each row; a row
+    /// that counts for nothing has gain 0 and weight 0.
+    fn gains(&self, t_s: &[f64], count: &[f64]) -> Vec<[f64; 3]> {
+        let (r, s) = (self.white * self.white, self.slow * self.slow);
+        let mut variance = s;
+        let mut out = Vec::with_capacity(t_s.len());
+        let mut known = Known::default();
+        for k in 0..t_s.len() {
+            let step = if k == 0 {
+                f64::INFINITY
+            } else {
+                t_s[k] - t_s[k - 1]
+            };
+            let decay = known.decay(step, self.tau_s);
+            variance = decay * decay * variance + s * (1.0 - decay * decay);
+            if count[k] <= 0.0 {
+                out.push([decay, 0.0, 0.0]);
+                continue;
+            }
+            let innovation = variance + r / count[k];
+            let gain = variance / innovation;
+            out.push([decay, gain, 1.0 / innovation.sqrt()]);
+            variance *= 1.0 - gain;
+        }
+        out
+    }
+
+    /// Log-likelihood of `y`, nats.
+    pub fn log_likelihood(&self, t_s: &[f64], y: &[f64], count: &[f64]) -> f64 {
+        let (r, s) = (self.white * self.white, self.slow * self.slow);
+        let (mut variance, mut mean, mut last_s) = (s, 0.0, f64::NEG_INFINITY);
+        let (mut squares, mut kept) = (0.0, 0.0);
+        let mut determinant = LogProduct::default();
+        let mut known = Known::default();
+        for ((&t_s, &y), &count) in t_s.iter().zip(y).zip(count) {
+            let decay = known.decay(t_s - last_s, self.tau_s);
+            last_s = t_s;
+            let square = decay * decay;
+            variance = square * variance + s * (1.0 - square);
+            mean *= decay;
+            if count <= 0.0 {
+                continue;
+            }
+            let innovation = variance + r / count;
+            let inverse = 1.0 / innovation;
+            let gain = variance * inverse;
+            let e = y - mean;
+            mean += gain * e;
+            variance *= 1.0 - gain;
+            squares += e * e * inverse;
+            determinant.times(innovation);
+            kept += 1.0;
+        }
+        -0.5 * (squares + determinant.ln() + kept * std::f64::consts::TAU.ln())
+    }
+
+    /// Noise of greatest likelihood for a series about zero. With fewer than 30 rows, too
+    /// few to tell a correlation, white noise.
+    pub fn fit(t_s: &[f64], y: &[f64], count: &[f64]) -> Self {
+        Self::fit_above(0.0, t_s, y, count)
+    }
+
+    /// As [`fit`](Self::fit), where the white part is known to be no less than `least`.
+    pub fn fit_above(least: f64, t_s: &[f64], y: &[f64], count: &[f64]) -> Self {
+        let kept: Vec<usize> = (0..y.len()).filter(|&k| count[k] > 0.0).collect();
+        let variance =
+            kept.iter().map(|&k| y[k] * y[k] * count[k]).sum::<f64>() / kept.len().max(1) as f64;
+        let rms = variance.sqrt().max(least).max(1e-12);
+        let white = Self {
+            white: rms,
+            slow: 0.0,
+            tau_s: 1.0,
+        };
+        let (Some(step), Some((first, last))) = (
+            spectra::robust::median_step(t_s),
+            t_s.first().zip(t_s.last()),
+        ) else {
+            return white;
+        };
+        let span = last - first;
+        if kept.len() < 30 || step <= 0.0 {
+            return white;
+        }
+        let problem = Likelihood {
+            t_s,
+            y,
+            count,
+            rms,
+            least,
+            bounds: [0.5 * step, 3.0 * span],
+        };
+        let own = if least > 0.0 { 0.3_f64 } else { 0.7 }.ln();
+        // A likelihood in the correlation time has more than one hill: start on each.
+        let best = [3.0 * step, (step * span).sqrt(), 0.1 * span]
+            .into_par_iter()
+            .filter_map(|tau| problem.climb([own, 0.7_f64.ln(), tau.ln()], -0.7))
+            .collect::<Vec<_>>()
+            .into_iter()
+            .max_by(|a, b| a.0.total_cmp(&b.0));
+        // Two more parameters must earn their keep (Akaike).
+        match best {
+            Some((found, noise)) if found > white.log_likelihood(t_s, y, count) + 2.0 => noise,
+            _ => white,
+        }
+    }
+
+    /// The noise of a similar series, started from this one.
+    pub fn refit(&self, t_s: &[f64], y: &[f64], count: &[f64]) -> Self {
+        self.refit_above(0.0, t_s, y, count)
+    }
+
+    /// As [`refit`](Self::refit), where the white part is known to be no less than `least`.
+    pub fn refit_above(&self, least: f64, t_s: &[f64], y: &[f64], count: &[f64]) -> Self {
+        if self.slow <= 0.0 {
+            return Self::fit_above(least, t_s, y, count);
+        }
+        let Some(step) = spectra::robust::median_step(t_s) else {
+            return *self;
+        };
+        let span = t_s[t_s.len() - 1] - t_s[0];
+        let problem = Likelihood {
+            t_s,
+            y,
+            count,
+            rms: 1.0,
+            least,
+            bounds: [0.5 * step, 3.0 * span],
+        };
+        problem
+            .climb(
+                [
+                    own_white(self.white, least).ln(),
+                    self.slow.ln(),
+                    self.tau_s.ln(),
+                ],
+                -0.3,
+            )
+            .map_or(*self, |(_, noise)| noise)
+    }
+
+    /// Standard errors of the slow part relative to it, of sigma and of tau, from
+    /// the curvature of the log-likelihood; `None` where it has no summit.
+    pub fn relative_sigma(&self, t_s: &[f64], y: &[f64], count: &[f64]) -> Option<[f64; 2]> {
+        const STEP: f64 = 0.05;
+        let height = |d: [f64; 3]| {
+            Self {
+                white: self.white * d[0].exp(),
+                slow: self.slow * d[1].exp(),
+                tau_s: self.tau_s * d[2].exp(),
+            }
+            .log_likelihood(t_s, y, count)
+        };
+        let shifted = |i: usize, a: f64, j: usize, b: f64| {
+            let mut d = [0.0; 3];
+            d[i] += a;
+            d[j] += b;
+            height(d)
+        };
+        let information = nalgebra::Matrix3::from_fn(|i, j| {
+            (shifted(i, STEP, j, -STEP) + shifted(i, -STEP, j, STEP)
+                - shifted(i, STEP, j, STEP)
+                - shifted(i, -STEP, j, -STEP))
+                / (4.0 * STEP * STEP)
+        });
+        let covariance = information.cholesky()?.inverse();
+        Some([covariance[(1, 1)].sqrt(), covariance[(2, 2)].sqrt()])
+    }
+
+    /// Products of whitened steps (0 before each of the rows `at`, 1 from there on) with themselves and
+    /// with two whitened series `with`, three numbers a step: what a fit of one step and its likelihood need.
+    pub fn steps(
+        &self,
+        t_s: &[f64],
+        count: &[f64],
+        at: &[usize],
+        with: [&[f64]; 2],
+    ) -> Vec<[f64; 3]> {
+        // side by side: each is a chain of products
+        const LANES: usize = 8;
+        let gains = self.gains(t_s, count);
+        let mut out = Vec::with_capacity(at.len());
+        for at in at.chunks(LANES) {
+            let mut mean = [0.0; LANES];
+            let mut sums = [[0.0; LANES]; 3];
+            let mut from = [usize::MAX; LANES];
+            from[..at.len()].copy_from_slice(at);
+            let first = at.iter().copied().min().unwrap_or(0);
+            let with = with.map(|w| &w[first..]);
+            for (j, [decay, gain, weight]) in gains[first..].iter().enumerate() {
+                for l in 0..LANES {
+                    let step = f64::from(u8::from(first + j >= from[l]));
+                    let before = mean[l] * decay;
+                    let e = step - before;
+                    let white = e * weight;
+                    mean[l] = before + gain * e;
+                    sums[0][l] += white * white;
+                    sums[1][l] += white * with[0][j];
+                    sums[2][l] += white * with[1][j];
+                }
+            }
+            out.extend((0..at.len()).map(|l| [sums[0][l], sums[1][l], sums[2][l]]));
+        }
+        out
+    }
+
+    /// Whitens a series in place: independent, unit variance; rows that are left out become 0. Regressors
+    /// whitened alike make least squares generalised.
+    pub fn whiten(&self, t_s: &[f64], count: &[f64], columns: &mut [&mut [f64]]) {
+        let gains = self.gains(t_s, count);
+        for column in columns {
+            let mut mean = 0.0;
+            for (k, [decay, gain, weight]) in gains.iter().enumerate() {
+                mean *= decay;
+                if count[k] <= 0.0 {
+                    column[k] = 0.0;
+                    continue;
+                }
+                let e = column[k] - mean;
+                mean += gain * e;
+                column[k] = e * weight;
+            }
+        }
+    }
+}
+
+/// Steps repeat: one exponential serves them all.
+#[derive(Clone, Copy, Debug)]
+struct Known {
+    step_s: f64,
+    decay: f64,
+}
+
+impl Default for Known {
+    fn default() -> Self {
+        Self {
+            step_s: f64::NAN,
+            decay: 0.0,
+        }
+    }
+}
+
+impl Known {
+    fn decay(&mut self, step_s: f64, tau_s: f64) -> f64 {
+        // alike but for the rounding of times
+        let alike = (step_s - self.step_s).abs() <= 1e-9 * step_s;
+        if !alike || step_s.is_infinite() {
+            *self = Self {
+                step_s,
+                decay: (-step_s / tau_s).exp(),
+            };
+        }
+        self.decay
+    }
+}
+
+/// The logarithm of a long product of positive numbers, without one logarithm for each.
+#[derive(Clone, Copy, Debug)]
+pub struct LogProduct {
+    product: f64,
+    ln: f64,
+}
+
+impl Default for LogProduct {
+    fn default() -> Self {
+        Self {
+            product: 1.0,
+            ln: 0.0,
+        }
+    }
+}
+
+impl LogProduct {
+    /// Multiplies by `factor`.
+    pub fn times(&mut self, factor: f64) {
+        self.product *= factor;
+        if !(1e-120..1e120).contains(&self.product) {
+            self.ln += self.product.ln();
+            self.product = 1.0;
+        }
+    }
+
+    /// The logarithm of the product.
+    #[must_use]
+    pub fn ln(self) -> f64 {
+        self.ln + self.product.ln()
+    }
+}
+
+/// What a white part has beside `least`: a start, not nothing.
+fn own_white(white: f64, least: f64) -> f64 {
+    (white * white - least * least)
+        .max(0.01 * white * white)
+        .max(1e-24)
+        .sqrt()
+}
+
+/// The slow part of greatest likelihood that several series have alike, each beside a white part of
+/// its own of no less than `least`, from `start`; and the log-likelihood of all, nats.
+pub(crate) fn fit_alike(
+    least: f64,
+    t_s: &[f64],
+    series: &[(&[f64], &[f64])],
+    start: &Coloured,
+) -> Option<(Coloured, f64)> {
+    let step = spectra::robust::median_step(t_s)?;
+    let span = t_s.last()? - t_s.first()?;
+    let problem = Alike {
+        t_s,
+        series,
+        least,
+        bounds: [0.5 * step, 3.0 * span],
+    };
+    let mut first = vec![start.slow.ln(), start.tau_s.ln()];
+    first.extend(series.iter().map(|_| own_white(start.white, least).ln()));
+    let mut simplex = vec![first.clone()];
+    for (k, step) in [0.5, -0.7]
+        .into_iter()
+        .chain(series.iter().map(|_| 0.5))
+        .enumerate()
+    {
+        let mut corner = first.clone();
+        corner[k] += step;
+        simplex.push(corner);
+    }
+    let solver = NelderMead::new(simplex).with_sd_tolerance(1e-2).ok()?;
+    let result = Executor::new(&problem, solver)
+        .configure(|s| s.max_iters(160))
+        .run()
+        .ok()?;
+    let best = result.state.best_param?;
+    Some((problem.at(&best, 0), problem.height(&best)))
+}
+
+struct Alike<'a> {
+    t_s: &'a [f64],
+    /// Values and counts.
+    series: &'a [(&'a [f64], &'a [f64])],
+    least: f64,
+    bounds: [f64; 2],
+}
+
+impl Alike<'_> {
+    fn at(&self, p: &[f64], k: usize) -> Coloured {
+        Coloured {
+            white: p[2 + k].clamp(-40.0, 40.0).exp().hypot(self.least),
+            slow: p[0].clamp(-40.0, 40.0).exp(),
+            tau_s: p[1].exp().clamp(self.bounds[0], self.bounds[1]),
+        }
+    }
+
+    fn height(&self, p: &[f64]) -> f64 {
+        let of = |(k, (y, count)): (usize, &(&[f64], &[f64]))| {
+            self.at(p, k).log_likelihood(self.t_s, y, count)
+        };
+        self.series.iter().enumerate().map(of).sum()
+    }
+}
+
+impl CostFunction for &Alike<'_> {
+    type Param = Vec<f64>;
+    type Output = f64;
+
+    fn cost(&self, p: &Vec<f64>) -> Result<f64, argmin::core::Error> {
+        Ok(-self.height(p))
+    }
+}
+
+struct Likelihood<'a> {
+    t_s: &'a [f64],
+    y: &'a [f64],
+    count: &'a [f64],
+    rms: f64,
+    /// Least white part; the rest of it is fitted.
+    least: f64,
+    bounds: [f64; 2],
+}
+
+impl Likelihood<'_> {
+    fn at(&self, p: &[f64]) -> Coloured {
+        Coloured {
+            white: (self.rms * p[0].clamp(-20.0, 20.0).exp()).hypot(self.least),
+            slow: self.rms * p[1].clamp(-20.0, 20.0).exp(),
+            tau_s: p[2].exp().clamp(self.bounds[0], self.bounds[1]),
+        }
+    }
+}
+
+impl Likelihood<'_> {
+    /// Climbs from `start` (logarithms) with first steps of `step`; the height
+    /// and the noise there.
+    fn climb(&self, start: [f64; 3], step: f64) -> Option<(f64, Coloured)> {
+        let mut simplex = vec![start.to_vec()];
+        for k in 0..3 {
+            let mut corner = start.to_vec();
+            corner[k] += if k == 2 { -1.4 * step } else { step };
+            simplex.push(corner);
+        }
+        let solver = NelderMead::new(simplex).with_sd_tolerance(1e-3).ok()?;
+        let result = Executor::new(self, solver)
+            .configure(|s| s.max_iters(120))
+            .run()
+            .ok()?;
+        let noise = self.at(&result.state.best_param?);
+        Some((noise.log_likelihood(self.t_s, self.y, self.count), noise))
+    }
+}
+
+impl CostFunction for &Likelihood<'_> {
+    type Param = Vec<f64>;
+    type Output = f64;
+
+    fn cost(&self, p: &Vec<f64>) -> Result<f64, argmin::core::Error> {
+        Ok(-self.at(p).log_likelihood(self.t_s, self.y, self.count))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand_core::SeedableRng;
+    use rand_distr::{Distribution, StandardNormal};
+    use rand_xoshiro::Xoshiro256PlusPlus;
+
+    fn series(noise: &Coloured, t_s: &[f64], seed: u64) -> Vec<f64> {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+        let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
+        let mut b = noise.slow * normal();
+        let mut out = Vec::new();
+        for k in 0..t_s.len() {
+            if k > 0 {
+                let a = (-(t_s[k] - t_s[k - 1]) / noise.tau_s).exp();
+                b = a * b + noise.slow * (1.0 - a * a).sqrt() * normal();
+            }
+            out.push(b + noise.white * normal());
+        }
+        out
+    }
+
+    /// The likelihood of a series is that of its whitened one less the logarithms of the weights, and
+    /// steps side by side are those whitened one by one: rounding alone.
+    #[test]
+    fn sums_are_those_of_the_whitened_series() {
+        let noise = Coloured {
+            white: 0.02,
+            slow: 0.05,
+            tau_s: 40.0,
+        };
+        let t_s: Vec<f64> = (0..3000).map(|k| 0.1 * f64::from(k)).collect();
+        let count: Vec<f64> = (0..3000).map(|k| f64::from(k % 5)).collect();
+        let y = series(&noise, &t_s, 12);
+        let whitened = |series: &[f64]| {
+            let mut out = series.to_vec();
+            noise.whiten(&t_s, &count, &mut [&mut out]);
+            out
+        };
+        let weights = noise.gains(&t_s, &count).into_iter().map(|g| g[2]);
+        let logs: f64 = weights
+            .filter(|w| *w > 0.0)
+            .map(|w| w.ln() - 0.5 * std::f64::consts::TAU.ln())
+            .sum();
+        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        let white = whitened(&y);
+        let direct = logs - 0.5 * dot(&white, &white);
+        let ours = noise.log_likelihood(&t_s, &y, &count);
+        assert!((ours / direct - 1.0).abs() < 1e-9, "{ours} {direct}");
+        let one = whitened(&vec![1.0; y.len()]);
+        let at: Vec<usize> = (5..2900).step_by(263).collect();
+        for (sums, &at) in noise
+            .steps(&t_s, &count, &at, [&one, &white])
+            .iter()
+            .zip(&at)
+        {
+            let step: Vec<f64> = (0..y.len()).map(|k| f64::from(u8::from(k >= at))).collect();
+            let step = whitened(&step);
+            let direct = [dot(&step, &step), dot(&step, &one), dot(&step, &white)];
+            for (a, b) in sums.iter().zip(direct) {
+                assert!((a - b).abs() < 1e-9 * direct[0], "{sums:?} {direct:?}");
+            }
+        }
+    }
+
+    /// Whitened noise is N(0,1) and independent: the mean square over n rows has
+    /// standard error sqrt(2/n), the lag-one product 1/sqrt(n).
+    #[test]
+    fn whitened_noise_is_white_across_a_gap() {
+        let noise = Coloured {
+            white: 0.5,
+            slow: 1.5,
+            tau_s: 40.0,
+        };
+        let t_s: Vec<f64> = (0..20_000)
+            .map(|k| f64::from(k) + if k > 9000 { 500.0 } else { 0.0 })
+            .collect();
+        let mut y = series(&noise, &t_s, 11);
+        noise.whiten(&t_s, &vec![1.0; y.len()], &mut [&mut y]);
+        let n = y.len() as f64;
+        let square = y.iter().map(|v| v * v).sum::<f64>() / n;
+        let lag = y.windows(2).map(|w| w[0] * w[1]).sum::<f64>() / n;
+        assert!(
+            (square - 1.0).abs() < 5.0 * (2.0 / n).sqrt(),
+            "mean square {square}"
+        );
+        assert!(lag.abs() < 5.0 / n.sqrt(), "lag one {lag}");
+    }
+
+    /// The span is 500 tau and slow dominates: `sigma_b` is known to about
+    /// sqrt(tau/span) = 4.5 %, tau to twice that, the white part far better.
+    #[test]
+    fn the_fit_finds_the_noise() {
+        let truth = Coloured {
+            white: 0.5,
+            slow: 1.5,
+            tau_s: 40.0,
+        };
+        let t_s: Vec<f64> = (0..20_000).map(f64::from).collect();
+        let y = series(&truth, &t_s, 5);
+        let found = Coloured::fit(&t_s, &y, &vec![1.0; y.len()]);
+        assert!(
+            (found.slow / truth.slow - 1.0).abs() < 5.0 * 0.045,
+            "{found:?}"
+        );
+        assert!(
+            (found.tau_s / truth.tau_s - 1.0).abs() < 5.0 * 0.09,
+            "{found:?}"
+        );
+        assert!((found.white / truth.white - 1.0).abs() < 0.1, "{found:?}");
+    }
+
+    #[test]
+    fn white_noise_stays_white() {
+        let truth = Coloured {
+            white: 2.0,
+            slow: 0.0,
+            tau_s: 1.0,
+        };
+        let t_s: Vec<f64> = (0..5000).map(f64::from).collect();
+        let y = series(&truth, &t_s, 3);
+        let found = Coloured::fit(&t_s, &y, &vec![1.0; y.len()]);
+        let total = found.white.hypot(found.slow);
+        assert!(
+            (total / 2.0 - 1.0).abs() < 5.0 * (0.5 / 5000.0_f64).sqrt() + 0.02,
+            "{found:?}"
+        );
+        assert!(found.slow < 0.5 || found.tau_s < 2.0, "{found:?}");
+    }
+}
