@@ -7,14 +7,19 @@
 //! description by up to three terms ([`crate::search::empirical`]), term after term,
 //!
 //! ```text
-//! worth(set) = L(rest + set) - L(rest) - price(set)     L: log-likelihood out of fold
+//! worth(set) = (L(rest + set) - L(rest)) / m - price(set)     L: log-likelihood out of fold
 //! ```
 //!
-//! and a set that a description beats by far is not named: it is said what the leftover
-//! follows. A term holds the effects that act through its variable as special cases with
-//! more parameters, so that it does not beat an effect that does act.
+//! with m how much wider than under white noise the amplitudes scatter (shared noise of the
+//! reference makes likelihoods of whatever turns frames too large), and a set that a
+//! description beats by far is not named: it is said what the leftover follows. A term holds
+//! the effects that act through its variable as special cases with more parameters, so that it
+//! does not beat an effect that does act. But it takes the columns that it needs, one axis of
+//! three, say: so the set pays for no more either, and is judged at its best part.
 //!
 //! Source: Schwarz 1978 for the price of a parameter.
+
+use block_regression::Fits;
 
 use crate::causes::description::Described;
 use crate::search::selection::{FAMILY_ALPHA, columns_of, each};
@@ -33,30 +38,68 @@ pub(crate) type Part = (usize, Vec<usize>);
 /// does, and that description.
 pub(crate) fn stand_ins(described: &Described) -> Option<(Vec<usize>, Vec<Part>)> {
     let groups = &described.fitted.groups;
-    let chosen = &described.chosen;
-    let all = described
-        .fitted
-        .fits
-        .out_of_fold(&columns_of(groups, chosen))?;
-    let all = all.total_loglik();
     let mut most = None;
     let mut by = BY_FAR;
     for set in sets(described) {
-        let rest: Vec<usize> = chosen
-            .iter()
-            .copied()
-            .filter(|g| !set.contains(g))
-            .collect();
-        let paid: f64 = set.iter().map(|&k| described.paid[k]).sum();
-        let Some((worth, parts)) = describe(described, &columns_of(groups, &rest)) else {
+        let chosen = described.chosen.iter().copied();
+        let rest: Vec<usize> = chosen.filter(|g| !set.contains(g)).collect();
+        let rest = columns_of(groups, &rest);
+        let Some((worth, parts)) = describe(described, &rest) else {
             continue;
         };
-        if worth - (all - paid) > by {
-            by = worth - (all - paid);
+        let Some(own) = at_best(described, &set, &rest) else {
+            continue;
+        };
+        if worth - own > by {
+            by = worth - own;
             most = Some((set, parts));
         }
     }
     most
+}
+
+/// Likelihood of `rest` and the part of `set` that is worth most, after its price.
+fn at_best(described: &Described, set: &[usize], rest: &[usize]) -> Option<f64> {
+    let fits = &described.fitted.fits;
+    let each = each(described.fitted.scalars);
+    let mut part = columns_of(&described.fitted.groups, set);
+    let paid: f64 = set.iter().map(|&k| described.paid[k]).sum();
+    // signs and other choices stay paid for
+    let choices = paid - each * part.len() as f64;
+    let base = fits.out_of_fold(rest)?.total_loglik();
+    let worth = |part: &[usize]| -> Option<f64> {
+        let price = choices + each * part.len() as f64;
+        Some(base + gain(fits, rest, part)? - price)
+    };
+    let mut best = worth(&part)?;
+    while part.len() > 1 {
+        let fewer = (0..part.len()).filter_map(|at| {
+            let mut less = part.clone();
+            less.remove(at);
+            Some((worth(&less)?, less))
+        });
+        let Some((value, less)) = fewer.max_by(|a, b| a.0.total_cmp(&b.0)) else {
+            break;
+        };
+        if value <= best {
+            break;
+        }
+        (best, part) = (value, less);
+    }
+    Some(best)
+}
+
+/// What `part` adds to the likelihood of `rest` out of fold, over how much wider it scatters.
+fn gain(fits: &Fits, rest: &[usize], part: &[usize]) -> Option<f64> {
+    let mut with = rest.to_vec();
+    with.extend(part);
+    let which: Vec<usize> = (rest.len()..with.len()).collect();
+    let more = fits.out_of_fold(&with)?.total_loglik() - fits.out_of_fold(rest)?.total_loglik();
+    if more <= 0.0 {
+        return Some(more);
+    }
+    let wider = fits.estimate(&with)?.wider(&which)?.mean();
+    Some(more / wider.max(1.0))
 }
 
 /// The best description of what `rest` leaves: its likelihood after all prices.
@@ -74,29 +117,26 @@ pub(crate) fn describe(described: &Described, rest: &[usize]) -> Option<(f64, Ve
                 if part.iter().any(|c| with.contains(c)) {
                     continue;
                 }
-                let mut trial = with.clone();
-                trial.extend(part);
-                let Some(fit) = fits.out_of_fold(&trial) else {
+                let Some(more) = gain(fits, &with, part) else {
                     continue;
                 };
                 // what is in the description already has been paid for
-                let bought = with.len() - rest.len() + part.len();
-                let gain = fit.total_loglik() - each * bought as f64;
+                let more = more - each * part.len() as f64;
                 let certain = || {
+                    let mut trial = with.clone();
+                    trial.extend(part);
                     let which: Vec<usize> = (with.len()..trial.len()).collect();
                     fits.estimate(&trial)
                         .is_some_and(|e| e.p_value(&which) * (tried as f64) < FAMILY_ALPHA)
                 };
-                if gain > worth + WORTH
-                    && best.as_ref().is_none_or(|(most, ..)| gain > *most)
-                    && certain()
+                if more > WORTH && best.as_ref().is_none_or(|(most, ..)| more > *most) && certain()
                 {
-                    best = Some((gain, k, part));
+                    best = Some((more, k, part));
                 }
             }
         }
-        let Some((gain, k, part)) = best else { break };
-        worth = gain;
+        let Some((more, k, part)) = best else { break };
+        worth += more;
         with.extend(part);
         let first = described.terms[k].first;
         parts.push((k, part.iter().map(|c| c - first).collect()));
