@@ -333,6 +333,15 @@ impl Estimate {
         (values.max() > 0.0).then_some(values)
     }
 
+    /// Squared distance of amplitudes `which` from zero under white noise, over that with their own
+    /// covariance: how many times too large white noise makes what they gain. `None` if they cannot be
+    /// told apart.
+    pub fn excess(&self, which: &[usize]) -> Option<f64> {
+        let value = DVector::from_fn(which.len(), |i, _| self.value[which[i]]);
+        let own = Cholesky::new(part(&self.covariance, which))?;
+        Some(self.square(which)? / value.dot(&own.solve(&value)))
+    }
+
     /// The cluster-robust covariance with no variance below that of white noise.
     pub fn cautious_covariance(&self) -> DMatrix<f64> {
         let stretch =

@@ -10,7 +10,7 @@
 //! worth(set) = (L(rest + set) - L(rest)) / m - price(set)     L: log-likelihood out of fold
 //! ```
 //!
-//! with m how much wider than under white noise the amplitudes scatter (shared noise of the
+//! with m how many times white noise makes the gain too large (shared noise of the
 //! reference makes likelihoods of whatever turns frames too large), and a set that a
 //! description beats by far is not named: it is said what the leftover follows. A term holds
 //! the effects that act through its variable as special cases with more parameters, so that it
@@ -89,7 +89,7 @@ fn at_best(described: &Described, set: &[usize], rest: &[usize]) -> Option<f64> 
     Some(best)
 }
 
-/// What `part` adds to the likelihood of `rest` out of fold, over how much wider it scatters.
+/// What `part` adds to the likelihood of `rest` out of fold, over how many times white noise makes it too large.
 fn gain(fits: &Fits, rest: &[usize], part: &[usize]) -> Option<f64> {
     let mut with = rest.to_vec();
     with.extend(part);
@@ -98,8 +98,7 @@ fn gain(fits: &Fits, rest: &[usize], part: &[usize]) -> Option<f64> {
     if more <= 0.0 {
         return Some(more);
     }
-    let wider = fits.estimate(&with)?.wider(&which)?.mean();
-    Some(more / wider.max(1.0))
+    Some(more / fits.estimate(&with)?.excess(&which)?.max(1.0))
 }
 
 /// The best description of what `rest` leaves: its likelihood after all prices.
