@@ -29,13 +29,15 @@ use crate::star::search::{Searched, attempt, declared_noise};
 use commonness::Slow;
 use description::{Described, Kept};
 use invariance::{Change, Changing, Inner, Way, changing};
-use stand_ins::{BY_FAR, Part, describe, stand_ins};
+use stand_ins::{Part, describe, stand_ins};
 
 pub(crate) mod commonness;
 pub(crate) mod description;
 pub(crate) mod invariance;
 mod stand_ins;
 
+/// Nats by which a description must be worth more than a slow error of the reference.
+const BY_FAR: f64 = 8.0;
 /// Searches whose outcome is refused before one is taken as it is.
 const MOST_REFUSALS: usize = 10;
 /// Chance beyond which an effect is doubted beside slow noise of the stars.

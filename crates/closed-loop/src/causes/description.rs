@@ -16,7 +16,7 @@ use crate::causes::invariance::{Changing, Inner, Way};
 use crate::error::CloseError;
 use crate::figures::{self, Followed};
 use crate::search::empirical::{Empirical, Variable, flux_of, range};
-use crate::search::selection::{columns_of, each, judged};
+use crate::search::selection::{columns_of, costs, each, judged};
 use crate::search::{Fitted, Found, borrowed, fit};
 use crate::situation::Situation;
 use crate::situation::channels_of_interest;
@@ -59,7 +59,7 @@ pub(crate) struct Described {
     pub(crate) changes: Vec<Vec<(Way, Vec<usize>)>>,
     /// Ids of the chosen effects.
     pub(crate) names: Vec<&'static str>,
-    /// What the columns of each chosen effect cost, nats: terms do not pay for choices either.
+    /// What having looked for each chosen effect costs, nats ([`costs`]).
     pub(crate) paid: Vec<f64>,
 }
 
@@ -100,10 +100,9 @@ impl Described {
         };
         let n = chosen.len();
         let names = only.candidates.iter().map(|c| c.id()).collect();
-        let paid = fitted.groups[..n]
-            .iter()
-            .map(|g| g.columns.len() as f64 * each(fitted.scalars))
-            .collect();
+        let groups = &found.fitted.groups;
+        let costs = costs(groups, &vec![true; groups.len()]);
+        let paid = chosen.iter().map(|&g| costs[g].ln()).collect();
         let mut first: usize = only.candidates.iter().map(|c| c.coefficients().len()).sum();
         let mut changes = vec![Vec::new(); n];
         for (k, changing) in changing.iter().enumerate() {

@@ -7,14 +7,16 @@
 //! description by up to three terms ([`crate::search::empirical`]), term after term,
 //!
 //! ```text
-//! worth(set) = (L(rest + set) - L(rest)) / m - price(set)     L: log-likelihood out of fold
+//! worth(set) = (L(rest + set) - L(rest)) / m - k/2 ln n - ln c     L: log-likelihood out of fold
 //! ```
 //!
 //! with m how many times white noise makes the gain too large (shared noise of the
 //! reference makes likelihoods of whatever turns frames too large), and a set that a
 //! description beats by far is not named: it is said what the leftover follows. A term holds
 //! the effects that act through its variable as special cases with more parameters, so that it
-//! does not beat an effect that does act. But it takes the columns that it needs, one axis of
+//! does not beat an effect that does act. Both pay for their k columns and for the c among which
+//! each of their parts was looked for: two misplaced stars are two choices of many, one slope is
+//! one. A description takes the columns that it needs, one axis of
 //! three, say: so the set pays for no more either, and is judged at its best part.
 //!
 //! Source: Schwarz 1978 for the price of a parameter.
@@ -25,7 +27,7 @@ use crate::causes::description::Described;
 use crate::search::selection::{FAMILY_ALPHA, columns_of, each};
 
 /// Nats by which a description must be worth more.
-pub(crate) const BY_FAR: f64 = 8.0;
+const BY_FAR: f64 = 4.0;
 /// Terms of a description.
 const MOST_TERMS: usize = 3;
 /// Nats that a further term must be worth.
@@ -38,6 +40,7 @@ pub(crate) type Part = (usize, Vec<usize>);
 /// does, and that description.
 pub(crate) fn stand_ins(described: &Described) -> Option<(Vec<usize>, Vec<Part>)> {
     let groups = &described.fitted.groups;
+    let looked = (parts_of_all(described) as f64).ln();
     let mut most = None;
     let mut by = BY_FAR;
     for set in sets(described) {
@@ -50,6 +53,7 @@ pub(crate) fn stand_ins(described: &Described) -> Option<(Vec<usize>, Vec<Part>)
         let Some(own) = at_best(described, &set, &rest) else {
             continue;
         };
+        let worth = worth - parts.len() as f64 * looked;
         if worth - own > by {
             by = worth - own;
             most = Some((set, parts));
@@ -64,11 +68,9 @@ fn at_best(described: &Described, set: &[usize], rest: &[usize]) -> Option<f64> 
     let each = each(described.fitted.scalars);
     let mut part = columns_of(&described.fitted.groups, set);
     let paid: f64 = set.iter().map(|&k| described.paid[k]).sum();
-    // signs and other choices stay paid for
-    let choices = paid - each * part.len() as f64;
     let base = fits.out_of_fold(rest)?.total_loglik();
     let worth = |part: &[usize]| -> Option<f64> {
-        let price = choices + each * part.len() as f64;
+        let price = paid + each * part.len() as f64;
         Some(base + gain(fits, rest, part)? - price)
     };
     let mut best = worth(&part)?;
@@ -105,7 +107,7 @@ fn gain(fits: &Fits, rest: &[usize], part: &[usize]) -> Option<f64> {
 pub(crate) fn describe(described: &Described, rest: &[usize]) -> Option<(f64, Vec<Part>)> {
     let fits = &described.fitted.fits;
     let each = each(described.fitted.scalars);
-    let tried: usize = described.terms.iter().map(|t| t.parts.len()).sum();
+    let tried = parts_of_all(described);
     let mut with = rest.to_vec();
     let mut worth = fits.out_of_fold(&with)?.total_loglik();
     let mut parts = Vec::new();
@@ -141,6 +143,11 @@ pub(crate) fn describe(described: &Described, rest: &[usize]) -> Option<(f64, Ve
         parts.push((k, part.iter().map(|c| c - first).collect()));
     }
     (!parts.is_empty()).then_some((worth, parts))
+}
+
+/// Parts that a description may be made of.
+fn parts_of_all(described: &Described) -> usize {
+    described.terms.iter().map(|t| t.parts.len()).sum()
 }
 
 /// Each effect, each pile of one kind, and all.
