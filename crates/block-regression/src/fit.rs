@@ -69,6 +69,8 @@ use moderation::Usual;
 
 /// Share of a column's squared length that has to be left: near zero, it is unobservable.
 const OBSERVABLE_SHARE: f64 = 1e-7;
+/// What all columns say counts for no more than this many times the blocks that there are.
+const MOST_BLOCKS: f64 = 2.0;
 
 /// The columns of a Gram matrix, in their order: nuisance, candidates, residuals.
 #[derive(Clone, Debug, Default)]
@@ -601,7 +603,7 @@ impl Fits {
             .filter_map(|c| self.scatter(&[c]))
             .map(|own| (own.robust[(0, 0)] / own.white[(0, 0)], own.blocks - 1.0))
             .collect();
-        Usual::of(&columns, self.grams.gram.len() as f64)
+        Usual::of(&columns, MOST_BLOCKS * self.grams.gram.len() as f64)
     }
 
     fn scatter(&self, set: &[usize]) -> Option<Scatter> {

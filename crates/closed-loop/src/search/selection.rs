@@ -239,3 +239,37 @@ fn judge(
         observable: true,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn group(kind: &'static str, columns: usize) -> Group {
+        Group {
+            columns: (0..columns).collect(),
+            bounds: vec![[0.0, 1.0]; columns],
+            choices: 0,
+            shapes: 0,
+            family: kind.to_owned(),
+            kind,
+        }
+    }
+
+    /// What the groups pay, as shares of the chance that any of them is chosen by mistake, adds up to all
+    /// of it: over those that may be chosen and can be seen. One of a hundred pays more than one alone,
+    /// but not a hundred times.
+    #[test]
+    fn what_the_search_costs_adds_up() {
+        let mut groups = vec![group("scale", 1), group("drift", 2), group("blind", 0)];
+        groups.extend((0..100).map(|_| group("pixel", 1)));
+        groups.extend((0..14).map(|_| group("star", 2)));
+        let mut may = vec![true; groups.len()];
+        may[1] = false;
+        let cost = costs(&groups, &may);
+        let counted = (0..groups.len()).filter(|&g| may[g] && !groups[g].columns.is_empty());
+        let shares: f64 = counted.map(|g| cost[g].recip()).sum();
+        assert!((shares - 1.0).abs() < 1e-12, "{shares}");
+        // sqrt(1) and sqrt(100), each times 1 + 10 + sqrt(14)
+        assert!((cost[0] - 14.742).abs() < 1e-3 && (cost[3] - 147.42).abs() < 1e-2);
+    }
+}
