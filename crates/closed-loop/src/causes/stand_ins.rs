@@ -10,7 +10,7 @@
 //! worth(set) = (L(rest + set) - L(rest)) / m - k/2 ln n - ln c     L: log-likelihood out of fold
 //! ```
 //!
-//! with m how many times white noise makes the gain too large (shared noise of the
+//! with m how many times white noise makes the gain of the set too large (shared noise of the
 //! reference makes likelihoods of whatever turns frames too large), and a set that a
 //! description beats by far is not named: it is said what the leftover follows. A term holds
 //! the effects that act through its variable as special cases with more parameters, so that it
@@ -47,10 +47,13 @@ pub(crate) fn stand_ins(described: &Described) -> Option<(Vec<usize>, Vec<Part>)
         let chosen = described.chosen.iter().copied();
         let rest: Vec<usize> = chosen.filter(|g| !set.contains(g)).collect();
         let rest = columns_of(groups, &rest);
-        let Some((worth, parts)) = describe(described, &rest) else {
+        let Some(times) = too_large(described, &set, &rest) else {
             continue;
         };
-        let Some(own) = at_best(described, &set, &rest) else {
+        let Some((worth, parts)) = describe_at(described, &rest, times) else {
+            continue;
+        };
+        let Some(own) = at_best(described, &set, &rest, times) else {
             continue;
         };
         let worth = worth - parts.len() as f64 * looked;
@@ -62,8 +65,17 @@ pub(crate) fn stand_ins(described: &Described) -> Option<(Vec<usize>, Vec<Part>)
     most
 }
 
-/// Likelihood of `rest` and the part of `set` that is worth most, after its price.
-fn at_best(described: &Described, set: &[usize], rest: &[usize]) -> Option<f64> {
+/// How many times white noise makes the gain of `set` beside `rest` too large, at least 1.
+fn too_large(described: &Described, set: &[usize], rest: &[usize]) -> Option<f64> {
+    let mut with = rest.to_vec();
+    with.extend(columns_of(&described.fitted.groups, set));
+    let which: Vec<usize> = (rest.len()..with.len()).collect();
+    let estimate = described.fitted.fits.estimate(&with)?;
+    Some(estimate.excess(&which)?.max(1.0))
+}
+
+/// Likelihood of `rest` and the part of `set` that is worth most, gains over `times`, after its price.
+fn at_best(described: &Described, set: &[usize], rest: &[usize], times: f64) -> Option<f64> {
     let fits = &described.fitted.fits;
     let each = each(described.fitted.scalars);
     let mut part = columns_of(&described.fitted.groups, set);
@@ -71,7 +83,7 @@ fn at_best(described: &Described, set: &[usize], rest: &[usize]) -> Option<f64> 
     let base = fits.out_of_fold(rest)?.total_loglik();
     let worth = |part: &[usize]| -> Option<f64> {
         let price = paid + each * part.len() as f64;
-        Some(base + gain(fits, rest, part)? - price)
+        Some(base + gain(fits, rest, part)? / times - price)
     };
     let mut best = worth(&part)?;
     while part.len() > 1 {
@@ -91,20 +103,20 @@ fn at_best(described: &Described, set: &[usize], rest: &[usize]) -> Option<f64> 
     Some(best)
 }
 
-/// What `part` adds to the likelihood of `rest` out of fold, over how many times white noise makes it too large.
+/// What `part` adds to the likelihood of `rest` out of fold.
 fn gain(fits: &Fits, rest: &[usize], part: &[usize]) -> Option<f64> {
     let mut with = rest.to_vec();
     with.extend(part);
-    let which: Vec<usize> = (rest.len()..with.len()).collect();
-    let more = fits.out_of_fold(&with)?.total_loglik() - fits.out_of_fold(rest)?.total_loglik();
-    if more <= 0.0 {
-        return Some(more);
-    }
-    Some(more / fits.estimate(&with)?.excess(&which)?.max(1.0))
+    Some(fits.out_of_fold(&with)?.total_loglik() - fits.out_of_fold(rest)?.total_loglik())
 }
 
 /// The best description of what `rest` leaves: its likelihood after all prices.
 pub(crate) fn describe(described: &Described, rest: &[usize]) -> Option<(f64, Vec<Part>)> {
+    describe_at(described, rest, 1.0)
+}
+
+/// The same where gains count by `times` less.
+fn describe_at(described: &Described, rest: &[usize], times: f64) -> Option<(f64, Vec<Part>)> {
     let fits = &described.fitted.fits;
     let each = each(described.fitted.scalars);
     let tried = parts_of_all(described);
@@ -122,7 +134,7 @@ pub(crate) fn describe(described: &Described, rest: &[usize]) -> Option<(f64, Ve
                     continue;
                 };
                 // what is in the description already has been paid for
-                let more = more - each * part.len() as f64;
+                let more = more / times - each * part.len() as f64;
                 let certain = || {
                     let mut trial = with.clone();
                     trial.extend(part);
