@@ -59,6 +59,8 @@ pub(crate) struct Described {
     pub(crate) changes: Vec<Vec<(Way, Vec<usize>)>>,
     /// Ids of the chosen effects.
     pub(crate) names: Vec<&'static str>,
+    /// Whether each turns whole frames.
+    pub(crate) turns: Vec<bool>,
     /// What having looked for each chosen effect costs, nats ([`costs`]).
     pub(crate) paid: Vec<f64>,
 }
@@ -100,6 +102,8 @@ impl Described {
         };
         let n = chosen.len();
         let names = only.candidates.iter().map(|c| c.id()).collect();
+        let turns = only.candidates.iter().map(|c| c.acts_on_attitude());
+        let turns = turns.collect();
         let groups = &found.fitted.groups;
         let costs = costs(groups, &vec![true; groups.len()]);
         let paid = chosen.iter().map(|&g| costs[g].ln()).collect();
@@ -147,6 +151,7 @@ impl Described {
             terms,
             changes,
             names,
+            turns,
             paid,
         })
     }

@@ -10,8 +10,8 @@
 //! worth(set) = (L(rest + set) - L(rest)) / m - k/2 ln n - ln c     L: log-likelihood out of fold
 //! ```
 //!
-//! with m how many times white noise makes the gain of the set too large (shared noise of the
-//! reference makes likelihoods of whatever turns frames too large), and a set that a
+//! with m how many times white noise makes the gain of a set too large that turns whole frames
+//! (noise of the reference is theirs, too), and a set that a
 //! description beats by far is not named: it is said what the leftover follows. A term holds
 //! the effects that act through its variable as special cases with more parameters, so that it
 //! does not beat an effect that does act. Both pay for their k columns and for the c among which
@@ -65,8 +65,12 @@ pub(crate) fn stand_ins(described: &Described) -> Option<(Vec<usize>, Vec<Part>)
     most
 }
 
-/// How many times white noise makes the gain of `set` beside `rest` too large, at least 1.
+/// How many times white noise makes the gain of `set` beside `rest` too large, at least 1: where it
+/// turns whole frames.
 fn too_large(described: &Described, set: &[usize], rest: &[usize]) -> Option<f64> {
+    if !set.iter().all(|&k| described.turns[k]) {
+        return Some(1.0);
+    }
     let mut with = rest.to_vec();
     with.extend(columns_of(&described.fitted.groups, set));
     let which: Vec<usize> = (rest.len()..with.len()).collect();
