@@ -82,7 +82,11 @@ impl Slow {
         let share = (self.stars / (1.0 + self.stars)).max(0.0);
         let first = unattributed.depends_on.first();
         let known = first.map_or(0.0, |d| d.variance_explained);
-        let certain = |d: &Dependence| d.p_value < self.chance() || d.p_value < CERTAIN;
+        // the logarithm of a chance is half a square, and slow noise makes squares larger
+        let certain = |d: &Dependence| {
+            let p = d.p_value.powf(self.inflation().recip());
+            p < self.chance() || p < CERTAIN
+        };
         let surer = !unattributed.depends_on.iter().any(certain) && share > SURER * known;
         let little = share < MOSTLY * known && !surer;
         if self.chance() >= ALPHA || unattributed.present && little {
