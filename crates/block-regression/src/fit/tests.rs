@@ -5,6 +5,7 @@ use crate::gram::Design;
 use rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
+use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 /// One scalar a frame: two nuisance columns, three candidates, one residual.
 struct Table(DMatrix<f64>);
