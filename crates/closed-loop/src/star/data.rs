@@ -34,6 +34,7 @@ use telemetry::WindowTable;
 use spectra::robust;
 
 use crate::evidence::Residuals;
+use crate::motion;
 use crate::star::directions;
 use crate::star::frame_rotation::{rotation_of, rotation_row};
 
@@ -99,7 +100,8 @@ pub(crate) struct StarData {
     pub(crate) free_attitude: bool,
     /// No catalogue: every star's direction is an unknown constant.
     pub(crate) free_directions: bool,
-    /// Star rows that had to be set aside because the reference does not cover them.
+    /// Star rows that had to be set aside because the reference does not cover them, or not enough of
+    /// the time around them.
     pub(crate) outside_reference: usize,
 }
 
@@ -116,8 +118,9 @@ pub(crate) struct Inputs<'a> {
 }
 
 impl StarData {
-    /// Joins measurements, reference and catalogue. Frames outside the
-    /// reference, and frames without a solvable attitude, are set aside.
+    /// Joins measurements, reference and catalogue. Frames outside the reference, frames without a
+    /// solvable attitude, and the few around which the motion is not known though it is elsewhere, are
+    /// set aside.
     pub(crate) fn prepare(inputs: &Inputs<'_>) -> Self {
         let mut stars: Vec<Star> = Vec::new();
         let mut index_of = std::collections::BTreeMap::new();
@@ -137,7 +140,8 @@ impl StarData {
             star.push(index);
         }
         let free_directions = inputs.catalogue.is_none();
-        let (attitude, free_attitude) = Self::solve(inputs, &star, &mut stars, free_directions);
+        let (mut attitude, free_attitude) = Self::solve(inputs, &star, &mut stars, free_directions);
+        set_aside_lost(inputs, &mut attitude);
         let mut data = Self::keep(inputs, &star, stars, &attitude);
         data.free_attitude = free_attitude;
         data.free_directions = free_directions;
@@ -608,5 +612,29 @@ impl StarData {
                 .collect()
         };
         [axis(0, measured.x), axis(1, measured.y)]
+    }
+}
+
+/// Takes the attitude from frames around which it is not known how the tracker moved, where it is
+/// around others: what acts on the motion would seem not to act on them.
+fn set_aside_lost(inputs: &Inputs<'_>, attitude: &mut [Option<UnitQuaternion<f64>>]) {
+    let solved: Vec<usize> = (0..attitude.len())
+        .filter(|&k| attitude[k].is_some())
+        .collect();
+    let t_s: Vec<f64> = solved.iter().map(|&k| inputs.frames.t_s[k]).collect();
+    let own = || {
+        let q = attitude.iter().copied().flatten().collect();
+        AttitudeSeries::new(t_s.clone(), q, None).ok()
+    };
+    let around = match inputs.reference {
+        Some(reference) => Some(motion::around(reference, &t_s)),
+        None => own().map(|own| motion::around(&own, &t_s)),
+    };
+    if let Some(around) = around {
+        for (i, &k) in solved.iter().enumerate() {
+            if around.lost(i) {
+                attitude[k] = None;
+            }
+        }
     }
 }
