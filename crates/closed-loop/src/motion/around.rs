@@ -83,6 +83,15 @@ impl Around {
         around
     }
 
+    /// The same as a camera sees it that is turned against it.
+    pub(crate) fn turned(mut self, turn: &UnitQuaternion<f64>) -> Self {
+        for piece in self.pieces.iter_mut().flatten() {
+            piece.q = turn * piece.q;
+            piece.newton.iter_mut().for_each(|phi| *phi = turn * *phi);
+        }
+        self
+    }
+
     /// Whether the samples tell how the tracker moved between them.
     pub(crate) fn resolved(&self) -> bool {
         self.resolved

@@ -151,7 +151,7 @@ fn explain(
         None => data.own_motion(),
     };
     let known = situation.reference.as_ref().or(own.as_ref());
-    let around = known.map(|series| motion::around(series, &data.frames.t_s));
+    let around = known.map(|series| motion::around(series, &data.frames.t_s).turned(&data.turn()));
     let motion = around.as_ref();
     data.follow(source(motion));
     let data = &*data;
