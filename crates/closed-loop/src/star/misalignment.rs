@@ -102,6 +102,7 @@ impl AttitudeSource for Turned<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::motion::Around;
     use crate::star::data::{Inputs, Star};
     use centroid::CentroidError;
     use effects::{ParameterValue, Parameters, Surroundings};
@@ -168,7 +169,7 @@ mod tests {
                 effects: &effects,
             })
         };
-        let (mut data, truth) = (data(&askew), data(&straight));
+        let (mut data, mut truth) = (data(&askew), data(&straight));
         // on the way, and back from too far
         for almost in [theta * 0.9, theta * 1.3, theta] {
             assert!(data.project_through(almost, 1e-4, &askew, &effects));
@@ -186,6 +187,19 @@ mod tests {
                 assert!(off.abs() < 1e-9, "row {row}: {off} px");
                 let left = residual[axis][row] - shift[axis][row] - bare[axis][row];
                 assert!(left.abs() < 1e-6, "row {row}: {left} arcsec");
+            }
+        }
+        // and move as they do
+        let t_s = data.frames.t_s.clone();
+        data.follow(Some(&Around::new(&askew, &t_s, true).turned(&data.turn())));
+        truth.follow(Some(&Around::new(&straight, &t_s, true)));
+        for axis in 0..2 {
+            for row in 0..data.t_s.len() {
+                let (v, its) = (data.velocity[axis][row], truth.velocity[axis][row]);
+                assert!(
+                    (v - its).abs() < 1e-6 * (1.0 + its.abs()),
+                    "row {row}: {v} {its} px/s"
+                );
             }
         }
         assert!(shift[0].iter().any(|s| s.abs() > 900.0));
