@@ -364,6 +364,11 @@ impl Fits {
         })
     }
 
+    /// The same data where the noise that the priors are weighed against has another `variance`.
+    pub fn reweighed(&self, folds: &Folds, variance: f64) -> Option<Self> {
+        Self::new(&self.grams, folds, &self.layout, variance)
+    }
+
     /// Noise variance of a scalar where no candidate is in the model, from a first guess.
     pub fn noise_alone(sums: &FoldSums, layout: &Layout, guess: f64) -> Option<f64> {
         let (gram, scalars) = &sums.all;

@@ -13,7 +13,7 @@
 //!
 //! against the step `q_{k+1} - q_k`: for white noise of variance s^2 they have
 //! variances (1 + 34/36) s^2 and 2 s^2, so nearly alike; for a resolved motion the
-//! error is of fourth order in the step.
+//! error is of fourth order in the step. Samples on both sides of a hole predict nothing.
 //!
 //! Source: Lagrange interpolation; the errors-in-variables trap of regression.
 
@@ -21,18 +21,23 @@ mod around;
 
 pub(crate) use around::Around;
 
-use focal_plane::{AttitudeSource, rotation_vector};
+use focal_plane::{AttitudeSeries, AttitudeSource, rotation_vector};
 use nalgebra::{UnitQuaternion, Vector3};
-
-use crate::situation::Situation;
+use spectra::robust::median_step;
 
 /// Largest ratio of prediction error to step at which the motion is resolved.
 const RESOLVED: f64 = 0.3;
+/// A longer step than this many medians is a hole.
+const HOLE_STEPS: f64 = 1.9;
 
 /// Whether a series of attitudes tells how the tracker moved between them.
-pub(crate) fn resolved(q: &[UnitQuaternion<f64>]) -> bool {
+fn resolved(t_s: &[f64], q: &[UnitQuaternion<f64>]) -> bool {
+    let longest = HOLE_STEPS * median_step(t_s).unwrap_or(f64::INFINITY);
     let (mut error, mut step, mut count) = (0.0, 0.0, 0_u32);
-    for w in q.windows(5) {
+    for (t, w) in t_s.windows(5).zip(q.windows(5)) {
+        if t.windows(2).any(|pair| pair[1] - pair[0] > longest) {
+            continue;
+        }
         let [a, b, d, e]: [Vector3<f64>; 4] = [0, 1, 3, 4].map(|k| rotation_vector(&w[k], &w[2]));
         let predicted = (4.0 * (b + d) - a - e) / 6.0;
         error += predicted.norm_squared();
@@ -42,20 +47,17 @@ pub(crate) fn resolved(q: &[UnitQuaternion<f64>]) -> bool {
     count > 0 && error <= RESOLVED * RESOLVED * step
 }
 
-/// The reference as a motion around each frame, where its samples resolve one.
-pub(crate) fn resolved_motion(
-    situation: &Situation<'_>,
-    t_s: &[f64],
-) -> Option<Box<dyn AttitudeSource>> {
-    let reference = situation.reference.as_ref()?;
-    // Rates that were measured do not come from differences.
-    let known = situation
-        .bundle
-        .reference
-        .as_ref()
-        .is_some_and(|r| r.rates_rad_s.is_some());
-    (known || resolved(reference.quaternions()))
-        .then(|| Box::new(Around::new(reference, t_s)) as Box<dyn AttitudeSource>)
+/// A series as a motion around each frame, as far as its samples resolve one; rates that were
+/// measured do not come from differences.
+pub(crate) fn around(series: &AttitudeSeries, t_s: &[f64]) -> Around {
+    let known = series.given_rates_rad_s().is_some();
+    let resolved = known || resolved(series.t_s(), series.quaternions());
+    Around::new(series, t_s, resolved)
+}
+
+/// The motion as effects see it.
+pub(crate) fn source(around: Option<&Around>) -> Option<&dyn AttitudeSource> {
+    around.map(|a| a as &dyn AttitudeSource)
 }
 
 #[cfg(test)]
@@ -65,6 +67,10 @@ mod tests {
     use rand_core::SeedableRng;
     use rand_distr::{Distribution, StandardNormal};
     use rand_xoshiro::Xoshiro256PlusPlus;
+
+    fn time() -> Vec<f64> {
+        (0..500).map(|k| f64::from(k) * 0.5).collect()
+    }
 
     fn series(noise: f64) -> Vec<UnitQuaternion<f64>> {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(4);
@@ -80,7 +86,22 @@ mod tests {
 
     #[test]
     fn a_smooth_path_is_resolved_and_noise_is_not() {
-        assert!(resolved(&series(1e-6)));
-        assert!(!resolved(&series(1e-3)));
+        assert!(resolved(&time(), &series(1e-6)));
+        assert!(!resolved(&time(), &series(1e-3)));
+    }
+
+    /// A path of 3e-5 rad a step, and holes across which it turns by up to 1e-2.
+    #[test]
+    fn holes_say_nothing_of_the_motion_between_samples() {
+        let kept = |k: usize| !(100..220).contains(&k) && !(300..420).contains(&k);
+        let of = |noise: f64| {
+            let q = series(noise);
+            let rows = (0..q.len()).filter(|&k| kept(k));
+            rows.map(|k| (time()[k], q[k])).unzip()
+        };
+        let (t_s, q): (Vec<f64>, Vec<_>) = of(1e-6);
+        assert!(resolved(&t_s, &q));
+        let (t_s, q): (Vec<f64>, Vec<_>) = of(1e-3);
+        assert!(!resolved(&t_s, &q));
     }
 }

@@ -207,7 +207,7 @@ pub(crate) fn claim(
     };
     let outliers = declared_outliers(situation)?;
     let make = |belief: &dyn Fn(&Row) -> [f64; 2]| source.rows(belief);
-    let Some(verdicts) = judge(&make, folds, level.motion.is_some(), outliers) else {
+    let Some(verdicts) = judge(&make, folds, level.resolved, outliers) else {
         return Ok(NoiseEffects::default());
     };
     let mut verdicts = verdicts;
@@ -218,7 +218,7 @@ pub(crate) fn claim(
             ..source
         };
         let make = |belief: &dyn Fn(&Row) -> [f64; 2]| source.rows(belief);
-        if let Some(fast) = judge(&make, folds, level.motion.is_some(), outliers) {
+        if let Some(fast) = judge(&make, folds, level.resolved, outliers) {
             let magnitude = &fast.magnitude;
             verdicts.magnitude.stands &= verdicts.magnitude.agrees(magnitude, SLOPE_AS_DECLARED);
             verdicts.rate.stands &= verdicts.rate.agrees(&fast.rate, 0.0);

@@ -31,6 +31,10 @@ const ROUNDS: usize = 4;
 /// Columns at an estimate that differ from those it was found with by less than this, in
 /// squared sigmas over all data, are the same: no amplitude moves by a tenth of its sigma.
 const SAME: f64 = 0.01;
+/// Noise beside what was chosen that is this much less than the noise which priors were weighed against
+/// asks for another fit: what a large effect adds would squeeze the declared unknowns, and what these may
+/// not be any more shows up as other effects.
+const LOUDER: f64 = 1.5;
 
 /// Fits of one list of candidates, with the groups that selection moves.
 #[derive(Debug)]
@@ -39,9 +43,39 @@ pub(crate) struct Fitted {
     pub(crate) groups: Vec<Group>,
     /// Independent scalars in the data.
     pub(crate) scalars: f64,
+    /// Noise variance that the priors are weighed against.
+    variance: f64,
     /// What the log-likelihood of the scalars lacks to that of the measurements in
     /// arcsec, nats.
     pub(crate) log_scale: f64,
+}
+
+impl Fitted {
+    /// Noise variance beside `chosen`.
+    pub(crate) fn variance_beside(&self, chosen: &[usize]) -> Option<f64> {
+        self.fits.variance(&columns_of(&self.groups, chosen))
+    }
+
+    /// The same with priors weighed against the noise beside `chosen`, where that is much less.
+    pub(crate) fn beside(
+        self,
+        folds: &Folds,
+        candidates: &[&dyn Candidate],
+        chosen: &[usize],
+    ) -> Result<Self, CloseError> {
+        let left = self.variance_beside(chosen);
+        let Some(variance) = left.filter(|v| *v > 0.0 && LOUDER * v < self.variance) else {
+            return Ok(self);
+        };
+        let fits = self.fits.reweighed(folds, variance);
+        let fits = fits.ok_or(CloseError::Singular)?;
+        Ok(Self {
+            groups: grouped(&fits, candidates),
+            fits,
+            variance,
+            ..self
+        })
+    }
 }
 
 /// Accumulates and eliminates; the noise variance that weighs the priors is
@@ -89,6 +123,17 @@ pub(crate) fn fit_grams(
         .max(f64::MIN_POSITIVE);
     let fits = Fits::of(grams, &sums, folds, &layout, variance).ok_or(CloseError::Singular)?;
     let (_, scalars) = sums.all;
+    Ok(Fitted {
+        groups: grouped(&fits, candidates),
+        fits,
+        scalars,
+        variance,
+        log_scale: grams.log_scale,
+    })
+}
+
+/// The columns that the data shows, candidate by candidate.
+fn grouped(fits: &Fits, candidates: &[&dyn Candidate]) -> Vec<Group> {
     let mut groups = Vec::new();
     let mut column = 0;
     for candidate in candidates {
@@ -108,12 +153,7 @@ pub(crate) fn fit_grams(
         });
         column += p;
     }
-    Ok(Fitted {
-        fits,
-        groups,
-        scalars,
-        log_scale: grams.log_scale,
-    })
+    groups
 }
 
 /// Sizes of a coefficient that are still credible.
@@ -204,7 +244,7 @@ pub(crate) fn search(
             Some(fitted) => fitted,
             None => fit(evidence, folds, &borrowed(&candidates))?,
         };
-        let selection = select(&fitted.fits, &fitted.groups, may, fitted.scalars);
+        let (fitted, selection) = chosen_from(fitted, folds, &candidates, may)?;
         let settled = selection.chosen == before || round == ROUNDS;
         if selection.chosen.is_empty() || settled {
             return Ok(Found {
@@ -224,6 +264,22 @@ pub(crate) fn search(
         before.clone_from(&selection.chosen);
     }
     Err(CloseError::Singular)
+}
+
+/// Selects, and again where what was chosen leaves much less noise than the priors were weighed against.
+fn chosen_from(
+    fitted: Fitted,
+    folds: &Folds,
+    candidates: &[Box<dyn Candidate>],
+    may: &[bool],
+) -> Result<(Fitted, Selection), CloseError> {
+    let select = |f: &Fitted| select(&f.fits, &f.groups, may, f.scalars);
+    let selection = select(&fitted);
+    let loud = fitted.variance;
+    let fitted = fitted.beside(folds, &borrowed(candidates), &selection.chosen)?;
+    let again = fitted.variance < loud;
+    let selection = if again { select(&fitted) } else { selection };
+    Ok((fitted, selection))
 }
 
 /// The candidates as the pipeline borrows them.

@@ -4,6 +4,7 @@
 //! run             the order of the steps, from bundle to report
 //! data            centroids beside what the declared model says of them
 //! directions      directions and attitudes from the centroids alone, where nothing else tells them
+//! misalignment    the rotation between camera and reference, taken exactly
 //! frame_rotation  the rotation that the stars of a frame agree on
 //! nuisance        what the declared model leaves unknown, as columns with priors
 //! weights         how much each star counts
@@ -22,6 +23,7 @@ pub(crate) mod data;
 mod directions;
 pub(crate) mod evidence;
 pub(crate) mod frame_rotation;
+mod misalignment;
 mod moments;
 pub(crate) mod nuisance;
 mod own_attitude;

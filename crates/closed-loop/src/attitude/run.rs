@@ -14,7 +14,7 @@ use crate::declared;
 use crate::error::CloseError;
 use crate::evidence::{Amplitudes, Evidence, Residuals};
 use crate::figures;
-use crate::motion::resolved_motion;
+use crate::motion::{self, Around};
 use crate::questions::confusion;
 use crate::questions::hypothesis::{self, Grounds};
 use crate::questions::manoeuvre::attitudes::fly;
@@ -24,7 +24,6 @@ use crate::search::selection::columns_of;
 use crate::search::{Found, amplitudes, borrowed, fit};
 use crate::situation::{Situation, channels_of_interest};
 use crate::unexplained::leftover;
-use focal_plane::AttitudeSource;
 use nalgebra::{DVector, UnitQuaternion};
 use spectra::robust::{self, median_step};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -65,9 +64,8 @@ pub(crate) fn run(
         data.subtract(effect.as_ref());
     }
     let folds = Folds::cut(data.t_s.len());
-    let around = resolved_motion(situation, &data.t_s);
-    let motion = around.as_deref();
-    if motion.is_none() {
+    let motion = &motion::around(reference, &data.t_s);
+    if !motion.resolved() {
         data.rate = std::array::from_fn(|_| vec![0.0; data.t_s.len()]);
     }
     progress("residuals of the declared model");
@@ -122,7 +120,7 @@ fn settle(
     data: &mut AttitudeData,
     situation: &Situation<'_>,
     folds: &Folds,
-    motion: Option<&dyn AttitudeSource>,
+    motion: &Around,
 ) -> Result<Residuals, CloseError> {
     let white = [Coloured::WHITE; 3];
     loop {
@@ -147,7 +145,7 @@ fn evidence<'a>(
     data: &'a AttitudeData,
     situation: &Situation<'_>,
     noise: [Coloured; 3],
-    motion: Option<&'a dyn AttitudeSource>,
+    motion: &'a Around,
 ) -> AttitudeEvidence<'a> {
     AttitudeEvidence {
         data,
@@ -159,7 +157,7 @@ fn evidence<'a>(
                 b.map(|s| if s > 0.0 { s } else { f64::INFINITY })
             }),
         noise,
-        motion,
+        motion: Some(motion),
     }
 }
 
@@ -344,7 +342,7 @@ fn finish(
     data: &AttitudeData,
     folds: &Folds,
     noise: [Coloured; 3],
-    motion: Option<&dyn AttitudeSource>,
+    motion: &Around,
     found: &Found,
     before: Residuals,
     after: Residuals,
@@ -438,7 +436,7 @@ fn finish(
             information: &|c| lengths[c],
             alone: beyond_white(data, &before),
             left: beyond_white(data, &plain),
-            resolved: motion.is_some(),
+            resolved: motion.resolved(),
             effects: &effects,
             considered: &considered,
         },

@@ -34,6 +34,7 @@ use telemetry::WindowTable;
 use spectra::robust;
 
 use crate::evidence::Residuals;
+use crate::motion;
 use crate::star::directions;
 use crate::star::frame_rotation::{rotation_of, rotation_row};
 
@@ -79,6 +80,9 @@ pub(crate) struct StarData {
     pub(crate) log_flux: Vec<f64>,
     /// Middle of the window, a row, px; NaN where unknown.
     pub(crate) window_px: [Vec<f64>; 2],
+    /// Misalignment between reference and camera that the attitudes hold already, arcsec
+    /// ([`crate::star::misalignment`]).
+    pub(crate) misalignment: Vector3<f64>,
     /// Attitude of each frame.
     pub(crate) attitude: Vec<UnitQuaternion<f64>>,
     /// Projected position, px.
@@ -99,7 +103,8 @@ pub(crate) struct StarData {
     pub(crate) free_attitude: bool,
     /// No catalogue: every star's direction is an unknown constant.
     pub(crate) free_directions: bool,
-    /// Star rows that had to be set aside because the reference does not cover them.
+    /// Star rows that had to be set aside because the reference does not cover them, or not enough of
+    /// the time around them.
     pub(crate) outside_reference: usize,
 }
 
@@ -116,8 +121,9 @@ pub(crate) struct Inputs<'a> {
 }
 
 impl StarData {
-    /// Joins measurements, reference and catalogue. Frames outside the
-    /// reference, and frames without a solvable attitude, are set aside.
+    /// Joins measurements, reference and catalogue. Frames outside the reference, frames without a
+    /// solvable attitude, and the few around which the motion is not known though it is elsewhere, are
+    /// set aside.
     pub(crate) fn prepare(inputs: &Inputs<'_>) -> Self {
         let mut stars: Vec<Star> = Vec::new();
         let mut index_of = std::collections::BTreeMap::new();
@@ -137,13 +143,18 @@ impl StarData {
             star.push(index);
         }
         let free_directions = inputs.catalogue.is_none();
-        let (attitude, free_attitude) = Self::solve(inputs, &star, &mut stars, free_directions);
+        let (mut attitude, free_attitude) = Self::solve(inputs, &star, &mut stars, free_directions);
+        set_aside_lost(inputs, &mut attitude);
         let mut data = Self::keep(inputs, &star, stars, &attitude);
         data.free_attitude = free_attitude;
         data.free_directions = free_directions;
-        data.project();
-        data.disturb(inputs.reference, inputs.effects);
-        data.modelled = data.projected.clone();
+        let own = inputs
+            .reference
+            .is_none()
+            .then(|| data.own_motion())
+            .flatten();
+        let motion = inputs.reference.or(own.as_ref());
+        data.place(motion.map(|m| m as &dyn AttitudeSource), inputs.effects);
         data.update_phase(inputs.phase);
         data.log_flux = data.fluxes();
         data
@@ -332,6 +343,7 @@ impl StarData {
             stars,
             star,
             t_s,
+            misalignment: Vector3::zeros(),
             attitude: kept_attitude,
             projected: pair(),
             modelled: pair(),
@@ -343,6 +355,18 @@ impl StarData {
             free_attitude: false,
             free_directions: false,
         }
+    }
+
+    /// Projected positions with what the declared effects do to them along `motion`; modelled ones are
+    /// the same.
+    pub(crate) fn place(
+        &mut self,
+        motion: Option<&dyn AttitudeSource>,
+        effects: &[Arc<dyn Effect>],
+    ) {
+        self.project();
+        self.disturb(motion, effects);
+        self.modelled = self.projected.clone();
     }
 
     /// Projected positions.
@@ -393,12 +417,8 @@ impl StarData {
 
     /// Adds what the declared effects do to the projected positions. Rows whose
     /// exposure leaves the known motion are set aside.
-    fn disturb(&mut self, reference: Option<&AttitudeSeries>, effects: &[Arc<dyn Effect>]) {
-        if effects.is_empty() {
-            return;
-        }
-        let own = self.own_motion();
-        let Some(motion) = reference.or(own.as_ref()) else {
+    fn disturb(&mut self, motion: Option<&dyn AttitudeSource>, effects: &[Arc<dyn Effect>]) {
+        let Some(motion) = motion.filter(|_| !effects.is_empty()) else {
             return;
         };
         let mut tracker = Pbm::new(self.camera.clone());
@@ -481,11 +501,7 @@ impl StarData {
     pub(crate) fn move_modelled(&mut self, residual: &mut Residuals, phase: &CentroidError) -> f64 {
         let scale = self.camera.arcsec_per_px();
         let known = self.phase_error.clone();
-        for axis in 0..2 {
-            for row in 0..self.t_s.len() {
-                self.modelled[axis][row] = self.shifted(axis, row, &residual.modelled);
-            }
-        }
+        self.modelled = self.shifted(&residual.modelled);
         self.update_phase(phase);
         let mut squares = 0.0;
         for axis in 0..2 {
@@ -500,9 +516,17 @@ impl StarData {
         squares
     }
 
-    /// Where this takes a row from its projection, px.
-    fn shifted(&self, axis: usize, row: usize, shift_arcsec: &[Vec<f64>]) -> f64 {
-        self.projected[axis][row] + shift_arcsec[axis][row] / self.camera.arcsec_per_px()[axis]
+    /// Where this takes each row from its projection, px.
+    fn shifted(&self, shift_arcsec: &[Vec<f64>]) -> [Vec<f64>; 2] {
+        let scale = self.camera.arcsec_per_px();
+        let mut out = self.projected.clone();
+        for row in 0..self.t_s.len() {
+            let turned = self.turned_arcsec(row);
+            for axis in 0..2 {
+                out[axis][row] += (shift_arcsec[axis][row] - turned[axis]) / scale[axis];
+            }
+        }
+        out
     }
 
     /// Where the light falls, as far as is known, px.
@@ -544,12 +568,11 @@ impl StarData {
     /// Whether `shift_arcsec`, with the effects that were found, takes the light off from where it was
     /// taken to fall by enough for its pixel phase to be another one.
     pub(crate) fn lands_elsewhere(&self, shift_arcsec: &[Vec<f64>]) -> bool {
-        let known = self.landed();
+        let (known, at) = (self.landed(), self.shifted(shift_arcsec));
         let (mut squares, mut count) = (0.0, 0.0);
         for row in (0..self.t_s.len()).filter(|&r| !self.outlier[r]) {
             for axis in 0..2 {
-                let at = self.shifted(axis, row, shift_arcsec);
-                squares += (at - known[axis][row]).powi(2);
+                squares += (at[axis][row] - known[axis][row]).powi(2);
             }
             count += 2.0;
         }
@@ -567,21 +590,13 @@ impl StarData {
         if self.free_attitude {
             self.turn_frames(shift_arcsec);
         }
-        let rows = 0..self.t_s.len();
-        let moved = |by: &[Vec<f64>]| {
-            [0, 1].map(|axis| {
-                rows.clone()
-                    .map(|row| self.shifted(axis, row, by))
-                    .collect()
-            })
-        };
-        let (modelled, landed) = (moved(fitted_arcsec), moved(shift_arcsec));
+        let (modelled, landed) = (self.shifted(fitted_arcsec), self.shifted(shift_arcsec));
         self.modelled = modelled;
         self.landed = Some(landed);
         self.update_phase(phase);
     }
 
-    fn update_phase(&mut self, phase: &CentroidError) {
+    pub(crate) fn update_phase(&mut self, phase: &CentroidError) {
         let [x, y] = &mut self.phase_error;
         let landed = self.landed.as_ref().unwrap_or(&self.modelled);
         let at = Points {
@@ -598,9 +613,8 @@ impl StarData {
         self.residual_arcsec(self.frames.positions())
     }
 
-    /// The residual of centroids `x_px, y_px` (the measured ones, or others
-    /// formed anew), arcsec.
-    pub(crate) fn residual_arcsec(&self, measured: Points<'_>) -> [Vec<f64>; 2] {
+    /// The same without the misalignment that the projection goes through.
+    pub(crate) fn bare_residual(&self, measured: Points<'_>) -> [Vec<f64>; 2] {
         let scale = self.camera.arcsec_per_px();
         let axis = |i: usize, measured: &[f64]| {
             (0..measured.len())
@@ -608,5 +622,42 @@ impl StarData {
                 .collect()
         };
         [axis(0, measured.x), axis(1, measured.y)]
+    }
+
+    /// The residual of centroids `x_px, y_px` (the measured ones, or others
+    /// formed anew), arcsec.
+    pub(crate) fn residual_arcsec(&self, measured: Points<'_>) -> [Vec<f64>; 2] {
+        let mut out = self.bare_residual(measured);
+        for row in 0..self.t_s.len() {
+            let turned = self.turned_arcsec(row);
+            for axis in 0..2 {
+                out[axis][row] += turned[axis];
+            }
+        }
+        out
+    }
+}
+
+/// Takes the attitude from frames around which it is not known how the tracker moved, where it is
+/// around others: what acts on the motion would seem not to act on them.
+fn set_aside_lost(inputs: &Inputs<'_>, attitude: &mut [Option<UnitQuaternion<f64>>]) {
+    let solved: Vec<usize> = (0..attitude.len())
+        .filter(|&k| attitude[k].is_some())
+        .collect();
+    let t_s: Vec<f64> = solved.iter().map(|&k| inputs.frames.t_s[k]).collect();
+    let own = || {
+        let q = attitude.iter().copied().flatten().collect();
+        AttitudeSeries::new(t_s.clone(), q, None).ok()
+    };
+    let around = match inputs.reference {
+        Some(reference) => Some(motion::around(reference, &t_s)),
+        None => own().map(|own| motion::around(&own, &t_s)),
+    };
+    if let Some(around) = around {
+        for (i, &k) in solved.iter().enumerate() {
+            if around.lost(i) {
+                attitude[k] = None;
+            }
+        }
     }
 }

@@ -17,6 +17,7 @@ use rayon::prelude::*;
 
 use crate::bins::Bins;
 use crate::evidence::{Amplitudes, Evidence, Residuals};
+use crate::motion::{Around, source};
 use crate::situation::Situation;
 use crate::star::columns::{CHUNK_FRAMES, Filled, StarColumns};
 use crate::star::data::StarData;
@@ -33,6 +34,8 @@ pub(crate) struct StarEvidence<'a> {
     /// Residual variants: one, or one a fold and a last one for all data.
     pub(crate) residuals: Arc<Vec<[Vec<f64>; 2]>>,
     pub(crate) motion: Option<&'a dyn AttitudeSource>,
+    /// Whether the motion is known between the samples, not attitudes alone.
+    pub(crate) resolved: bool,
     /// First guess of the noise of a centroid, per axis, arcsec.
     pub(crate) sigma_guess_arcsec: f64,
     /// Noise that the stars of a frame share; `None`: white.
@@ -49,14 +52,15 @@ impl<'a> StarEvidence<'a> {
         data: &'a StarData,
         situation: &Situation<'_>,
         residuals: Vec<[Vec<f64>; 2]>,
-        motion: Option<&'a dyn AttitudeSource>,
+        motion: Option<&'a Around>,
     ) -> Self {
         let temporal = situation.model.noise.temporal_arcsec.filter(|s| *s > 0.0);
         Self {
             data,
             nuisance: StarNuisance::declared(situation.model, data),
             residuals: Arc::new(residuals),
-            motion,
+            motion: source(motion),
+            resolved: motion.is_some_and(Around::resolved),
             // circular to per axis
             sigma_guess_arcsec: temporal.map_or(1.0, |s| s / std::f64::consts::SQRT_2),
             noise: None,

@@ -1,7 +1,8 @@
 //! What the declared model leaves unknown, as columns with priors.
 //!
 //! ```text
-//! misalignment   dx = J(P) theta                    three angles, prior: declared bias, or free
+//! misalignment   dx = J(P) theta                    three angles, prior: declared bias, or free;
+//!                                                   P is projected through theta itself
 //! distortion     dx = sum_jk a_jk (x^j y^k - m_jk)  (j,k) != (0,0), m_jk the mean over the field,
 //!                                                   the same for y; prior N(0, s^2) each
 //! zeros          dx = e, dy = n                     two numbers a star, of centroids formed anew
@@ -19,7 +20,7 @@ use std::ops::Range;
 
 use distortion::{DistortionField, monomial_moment};
 use focal_plane::Pixel;
-use nalgebra::Vector3;
+use nalgebra::{DVector, Vector3};
 use telemetry::Model;
 
 use crate::star::columns::Filled;
@@ -114,6 +115,12 @@ impl StarNuisance {
             self.distortion.map_or(0, |_| self.moments.len() - 1),
             2 * self.directions + 2 * self.zeros.len(),
         )
+    }
+
+    /// The misalignment among the amplitudes of the columns, arcsec.
+    pub(crate) fn misalignment_of(&self, amplitudes: &DVector<f64>) -> Option<Vector3<f64>> {
+        self.misalignment?;
+        Some(amplitudes.fixed_rows::<3>(0).into_owned())
     }
 
     /// Writes the entries of the rows of `frames`, arcsec per arcsec, into zeros.

@@ -57,7 +57,9 @@ pub(crate) fn residuals(
         let Some(&at) = own.get(&data.frames.t_s[k].to_bits()) else {
             continue;
         };
-        let theta = rotation_vector(&table.q[at], &data.attitude[k]) * focal_plane::ARCSEC_PER_RAD;
+        // the shifts hold the whole misalignment, and so does the error against the bare reference
+        let theta = rotation_vector(&table.q[at], &data.attitude[k]) * focal_plane::ARCSEC_PER_RAD
+            + data.misalignment;
         let (Some(b), Some(a)) = (
             rotation_of(data, k, &shift_before),
             rotation_of(data, k, &shift_after),

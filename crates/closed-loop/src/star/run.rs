@@ -9,7 +9,7 @@
 
 use block_regression::Folds;
 use effects::{Scene, StarFacts, StarRows};
-use focal_plane::{AttitudeSource, Points};
+use focal_plane::Points;
 use nalgebra::DVector;
 use spectra::robust::median_step;
 use star_images::Formed;
@@ -25,8 +25,7 @@ use crate::error::CloseError;
 use crate::evidence::{Evidence, Residuals};
 use crate::figures;
 use crate::image_level::{self, ImageLevel, Side};
-use crate::motion::resolved_motion;
-use crate::motion::{self, Around};
+use crate::motion::{self, source};
 use crate::noise_effects;
 use crate::questions::confusion;
 use crate::questions::hypothesis::{self, Grounds};
@@ -147,15 +146,14 @@ fn explain(
     last: bool,
     progress: &dyn Fn(&str),
 ) -> Result<Explained, CloseError> {
-    let around: Option<Box<dyn AttitudeSource>> = match &situation.reference {
-        Some(_) => resolved_motion(situation, &data.frames.t_s),
-        None => data
-            .own_motion()
-            .filter(|_| motion::resolved(&data.attitude))
-            .map(|own| Box::new(Around::new(&own, &data.frames.t_s)) as Box<dyn AttitudeSource>),
+    let own = match &situation.reference {
+        Some(_) => None,
+        None => data.own_motion(),
     };
-    let motion = around.as_deref();
-    data.follow(motion);
+    let known = situation.reference.as_ref().or(own.as_ref());
+    let around = known.map(|series| motion::around(series, &data.frames.t_s).turned(&data.turn()));
+    let motion = around.as_ref();
+    data.follow(source(motion));
     let data = &*data;
     let measured = StarEvidence::new(data, situation, vec![data.measured_residual()], motion);
 
@@ -197,7 +195,7 @@ fn explain(
             bv: s.bv,
         })
         .collect();
-    let rows = data.rows(0..data.t_s.len(), motion);
+    let rows = data.rows(0..data.t_s.len(), source(motion));
     let scene = scene(situation, data, &facts, &rows);
     let image = match &sides {
         Some(sides) => {
@@ -506,7 +504,7 @@ fn finish(f: &Finish<'_>, plain: Residuals) -> Result<Closed, CloseError> {
             information: &|c| fits.information(c),
             alone: remarkable(f, whole),
             left: remarkable(f, last),
-            resolved: f.level.motion.is_some(),
+            resolved: f.level.resolved,
             effects: &effects,
             considered: &considered,
         },

@@ -158,7 +158,7 @@ impl Instead {
             moments: &moments,
             folds,
             precision: white.precision(),
-            variance: found.fitted.fits.variance(&[]).unwrap_or(1.0),
+            variance: found.fitted.variance_beside(chosen).unwrap_or(1.0),
             groups: &found.fitted.groups,
             cost: costs(&found.fitted.groups, may),
             all: None,
@@ -432,14 +432,15 @@ fn coloured<'a>(
                 &borrowed(&candidates),
             )
         };
+        let beside = |fitted: Fitted| fitted.beside(folds, &borrowed(&candidates), &chosen);
         let grams = moments.white_of(&all);
-        let plain = fit_grams(white, &grams, folds, &borrowed(&candidates))?;
-        let filtered = under(&noise)?;
+        let plain = beside(fit_grams(white, &grams, folds, &borrowed(&candidates))?)?;
+        let filtered = beside(under(&noise)?)?;
         let trial = Trial {
             moments: &moments,
             folds,
             precision: white.precision(),
-            variance: plain.fits.variance(&[]).unwrap_or(1.0),
+            variance: plain.variance_beside(&chosen).unwrap_or(1.0),
             groups: &plain.groups,
             cost: costs(&plain.groups, may),
             all: Some(&filtered.fits),
@@ -496,7 +497,7 @@ fn coloured<'a>(
             .into_iter()
             .max_by(|a, b| a.1.total_cmp(&b.1));
         let Some((added, _, its_noise)) = best else {
-            let fitted = under(&noise)?;
+            let fitted = beside(under(&noise)?)?;
             let mut judged = judged(&fitted.fits, &fitted.groups, &chosen, &trial.cost);
             for (&g, judgement) in chosen.iter().zip(stands) {
                 judged[g] = judgement;
@@ -526,6 +527,7 @@ fn coloured<'a>(
         chosen.push(added);
         noise = its_noise;
         let fitted = under(&noise)?;
+        let fitted = fitted.beside(folds, &borrowed(&candidates), &chosen)?;
         let evidence = white.with_noise(&noise);
         if polish(&evidence, folds, &mut candidates, &fitted, &chosen)? {
             polished = true;

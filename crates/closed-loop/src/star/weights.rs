@@ -62,7 +62,8 @@ pub(crate) fn of(data: &StarData) -> Vec<f64> {
 
 /// Sizes of the changes of each star's residual from one frame to the next, arcsec.
 fn changes(data: &StarData) -> Vec<Vec<f64>> {
-    let residual = data.measured_residual();
+    // what a misalignment leaves changes along the motion
+    let residual = data.bare_residual(data.frames.positions());
     let gap = GAP_STEPS * median_step(&data.frames.t_s).unwrap_or(f64::INFINITY);
     let mut last: Vec<Option<usize>> = vec![None; data.stars.len()];
     let mut out = vec![Vec::new(); data.stars.len()];

@@ -1,5 +1,6 @@
 //! The loop on bundles of known truth.
 
+mod gaps;
 mod inputs;
 mod invariances;
 mod kit;

@@ -75,6 +75,19 @@ fn a_time_tag_offset_of_a_pixel_is_no_pixel_phase_error() {
     assert_eq!(report.effects.len(), 1, "{:?}", report.effects);
 }
 
+/// Against the 50 arcsec that such a tag leaves, the declared distortion's prior is a hundred times too
+/// tight: what it may not be is shifts of stars and a lens, unless it is weighed against the noise beside
+/// the tag.
+#[test]
+fn beside_a_large_effect_the_declared_distortion_is_what_it_was() {
+    for seed in [3, 7, 11] {
+        let case = Case::new(Path::Turns, seed).with("time_tag_offset", "offset_s = -0.3");
+        let found = case.close().report.effects;
+        let ids: Vec<&str> = found.iter().map(|e| e.id.as_str()).collect();
+        assert_eq!(ids, ["time_tag_offset"], "seed {seed}");
+    }
+}
+
 #[test]
 fn focal_length_with_a_temperature() {
     let lines = "channel = \"optics_c\"\nppm_per_c = {}";

@@ -106,6 +106,7 @@ impl<'a> Sky<'a> {
             nuisance: StarNuisance::declared(self.model, &data),
             residuals: vec![[none(), none()]].into(),
             motion: Some(flown),
+            resolved: true,
             sigma_guess_arcsec: 1.0,
             noise: None,
             weight: vec![1.0; data.t_s.len()].into(),
