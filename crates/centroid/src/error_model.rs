@@ -5,9 +5,14 @@
 //! ```
 //!
 //! evaluated at the distorted, noise-free position, and the same for y. Unit: that of the
-//! amplitudes given.
+//! amplitudes given. Where the position is known to a variance v (px^2) only, the error to expect is
+//! the mean over it, in which harmonics fade:
 //!
-//! Source: [M23] Eq. 9 to 11, Step 3.
+//! ```text
+//! E sin(k phi) = exp(-2 pi^2 k^2 v) sin(k phi_known)
+//! ```
+//!
+//! Source: [M23] Eq. 9 to 11, Step 3; the characteristic function of a Gaussian.
 
 use focal_plane::{Pixel, Points, PointsMut};
 
@@ -15,6 +20,15 @@ use crate::gaussian_psf::GaussianPsf;
 use crate::harmonics::Harmonics;
 use crate::phase;
 use crate::triangle::{self, Triangle};
+
+/// Nodes and weights of a mean over a normal variable, exact to the ninth power.
+const GAUSS_HERMITE_5: [(f64, f64); 5] = [
+    (-2.856_970_013_872_806, 0.011_257_411_327_720_69),
+    (-1.355_626_179_974_266, 0.222_075_922_005_612_6),
+    (0.0, 0.533_333_333_333_333_3),
+    (1.355_626_179_974_266, 0.222_075_922_005_612_6),
+    (2.856_970_013_872_806, 0.011_257_411_327_720_69),
+];
 
 /// How a centroid differs from the star's place, as a function of its pixel phase.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -59,6 +73,57 @@ impl CentroidError {
     #[inline]
     pub fn error_into(&self, at: Points<'_>, pixel_centre: f64, out: PointsMut<'_>) {
         self.each(at, pixel_centre, out, |_, error| error);
+    }
+
+    /// Errors to expect at positions that are known to these variances, px^2, about `at`; those of
+    /// [`error_into`](Self::error_into) to the last bit where these are 0. The S-curve of a spot is
+    /// averaged over five nodes.
+    ///
+    /// # Panics
+    ///
+    /// If the slices differ in length.
+    ///
+    /// ```
+    /// use centroid::{CentroidError, Harmonic, Harmonics};
+    /// use focal_plane::{Points, PointsMut};
+    ///
+    /// let wave = [Harmonic { amplitude: 2.0, phase_rad: 0.0 }];
+    /// let error = CentroidError::Harmonics(Harmonics::new(&wave, &wave));
+    /// let (mut x, mut y) = ([0.0], [0.0]);
+    /// let at = Points { x: &[0.25], y: &[0.25] };
+    /// error.mean_error_into(at, [&[0.01], &[0.0]], 0.5, PointsMut { x: &mut x, y: &mut y });
+    /// let faded = (-2.0 * std::f64::consts::PI.powi(2) * 0.01).exp();
+    /// assert!((x[0] - 2.0 * faded).abs() < 1e-14 && (y[0] - 2.0).abs() < 1e-14);
+    /// ```
+    pub fn mean_error_into(
+        &self,
+        at: Points<'_>,
+        variance_px2: [&[f64]; 2],
+        pixel_centre: f64,
+        out: PointsMut<'_>,
+    ) {
+        let n = at.x.len();
+        assert_eq!(at.y.len(), n, "x and y of the positions");
+        assert_eq!(out.x.len(), n, "positions and x of the output");
+        assert_eq!(out.y.len(), n, "positions and y of the output");
+        assert!(variance_px2.iter().all(|v| v.len() == n), "variances");
+        let offset = 0.5 - pixel_centre;
+        for (axis, (at, out)) in [(at.x, out.x), (at.y, out.y)].into_iter().enumerate() {
+            for ((out, p), &v) in out.iter_mut().zip(at).zip(variance_px2[axis]) {
+                let turns = p + offset;
+                *out = match self {
+                    Self::None => turns * 0.0,
+                    Self::Triangle(t) => t.peak[axis] * triangle::mean_wave(turns, v),
+                    Self::Harmonics(s) => s.mean_value(axis, turns, v),
+                    Self::GaussianPsf(g) if v > 0.0 => {
+                        let at = |node: f64| g.value(axis, turns + node * v.sqrt());
+                        let nodes = GAUSS_HERMITE_5.into_iter();
+                        nodes.map(|(node, weight)| weight * at(node)).sum()
+                    }
+                    Self::GaussianPsf(g) => g.value(axis, turns),
+                };
+            }
+        }
     }
 
     /// Measured positions: `at` plus the errors, which must be in px.

@@ -9,6 +9,8 @@
 //!
 //! Source: generalises [M23] Eq. 10; Clenshaw, Math. Tables Aids Comput. 9 (1955) 118.
 
+use std::f64::consts::PI;
+
 use crate::phase;
 
 /// One term of the series; its order is its place in the list, from 1.
@@ -86,11 +88,27 @@ impl Harmonics {
         }
         c1 * cos - c2 + s1 * sin
     }
+
+    /// Its mean over a position that is known to a variance, px^2.
+    pub(crate) fn mean_value(&self, axis: usize, turns: f64, variance_px2: f64) -> f64 {
+        if variance_px2 <= 0.0 {
+            return self.value(axis, turns);
+        }
+        let each = (-2.0 * PI * PI * variance_px2).exp();
+        let (mut sum, mut faded, mut ratio) = (0.0, each, each.powi(3));
+        for (k, [c, s]) in (1..).zip(&self.waves[axis]) {
+            let (sin, cos) = phase::sin_cos_turns(f64::from(k) * turns);
+            sum += faded * (c * cos + s * sin);
+            faded *= ratio;
+            ratio *= each * each;
+        }
+        sum
+    }
 }
 
 #[cfg(test)]
 mod tests {
-    use std::f64::consts::{PI, TAU};
+    use std::f64::consts::TAU;
 
     use super::*;
 

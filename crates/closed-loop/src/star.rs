@@ -6,6 +6,7 @@
 //! directions      directions and attitudes from the centroids alone, where nothing else tells them
 //! misalignment    the rotation between camera and reference, taken exactly
 //! frame_rotation  the rotation that the stars of a frame agree on
+//! light           where the light of each star fell, better than its reference says
 //! nuisance        what the declared model leaves unknown, as columns with priors
 //! weights         how much each star counts
 //! columns         all columns of a fit, row by row
@@ -23,6 +24,7 @@ pub(crate) mod data;
 mod directions;
 pub(crate) mod evidence;
 pub(crate) mod frame_rotation;
+mod light;
 mod misalignment;
 mod moments;
 pub(crate) mod nuisance;

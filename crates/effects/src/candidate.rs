@@ -38,6 +38,8 @@ pub struct StarRows<'a> {
     /// Where the light falls, x then y: the modelled position with all that effects shift it by, as far
     /// as that is known, px. What acts on the centroid is evaluated there.
     pub landed_px: [&'a [f64]; 2],
+    /// How well that is known: variance of x and of y, px^2.
+    pub landed_variance_px2: [&'a [f64]; 2],
     /// Velocity of the modelled x, px/s.
     pub vx_px_s: &'a [f64],
     /// Velocity of the modelled y, px/s.

@@ -257,6 +257,7 @@ impl Bench {
             x_px: &now[..n],
             y_px: &now[n..],
             landed_px: [&now[..n], &now[n..]],
+            landed_variance_px2: [&vec![0.0; n], &vec![0.0; n]],
             vx_px_s: &v[..n],
             vy_px_s: &v[n..],
             ax_px_s2: &a[..n],

@@ -7,8 +7,14 @@
 //! and the same in y, arcsec at the centre's scale, beside the declared centroid error and evaluated
 //! at the same distorted, noise-free position. As regressors the sine and the cosine of each order are
 //! two coefficients (amplitude cos phase, amplitude sin phase); amplitude and phase are reported.
+//! Where the position is known to a variance v (px^2) only, as from the noisy centroids themselves,
+//! the columns are what is to be expected of the waves there, exp(-2 pi^2 k^2 v) of them: without
+//! that an amplitude would come out smaller by as much.
 //!
-//! Source: \[M23\] Eq. 9-11, Step 3, with another periodic function in place of the triangle.
+//! Source: \[M23\] Eq. 9-11, Step 3, with another periodic function in place of the triangle; the
+//! characteristic function of a Gaussian.
+
+use core::f64::consts::PI;
 
 use focal_plane::Camera;
 use star_tracker::{Stages, StarView};
@@ -21,6 +27,9 @@ use crate::{
 };
 
 const ID: &str = "pixel_phase_harmonics";
+
+/// A wave of which less than this is left cannot be seen at all.
+const FADED: f64 = 0.01;
 
 /// Highest order.
 const ORDERS: u32 = 4;
@@ -176,6 +185,21 @@ impl Shift for Phase {
             terms[1] = [cos_x / scale_x, 0.0];
             terms[2] = [0.0, sin_y / scale_y];
             terms[3] = [0.0, cos_y / scale_y];
+        }
+    }
+    fn average(&self, variance_px2: [f64; 2], terms: &mut [[f64; 2]]) {
+        if variance_px2 == [0.0; 2] {
+            return;
+        }
+        for (terms, &k) in terms.chunks_exact_mut(4).zip(&self.orders) {
+            let order = f64::from(k);
+            let faded = variance_px2
+                .map(|v| (-2.0 * (PI * order).powi(2) * v).exp())
+                .map(|f| if f < FADED { 0.0 } else { f });
+            for term in terms {
+                term[0] *= faded[0];
+                term[1] *= faded[1];
+            }
         }
     }
     fn parameters(&self, values: &[f64]) -> Vec<Parameter> {

@@ -44,6 +44,11 @@ pub(crate) trait Shift: Clone + Debug + Send + Sync + 'static {
     }
     /// Shift per unit of each coefficient, px.
     fn terms(&self, star: &StarView, out: &mut [[f64; 2]]);
+    /// Makes `terms` at a position what is to be expected of them where it is known to these
+    /// variances of x and of y, px^2.
+    fn average(&self, variance_px2: [f64; 2], terms: &mut [[f64; 2]]) {
+        let _ = (variance_px2, terms);
+    }
     /// Reported parameters of these values.
     fn parameters(&self, values: &[f64]) -> Vec<Parameter> {
         self.coefficients()
@@ -163,6 +168,10 @@ impl<S: Shift> Candidate for ShiftCandidate<S> {
                 continue;
             }
             self.shift.terms(&star, &mut terms[..p]);
+            if centroid {
+                let variance = rows.landed_variance_px2.map(|v| v[i]);
+                self.shift.average(variance, &mut terms[..p]);
+            }
             for (j, term) in terms[..p].iter().enumerate() {
                 out.x[j * n + i] = term[0];
                 out.y[j * n + i] = term[1];

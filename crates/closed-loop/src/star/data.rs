@@ -37,6 +37,7 @@ use crate::evidence::Residuals;
 use crate::motion;
 use crate::star::directions;
 use crate::star::frame_rotation::{rotation_of, rotation_row};
+use crate::star::light::Light;
 
 /// A star with fewer rows has no scatter of its own: the median deviation of so many
 /// is uncertain by a quarter.
@@ -89,8 +90,12 @@ pub(crate) struct StarData {
     pub(crate) projected: [Vec<f64>; 2],
     /// Modelled position, px: where regressors are evaluated.
     pub(crate) modelled: [Vec<f64>; 2],
-    /// Where the light falls, px, where effects that were found shift it by much.
-    landed: Option<[Vec<f64>; 2]>,
+    /// Where effects that were found take the light, px, where that is far.
+    carried: Option<[Vec<f64>; 2]>,
+    /// How far beside it the light falls, [`crate::star::light`].
+    light: Light,
+    /// Where the light falls, as far as is known, px.
+    landed: [Vec<f64>; 2],
     /// Velocity and acceleration of the image, px/s and px/s^2; zero where the
     /// motion is not known.
     pub(crate) velocity: [Vec<f64>; 2],
@@ -347,7 +352,9 @@ impl StarData {
             attitude: kept_attitude,
             projected: pair(),
             modelled: pair(),
-            landed: None,
+            carried: None,
+            light: Light::as_modelled(n),
+            landed: pair(),
             velocity: pair(),
             acceleration: pair(),
             phase_error: pair(),
@@ -466,17 +473,21 @@ impl StarData {
             .map_or([f64::NAN; 2], |p| [p.x, p.y])
     }
 
+    /// The measured residual less `shift`, arcsec.
+    fn left(&self, shift: &[Vec<f64>]) -> [Vec<f64>; 2] {
+        let mut left = self.measured_residual();
+        for (left, shift) in left.iter_mut().zip(shift) {
+            left.iter_mut().zip(shift).for_each(|(l, s)| *l -= s);
+        }
+        left
+    }
+
     /// Turns each frame's own attitude by what its stars still agree on, once `shift` (arcsec,
     /// what the fitted unknowns move each row by) is out. The first attitudes know neither the
     /// unknowns nor the declared effects: under a lens that bends by pixels they are off by
     /// pixels, and with them every phase.
     pub(crate) fn turn_frames(&mut self, shift: &[Vec<f64>]) {
-        let measured = self.measured_residual();
-        let left: Vec<Vec<f64>> = measured
-            .iter()
-            .zip(shift)
-            .map(|(m, s)| m.iter().zip(s).map(|(m, s)| m - s).collect())
-            .collect();
+        let left = self.left(shift);
         let scale = self.camera.arcsec_per_px();
         for frame in 0..self.frames.frames() {
             let Some(theta) = rotation_of(self, frame, &left) else {
@@ -496,11 +507,13 @@ impl StarData {
     }
 
     /// Moves the modelled positions to projection + what `residual` was modelled by (the fitted
-    /// misalignment, distortion and directions), and evaluates the declared centroid error there.
+    /// misalignment, distortion and directions), and evaluates the declared centroid error where the
+    /// light fell.
     /// Takes its change out of `residual`; returns the sum of its squares, arcsec^2.
     pub(crate) fn move_modelled(&mut self, residual: &mut Residuals, phase: &CentroidError) -> f64 {
         let scale = self.camera.arcsec_per_px();
         let known = self.phase_error.clone();
+        self.light = Light::of(self, [&residual.axes[0], &residual.axes[1]]);
         self.modelled = self.shifted(&residual.modelled);
         self.update_phase(phase);
         let mut squares = 0.0;
@@ -531,8 +544,7 @@ impl StarData {
 
     /// Where the light falls, as far as is known, px.
     pub(crate) fn landed(&self) -> [&[f64]; 2] {
-        let at = self.landed.as_ref().unwrap_or(&self.modelled);
-        at.each_ref().map(Vec::as_slice)
+        self.landed.each_ref().map(Vec::as_slice)
     }
 
     /// Some rows, as candidates see them.
@@ -546,6 +558,7 @@ impl StarData {
             x_px: &self.modelled[0][rows.clone()],
             y_px: &self.modelled[1][rows.clone()],
             landed_px: self.landed().map(|p| &p[rows.clone()]),
+            landed_variance_px2: self.light.variance_px2.each_ref().map(|v| &v[rows.clone()]),
             vx_px_s: &self.velocity[0][rows.clone()],
             vy_px_s: &self.velocity[1][rows.clone()],
             ax_px_s2: &self.acceleration[0][rows.clone()],
@@ -562,13 +575,15 @@ impl StarData {
 
     /// Takes the light to fall where it is modelled.
     pub(crate) fn lands_as_modelled(&mut self) {
-        self.landed = None;
+        self.carried = None;
+        self.light = Light::as_modelled(self.t_s.len());
     }
 
     /// Whether `shift_arcsec`, with the effects that were found, takes the light off from where it was
     /// taken to fall by enough for its pixel phase to be another one.
     pub(crate) fn lands_elsewhere(&self, shift_arcsec: &[Vec<f64>]) -> bool {
-        let (known, at) = (self.landed(), self.shifted(shift_arcsec));
+        let known = self.carried.as_ref().unwrap_or(&self.modelled);
+        let at = self.shifted(shift_arcsec);
         let (mut squares, mut count) = (0.0, 0.0);
         for row in (0..self.t_s.len()).filter(|&r| !self.outlier[r]) {
             for axis in 0..2 {
@@ -590,22 +605,29 @@ impl StarData {
         if self.free_attitude {
             self.turn_frames(shift_arcsec);
         }
-        let (modelled, landed) = (self.shifted(fitted_arcsec), self.shifted(shift_arcsec));
+        let (modelled, carried) = (self.shifted(fitted_arcsec), self.shifted(shift_arcsec));
         self.modelled = modelled;
-        self.landed = Some(landed);
+        self.carried = Some(carried);
+        let left = self.left(shift_arcsec);
+        self.light = Light::of(self, left.each_ref().map(Vec::as_slice));
         self.update_phase(phase);
     }
 
     pub(crate) fn update_phase(&mut self, phase: &CentroidError) {
+        let from = self.carried.as_ref().unwrap_or(&self.modelled);
+        self.landed = std::array::from_fn(|axis| {
+            let beside = &self.light.beside_px[axis];
+            from[axis].iter().zip(beside).map(|(p, b)| p + b).collect()
+        });
         let [x, y] = &mut self.phase_error;
-        let landed = self.landed.as_ref().unwrap_or(&self.modelled);
         let at = Points {
-            x: &landed[0],
-            y: &landed[1],
+            x: &self.landed[0],
+            y: &self.landed[1],
         };
+        let variance = self.light.variance_px2.each_ref().map(Vec::as_slice);
         phase
             .scaled(self.camera.arcsec_per_px().map(|s| 1.0 / s))
-            .error_into(at, self.camera.pixel_centre(), PointsMut { x, y });
+            .mean_error_into(at, variance, self.camera.pixel_centre(), PointsMut { x, y });
     }
 
     /// The residual of the measured centroids, arcsec.

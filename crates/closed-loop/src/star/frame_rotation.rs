@@ -4,10 +4,18 @@
 //! theta = (A^T A)^-1 A^T r        A: columns of a small rotation, arcsec per arcsec
 //! ```
 //!
-//! Source: linearised least squares of the projection ([M23] Fig. 4).
+//! Of stars with noise s/w, in all frames, also what of these rotations is the reference's:
+//!
+//! ```text
+//! theta = C sum w^2 A' r,   C = (sum w^2 A' A)^-1
+//! S     = sum over frames (theta^2 / C - s^2) / sum 1 / C      axis by axis, at least 0
+//! ```
+//!
+//! Source: linearised least squares of the projection ([M23] Fig. 4); moments of a random effect.
 
 use focal_plane::{ARCSEC_PER_RAD, Pixel};
 use nalgebra::{Matrix3, Vector3};
+use rayon::prelude::*;
 
 use crate::star::data::StarData;
 
@@ -57,4 +65,84 @@ pub(crate) fn rotation_of(
         }
     }
     Some(inverse * moment)
+}
+
+/// What the stars of one frame say of its rotation.
+pub(crate) struct Turn {
+    /// Sums of w^2 A' A and of w^2 A' r over the rows that count.
+    pub(crate) normal: Matrix3<f64>,
+    pub(crate) moment: Vector3<f64>,
+    /// The rotation, and its variances where a row of weight 1 has variance 1.
+    pub(crate) theta: Vector3<f64>,
+    pub(crate) variance: Vector3<f64>,
+    /// Weighted squares that it leaves, and their degrees of freedom.
+    squares: f64,
+    freedom: f64,
+}
+
+/// What the stars of all frames say.
+pub(crate) struct Turns {
+    /// `None` for a frame whose rotation they do not tell.
+    pub(crate) frames: Vec<Option<Turn>>,
+    /// Variance of a row of weight 1, arcsec^2.
+    pub(crate) noise: f64,
+    /// Variance of the rotations beyond that of the stars: the reference's, arcsec^2.
+    pub(crate) reference: [f64; 3],
+}
+
+impl Turns {
+    /// Of `residual` by rows of `weight`; rows that are outliers or not finite do not count.
+    pub(crate) fn of(data: &StarData, residual: [&[f64]; 2], weight: &[f64]) -> Self {
+        let frames: Vec<Option<Turn>> = (0..data.frames.frames())
+            .into_par_iter()
+            .map(|k| Turn::of(data, k, residual, weight))
+            .collect();
+        let known = || frames.iter().flatten();
+        let freedom: f64 = known().map(|t| t.freedom).sum();
+        let noise = known().map(|t| t.squares).sum::<f64>() / freedom.max(1.0);
+        let reference: [f64; 3] = std::array::from_fn(|a| {
+            let beyond: f64 = known()
+                .map(|t| t.theta[a].powi(2) / t.variance[a] - noise)
+                .sum();
+            let information: f64 = known().map(|t| t.variance[a].recip()).sum();
+            (beyond / information).max(0.0)
+        });
+        Self {
+            frames,
+            noise,
+            reference,
+        }
+    }
+}
+
+/// Whether a row says anything of its frame's rotation.
+pub(crate) fn counts(data: &StarData, residual: [&[f64]; 2], row: usize) -> bool {
+    !data.outlier[row] && residual.iter().all(|axis| axis[row].is_finite())
+}
+
+impl Turn {
+    fn of(data: &StarData, frame: usize, residual: [&[f64]; 2], weight: &[f64]) -> Option<Self> {
+        let rows = data.frames.rows_of(frame);
+        let (mut normal, mut moment) = (Matrix3::zeros(), Vector3::zeros());
+        let (mut whole, mut count) = (0.0, 0_u32);
+        for r in rows.filter(|&r| counts(data, residual, r)) {
+            let w = weight[r] * weight[r];
+            for (axis, a) in rotation_row(data, r).map(Vector3::from).iter().enumerate() {
+                normal += a * a.transpose() * w;
+                moment += a * (w * residual[axis][r]);
+                whole += w * residual[axis][r].powi(2);
+            }
+            count += 1;
+        }
+        let covariance = normal.try_inverse()?;
+        let theta = covariance * moment;
+        (count > 1).then(|| Self {
+            normal,
+            moment,
+            theta,
+            variance: covariance.diagonal(),
+            squares: whole - theta.dot(&moment),
+            freedom: 2.0 * f64::from(count) - 3.0,
+        })
+    }
 }

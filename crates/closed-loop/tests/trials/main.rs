@@ -4,6 +4,7 @@ mod gaps;
 mod inputs;
 mod invariances;
 mod kit;
+mod light;
 mod noise;
 mod nulls;
 mod patterns;
