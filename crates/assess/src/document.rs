@@ -206,6 +206,7 @@ impl Assessment {
                     needed: None,
                     parameter: None,
                     unit: None,
+                    refused: None,
                 })
                 .collect(),
             hypotheses: Vec::new(),

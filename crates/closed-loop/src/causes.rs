@@ -16,10 +16,12 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use block_regression::Folds;
-use effects::Candidate;
+use effects::{Candidate, Surroundings};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
+use telemetry::report::ConsideredEffect;
 
 use crate::error::CloseError;
+use crate::figures;
 use crate::noise_effects;
 use crate::search::empirical::Empirical;
 use crate::search::selection::{columns_of, costs};
@@ -59,6 +61,8 @@ pub(crate) struct Quest<'a> {
     pub(crate) terms: &'a dyn Fn() -> Vec<Empirical>,
     /// What effects may change with.
     pub(crate) ways: &'a [Way],
+    /// What sizes are told in.
+    pub(crate) surroundings: Surroundings<'a>,
 }
 
 /// What may be named, and what is left beside it.
@@ -67,6 +71,8 @@ pub(crate) struct Named<'a> {
     pub(crate) described: Described,
     /// What is left of the stars themselves, and slow.
     pub(crate) slow: Option<Slow>,
+    /// What the first search refused by size alone: a description that is kept since takes its place.
+    pub(crate) oversize: Vec<ConsideredEffect>,
 }
 
 /// The slow error that was found, if it is not the reference's.
@@ -96,6 +102,7 @@ pub(crate) fn run<'a>(
     };
     let mut refused: BTreeSet<String> = BTreeSet::new();
     let mut kept: Vec<Arc<dyn Candidate>> = Vec::new();
+    let mut oversize = Vec::new();
     for round in 0.. {
         let beside = white.keeping(&kept);
         let may: Vec<bool> = (quest.candidates)()
@@ -104,6 +111,10 @@ pub(crate) fn run<'a>(
             .collect();
         let (mut searched, wander) = attempt(&beside, folds, quest.candidates, &may, start)?;
         let last = round == MOST_REFUSALS;
+        if round == 0 {
+            oversize = figures::considered(&searched.found, 0.0, &quest.surroundings);
+            oversize.retain(|c| c.refused.is_some());
+        }
         if !wander.is_empty() && !last {
             let all = &searched.found.candidates;
             refused.extend(wander.into_iter().map(|g| family(all[g].as_ref())));
@@ -175,6 +186,7 @@ pub(crate) fn run<'a>(
                 searched,
                 described,
                 slow,
+                oversize,
             });
         }
         // without what is only described
@@ -211,6 +223,7 @@ pub(crate) fn run<'a>(
             slow: slow_left(level, &searched),
             described,
             searched,
+            oversize,
         });
     }
     Err(CloseError::Singular)

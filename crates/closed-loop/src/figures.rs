@@ -15,14 +15,14 @@ use block_regression::Fits;
 use effects::Surroundings;
 use nalgebra::DMatrix;
 use telemetry::report::{
-    Confusable, ConsideredEffect, Dependence, Estimate, FoundEffect, Selector, Unattributed,
-    Verdict,
+    Confusable, ConsideredEffect, Dependence, Estimate, FoundEffect, RefusedSize, Selector,
+    Unattributed, Verdict,
 };
 use telemetry::{EffectEntry, EffectValue};
 
 use crate::error::CloseError;
 use crate::evidence::Residuals;
-use crate::questions::hypothesis::Questions;
+use crate::questions::hypothesis::{Questions, Told};
 use crate::search::Found;
 use crate::search::empirical::EMPIRICAL;
 use crate::search::selection::{FAMILY_ALPHA, columns_of, each};
@@ -165,7 +165,11 @@ fn confusable(found: &Found, g: usize, questions: &Questions) -> Vec<Confusable>
 }
 
 /// Every effect of the catalogue that was not added.
-pub(crate) fn considered(found: &Found, excess: f64) -> Vec<ConsideredEffect> {
+pub(crate) fn considered(
+    found: &Found,
+    excess: f64,
+    surroundings: &Surroundings<'_>,
+) -> Vec<ConsideredEffect> {
     effects::catalogue()
         .iter()
         .filter(|kind| {
@@ -175,11 +179,16 @@ pub(crate) fn considered(found: &Found, excess: f64) -> Vec<ConsideredEffect> {
                 .iter()
                 .any(|&g| found.candidates[g].id() == kind.id())
         })
-        .map(|kind| consider(found, kind.id(), excess))
+        .map(|kind| consider(found, kind.id(), excess, surroundings))
         .collect()
 }
 
-fn consider(found: &Found, id: &str, excess: f64) -> ConsideredEffect {
+fn consider(
+    found: &Found,
+    id: &str,
+    excess: f64,
+    surroundings: &Surroundings<'_>,
+) -> ConsideredEffect {
     let best = (0..found.candidates.len())
         .filter(|&g| found.candidates[g].id() == id && found.selection.judged[g].observable)
         .max_by(|&a, &b| {
@@ -196,6 +205,7 @@ fn consider(found: &Found, id: &str, excess: f64) -> ConsideredEffect {
         needed: None,
         parameter: None,
         unit: None,
+        refused: refused(found, id, surroundings),
     };
     let Some(g) = best else { return entry };
     let judged = &found.selection.judged[g];
@@ -220,6 +230,51 @@ fn consider(found: &Found, id: &str, excess: f64) -> ConsideredEffect {
         entry.unit = Some(coefficient.unit.to_owned());
     }
     entry
+}
+
+/// Why none of an effect's forms was added although one would be for all but its size.
+fn refused(found: &Found, id: &str, surroundings: &Surroundings<'_>) -> Option<RefusedSize> {
+    let judged = &found.selection.judged;
+    let of_size = |g: &usize| {
+        let j = &judged[*g];
+        found.candidates[*g].id() == id && !j.credible && j.stands_but_for_size()
+    };
+    let g = (0..found.candidates.len())
+        .filter(of_size)
+        .max_by(|&a, &b| judged[a].delta_loglik.total_cmp(&judged[b].delta_loglik))?;
+    let group = &found.fitted.groups[g];
+    let mut set = columns_of(&found.fitted.groups, &found.selection.chosen);
+    let own = set.len();
+    set.extend(&group.columns);
+    let estimate = found.fitted.fits.estimate(&set)?;
+    let first: usize = found.candidates[..g]
+        .iter()
+        .map(|c| c.coefficients().len())
+        .sum();
+    group.columns.iter().enumerate().find_map(|(k, column)| {
+        let (value, [low, high]) = (estimate.value[own + k], group.bounds[k]);
+        if (low..=high).contains(&value) {
+            return None;
+        }
+        let candidate = found.candidates[g].as_ref();
+        if value < low {
+            // below what the parameter can be there is only the coefficient
+            let coefficient = &candidate.coefficients()[column - first];
+            return Some(RefusedSize {
+                parameter: coefficient.name.clone(),
+                unit: coefficient.unit.to_owned(),
+                value,
+                believed: [low, high],
+            });
+        }
+        let told = Told::of(candidate, column - first, surroundings);
+        Some(RefusedSize {
+            value: told.size(value),
+            believed: [low, high].map(|v| told.size(v)),
+            parameter: told.name,
+            unit: told.unit,
+        })
+    })
 }
 
 /// What the leftover follows, among the empirical terms of `found` beside the chosen

@@ -307,6 +307,7 @@ impl NoiseEffects {
                 needed: None,
                 parameter: Some(names[0].0.to_owned()),
                 unit: Some(names[0].1.to_owned()),
+                refused: None,
             });
             return;
         }

@@ -159,7 +159,12 @@ fn grouped(fits: &Fits, candidates: &[&dyn Candidate]) -> Vec<Group> {
 /// Sizes of a coefficient that are still credible.
 fn credible(coefficient: &Coefficient) -> [f64; 2] {
     let most = CREDIBLE * coefficient.plausible;
-    [coefficient.lower.max(-most), most]
+    let upper = if coefficient.upper.is_finite() {
+        coefficient.upper
+    } else {
+        most
+    };
+    [coefficient.lower.max(-most), upper]
 }
 
 /// Forms of one cause: one id with one selector of what it acts on.

@@ -131,6 +131,9 @@ pub struct Coefficient {
     pub plausible: f64,
     /// Smallest physical value (0 for a squared exposure), or minus infinity.
     pub lower: f64,
+    /// Largest value that an instrument could have, where that does not follow from `plausible`: a size
+    /// that enters in square has squares of very different sizes. Otherwise infinity.
+    pub upper: f64,
 }
 
 impl Coefficient {
@@ -141,6 +144,7 @@ impl Coefficient {
             unit,
             plausible,
             lower: f64::NEG_INFINITY,
+            upper: f64::INFINITY,
         }
     }
 
@@ -148,6 +152,12 @@ impl Coefficient {
     #[must_use]
     pub fn at_least(self, lower: f64) -> Self {
         Self { lower, ..self }
+    }
+
+    /// The same, not above `upper`.
+    #[must_use]
+    pub fn at_most(self, upper: f64) -> Self {
+        Self { upper, ..self }
     }
 }
 

@@ -31,6 +31,8 @@ const ID: &str = "exposure_smear";
 
 /// Exposure about which the columns are first taken, when none is declared, s.
 const TYPICAL_S: f64 = 0.1;
+/// Longest exposure that is looked for, s; or that between frames, where these are further apart.
+const LONGEST_S: f64 = 2.0;
 
 /// The kind.
 #[derive(Debug)]
@@ -65,9 +67,10 @@ impl EffectKind for Kind {
         if !(scene.has_stars || scene.has_attitude && scene.has_reference) {
             return Vec::new();
         }
-        vec![Box::new(SmearCandidate::about(
-            scene.exposure_s.unwrap_or(TYPICAL_S),
-        ))]
+        let about_s = scene.exposure_s.unwrap_or(TYPICAL_S);
+        let between_s = Some(scene.step_s).filter(|s| s.is_finite());
+        let longest_s = between_s.unwrap_or(0.0).max(LONGEST_S).max(about_s);
+        vec![Box::new(SmearCandidate::about(about_s, longest_s))]
     }
 }
 
@@ -100,15 +103,19 @@ impl Effect for ExposureSmear {
 #[derive(Clone, Debug)]
 struct SmearCandidate {
     about_s: f64,
+    longest_s: f64,
     coefficients: [Coefficient; 1],
 }
 
 impl SmearCandidate {
-    fn about(about_s: f64) -> Self {
+    fn about(about_s: f64, longest_s: f64) -> Self {
         let plausible = (about_s * about_s).max(TYPICAL_S * TYPICAL_S);
-        let coefficient = Coefficient::new("exposure_squared_s2", "s^2", plausible).at_least(0.0);
+        let coefficient = Coefficient::new("exposure_squared_s2", "s^2", plausible)
+            .at_least(0.0)
+            .at_most(longest_s * longest_s);
         Self {
             about_s,
+            longest_s,
             coefficients: [coefficient],
         }
     }
@@ -123,7 +130,8 @@ impl Candidate for SmearCandidate {
     }
     fn refined(&self, values: &[f64]) -> Option<Box<dyn Candidate>> {
         // an exposure far below a millisecond would only divide rounding by itself
-        (values[0] > 1e-6).then(|| Box::new(Self::about(values[0].sqrt())) as Box<dyn Candidate>)
+        (values[0] > 1e-6)
+            .then(|| Box::new(Self::about(values[0].sqrt(), self.longest_s)) as Box<dyn Candidate>)
     }
     fn acts_on_stars(&self) -> bool {
         true

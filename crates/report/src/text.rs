@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use closed_loop::Closed;
-use telemetry::report::{Dependence, Errors, FoundEffect, Report, Selector, Verdict};
+use telemetry::report::{Dependence, Errors, FoundEffect, RefusedSize, Report, Selector, Verdict};
 
 use crate::number::number;
 
@@ -250,6 +250,21 @@ fn rivals(out: &mut String, closed: &Closed) {
     line!(out);
 }
 
+/// Why an effect was refused by its size.
+pub(crate) fn of_size(size: &RefusedSize) -> String {
+    let [least, most] = size.believed.map(number);
+    let RefusedSize {
+        parameter,
+        unit,
+        value,
+        ..
+    } = size;
+    format!(
+        "of a size that nature does not make: {parameter} {} {unit} (believed: {least} to {most})",
+        number(*value)
+    )
+}
+
 fn considered(out: &mut String, report: &Report) {
     let (seen, unseen): (Vec<_>, Vec<_>) = report.considered.iter().partition(|c| c.observable);
     let mut tried = seen;
@@ -265,6 +280,7 @@ fn considered(out: &mut String, report: &Report) {
         );
         for c in tried.iter().take(8) {
             let size = match (&c.parameter, c.detectable, &c.unit) {
+                _ if c.refused.is_some() => c.refused.iter().map(of_size).collect(),
                 (Some(parameter), Some(d), Some(unit)) => {
                     format!("{parameter} {} {unit}", number(d))
                 }

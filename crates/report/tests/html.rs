@@ -130,6 +130,7 @@ fn findings(stars: bool, attitude: bool) -> Report {
         needed: observable.then_some(0.93),
         parameter: Some(HOSTILE.to_owned()),
         unit: Some(HOSTILE.to_owned()),
+        refused: None,
     };
     Report {
         format: REPORT_FORMAT.to_owned(),

@@ -208,6 +208,9 @@ pub struct Hypothesis {
     pub delta_loglik: Option<f64>,
     /// Chance of such a gain without the effect, the whole search paid for.
     pub p_value: Option<f64>,
+    /// The size for which it was refused although it is significant.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub refused: Option<RefusedSize>,
     /// Its sizes, one a coefficient.
     pub sizes: Vec<HypothesisSize>,
     /// Share of the squared residual beside the other effects added that its best fit takes away, in sample.
@@ -262,6 +265,22 @@ pub struct ConsideredEffect {
     /// Its unit.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub unit: Option<String>,
+    /// The size for which it was refused although it is significant.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub refused: Option<RefusedSize>,
+}
+
+/// A size that no instrument has: its columns stand in for something else.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RefusedSize {
+    /// The parameter whose size is meant.
+    pub parameter: String,
+    /// Its unit.
+    pub unit: String,
+    /// Best fit.
+    pub value: f64,
+    /// Least and largest that are believed.
+    pub believed: [f64; 2],
 }
 
 /// What no effect explains.

@@ -426,7 +426,7 @@ fn finish(
         chi2_per_dof: None,
         loglik_per_frame: Some(loglik_per_frame(data, r)),
     };
-    let considered = figures::considered(found, 0.0);
+    let considered = figures::considered(found, 0.0, &situation.surroundings());
     let lengths = column_lengths(&evidence, found);
     let hypotheses = hypothesis::answer(
         situation.questions,

@@ -18,11 +18,13 @@
 use block_regression::Estimate;
 use effects::{Candidate, EffectKind, Surroundings};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
-use telemetry::report::{ConsideredEffect, FoundEffect, Hypothesis, HypothesisSize, Selector};
+use telemetry::report::{
+    ConsideredEffect, FoundEffect, Hypothesis, HypothesisSize, RefusedSize, Selector,
+};
 
 use crate::error::CloseError;
 use crate::search::Found;
-use crate::search::selection::columns_of;
+use crate::search::selection::{FAMILY_ALPHA, columns_of};
 
 /// Sigmas that a size takes to be seen.
 const SEEN: f64 = 5.0;
@@ -130,6 +132,12 @@ impl Grounds<'_> {
             None => self.listed(kind),
         };
         answer.id = id.to_owned();
+        let considered = self.considered.iter().find(|c| c.id == id);
+        if let Some((c, size)) = considered.and_then(|c| Some((c, c.refused.clone()?))) {
+            answer.refused = Some(size);
+            (answer.observable, answer.reason) = (true, None);
+            (answer.delta_loglik, answer.p_value) = (c.delta_loglik, c.p_value);
+        }
         answer.added = self.effects.iter().any(|e| e.id == id);
         answer.finding = finding(&answer);
         answer
@@ -322,18 +330,22 @@ impl Grounds<'_> {
 }
 
 /// The parameter by which a coefficient is told.
-struct Told<'a> {
+pub(crate) struct Told<'a> {
     candidate: &'a dyn Candidate,
     surroundings: &'a Surroundings<'a>,
     j: usize,
-    name: String,
-    unit: String,
+    pub(crate) name: String,
+    pub(crate) unit: String,
     /// Position among the effect's parameters; `None`: the coefficient is its own parameter.
     parameter: Option<usize>,
 }
 
 impl<'a> Told<'a> {
-    fn of(candidate: &'a dyn Candidate, j: usize, surroundings: &'a Surroundings<'a>) -> Self {
+    pub(crate) fn of(
+        candidate: &'a dyn Candidate,
+        j: usize,
+        surroundings: &'a Surroundings<'a>,
+    ) -> Self {
         let coefficient = &candidate.coefficients()[j];
         let mut told = Self {
             candidate,
@@ -370,7 +382,7 @@ impl<'a> Told<'a> {
     }
 
     /// A value of the coefficient as the parameter; below its physical range it is 0.
-    fn size(&self, value: f64) -> f64 {
+    pub(crate) fn size(&self, value: f64) -> f64 {
         let value = value.max(self.candidate.coefficients()[self.j].lower);
         let told = self
             .parameter
@@ -405,6 +417,17 @@ fn with_unit(value: f64, unit: &str) -> String {
     format!("{}{between}{unit}", short(value))
 }
 
+fn of_size(size: &RefusedSize) -> String {
+    let [least, most] = size.believed;
+    format!(
+        "of a size that nature does not make, {} = {}, believed from {} to {}",
+        size.parameter,
+        with_unit(size.value, &size.unit),
+        short(least),
+        with_unit(most, &size.unit),
+    )
+}
+
 /// The answer in a sentence or three.
 fn finding(h: &Hypothesis) -> String {
     if let Some(reason) = &h.reason {
@@ -417,7 +440,13 @@ fn finding(h: &Hypothesis) -> String {
         (false, true, Some(p)) => {
             format!("significant (p = {p:.1e}), but not worth its parameters beside what was added")
         }
-        (false, false, Some(p)) => format!("not significant (p = {p:.2})"),
+        (false, false, Some(p)) => match &h.refused {
+            Some(size) => format!("refused (p = {p:.1e}): {}", of_size(size)),
+            None if p < FAMILY_ALPHA => {
+                format!("p = {p:.1e}, but it predicts nothing out of fold")
+            }
+            None => format!("not significant (p = {p:.2})"),
+        },
         (false, _, None) => "not significant".to_owned(),
     });
     // of several sizes, the one that would have to grow least

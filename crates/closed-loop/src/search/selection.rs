@@ -78,7 +78,12 @@ impl Judgement {
 
     /// It may be claimed.
     pub(crate) fn stands(&self) -> bool {
-        self.observable && self.credible && self.delta_loglik > 0.0 && self.p_value < FAMILY_ALPHA
+        self.credible && self.stands_but_for_size()
+    }
+
+    /// It might be, were it of a size that nature makes.
+    pub(crate) fn stands_but_for_size(&self) -> bool {
+        self.observable && self.delta_loglik > 0.0 && self.p_value < FAMILY_ALPHA
     }
 }
 

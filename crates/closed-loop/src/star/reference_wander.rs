@@ -66,6 +66,7 @@ pub(crate) fn consider(
         needed: (excess > 0.0).then(|| (0.5 * excess / rows).sqrt()),
         parameter: Some(NAMES[0][0].to_owned()),
         unit: Some("arcsec".to_owned()),
+        refused: None,
     })
 }
 

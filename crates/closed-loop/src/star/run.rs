@@ -13,7 +13,7 @@ use focal_plane::Points;
 use nalgebra::DVector;
 use spectra::robust::median_step;
 use star_images::Formed;
-use telemetry::report::{Errors, FoundEffect, Report, Rows};
+use telemetry::report::{ConsideredEffect, Errors, FoundEffect, Report, Rows};
 use telemetry::{DarkMap, Model, StarResiduals};
 
 use crate::causes::commonness::Slow;
@@ -223,11 +223,13 @@ fn explain(
         candidates: &candidates,
         terms: &|| description::terms(situation, data),
         ways: &description::ways(situation, data),
+        surroundings: situation.surroundings(),
     };
     let Named {
         searched,
         described,
         slow,
+        oversize,
     } = causes::run(level, folds, &quest)?;
     let mut searched = searched;
     if situation.questions.empirical {
@@ -249,6 +251,7 @@ fn explain(
         found: &searched.found,
         described: &described,
         slow,
+        oversize,
         wander: searched.wander.as_ref(),
         settled,
         image: image.as_ref().zip(formed.as_ref()),
@@ -290,6 +293,7 @@ struct Finish<'a> {
     found: &'a Found,
     described: &'a Described,
     slow: Option<Slow>,
+    oversize: Vec<ConsideredEffect>,
     wander: Option<&'a Wander>,
     settled: &'a Settled,
     image: Option<(&'a ImageLevel, &'a Formed)>,
@@ -469,7 +473,12 @@ fn finish(f: &Finish<'_>, plain: Residuals) -> Result<Closed, CloseError> {
     }
     noise_left.tell(&mut unattributed);
     let excess = excess(f, last);
-    let mut considered = figures::considered(f.found, excess);
+    let mut considered = figures::considered(f.found, excess, &surroundings);
+    for entry in &mut considered {
+        if let Some(size) = f.oversize.iter().find(|c| c.id == entry.id) {
+            entry.clone_from(size);
+        }
+    }
     considered.retain(|c| !effects.iter().any(|e| e.id == c.id));
     let unit = f.level.noise.map_or(1.0, |n| n.centroid);
     let squares = excess * unit * unit;

@@ -181,3 +181,33 @@ fn a_faint_step_is_a_step() {
     assert!(steps >= 6, "{steps} of 8");
     assert!(inside + 3 >= steps, "{inside} of {steps} within");
 }
+
+/// The same case where nobody declares an exposure.
+fn undeclared(exposure_s: f64) -> Report {
+    let case =
+        Case::new(Path::Turns, 5).with("exposure_smear", &format!("exposure_s = {exposure_s:?}"));
+    let (mut model, mut bundle) = case.make();
+    model.tracker.exposure_s = None;
+    bundle.meta.tracker.exposure_s = None;
+    crate::kit::closed(&model, &bundle)
+        .expect("the loop closes")
+        .report
+}
+
+/// An exposure that nobody declared may be of any length up to 2 s: its square is not held against that of
+/// 0.1 s. Beyond, it is said why it is not named.
+#[test]
+fn a_long_exposure_that_nobody_declared() {
+    let report = undeclared(0.9);
+    let got = &report.effects[0].parameters["exposure_s"];
+    let sigma = got.sigma.unwrap();
+    assert_eq!(report.effects[0].id, "exposure_smear");
+    assert!((got.value - 0.9).abs() < 4.0 * sigma, "{got:?}");
+    let report = undeclared(2.6);
+    assert!(report.effects.iter().all(|e| e.id != "exposure_smear"));
+    let considered = report.considered.iter().find(|c| c.id == "exposure_smear");
+    let refused = considered.and_then(|c| c.refused.clone()).unwrap();
+    assert_eq!(refused.parameter, "exposure_s");
+    assert!((2.3..2.9).contains(&refused.value), "{refused:?}");
+    assert!((refused.believed[1] - 2.0).abs() < 1e-9, "{refused:?}");
+}

@@ -6,7 +6,7 @@ use telemetry::report::{ConsideredEffect, Dependence, Errors, Estimate, FoundEff
 use super::Page;
 use super::write::{Cell, datum, escaped, step};
 use crate::number::{change, hertz, percent, probability, short, with_sigma};
-use crate::text::selectors;
+use crate::text::{of_size, selectors};
 
 /// Chance below which an effect counts as seen.
 const SIGNIFICANT: f64 = 0.01;
@@ -359,10 +359,13 @@ fn considered_row(k: usize, c: &ConsideredEffect, report: &Report) -> Vec<Cell> 
 }
 
 fn why_not(c: &ConsideredEffect, report: &Report) -> String {
+    if let Some(size) = &c.refused {
+        return format!("significant, but {}", of_size(size));
+    }
     let gains = c.delta_loglik.is_some_and(|gain| gain > 0.0);
     if gains && c.p_value.is_some_and(|p| p < SIGNIFICANT) {
         let why = if report.effects.is_empty() {
-            "of a size that nature does not make, or without less error"
+            "without less error"
         } else {
             "not worth its parameters beside what was added"
         };
