@@ -150,6 +150,7 @@ fn grouped(fits: &Fits, candidates: &[&dyn Candidate]) -> Vec<Group> {
             shapes: candidate.nonlinear().len(),
             family: family(*candidate),
             kind: candidate.id(),
+            stands_for: candidate.stands_for(),
         });
         column += p;
     }

@@ -8,12 +8,17 @@ use star_tracker::{Disturbance, Pbm, TemporalNoise};
 
 use crate::harness::{Bench, Sway, as_given};
 use crate::{
-    Candidate, EffectError, FrameGeometry, Parameters, Surroundings, VectorFrame, build, catalogue,
-    harmonics_of, hot_pixel_at, kind, line_at, reported, step_at,
+    Candidate, EffectError, FrameGeometry, Parameters, Surroundings, VectorFrame, WarmPixels,
+    build, catalogue, harmonics_of, hot_pixel_at, kind, line_at, reported, step_at,
 };
 
 fn candidates(bench: &Bench, id: &str) -> Vec<Box<dyn Candidate>> {
-    bench.with_star_rows(|rows| kind(id).unwrap().candidates(&bench.scene(Some(rows))))
+    let warm = bench.with_star_rows(|rows| {
+        let n = rows.len();
+        let nothing = vec![0.0; n];
+        WarmPixels::look(&bench.camera, rows, [&nothing, &nothing], &vec![1.0; n])
+    });
+    kind(id).unwrap().candidates(&bench.scene(Some(&warm)))
 }
 
 /// A third of the plausible size of each coefficient, of either sign where it may have one.

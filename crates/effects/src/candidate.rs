@@ -195,6 +195,11 @@ pub trait Candidate: Debug + Send + Sync {
     fn choices(&self) -> usize {
         0
     }
+    /// How many forms of its effect were looked at for each that is proposed, this one among them: a form
+    /// that was chosen out of many by this very data has to pay for all of them.
+    fn stands_for(&self) -> f64 {
+        1.0
+    }
     /// The same candidate with other values of [`nonlinear`](Self::nonlinear), in its order; `None`
     /// when a value is out of range or there is nothing to change.
     fn with_nonlinear(&self, values: &[f64]) -> Option<Box<dyn Candidate>> {

@@ -22,6 +22,7 @@ use star_tracker::{Measured, NoiseStreams, Pbm, Rows, Scratch};
 
 use crate::{
     AttitudeRows, Candidate, FrameGeometry, Parameters, Scene, StarFacts, StarRows, Surroundings,
+    WarmPixels,
 };
 
 /// Rounding of a position, px.
@@ -135,7 +136,7 @@ impl Bench {
         }
     }
 
-    pub(crate) fn scene<'s>(&'s self, rows: Option<&'s StarRows<'s>>) -> Scene<'s> {
+    pub(crate) fn scene<'s>(&'s self, warm: Option<&'s WarmPixels>) -> Scene<'s> {
         Scene {
             surroundings: self.surroundings(),
             has_stars: true,
@@ -145,7 +146,7 @@ impl Bench {
             stars: &self.facts,
             exposure_s: Some(0.4),
             step_s: 2.0,
-            rows,
+            warm,
         }
     }
 

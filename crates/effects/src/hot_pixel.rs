@@ -10,8 +10,6 @@
 //!
 //! Source: first moment of a spot plus one pixel, to first order in the pixel's share.
 
-use std::collections::BTreeMap;
-
 use focal_plane::{Camera, Pixel};
 use star_tracker::{Stages, StarView};
 
@@ -23,12 +21,7 @@ use crate::{
 };
 
 const ID: &str = "hot_pixel";
-const HALF_WIDTH_PX: f64 = 1.5;
-
-/// Pixels that the catalogue proposes: those under most rows.
-const MOST_PIXELS: usize = 48;
-/// Rows under which a pixel is worth proposing.
-const LEAST_ROWS: usize = 10;
+pub(crate) const HALF_WIDTH_PX: f64 = 1.5;
 
 /// The kind.
 #[derive(Debug)]
@@ -72,27 +65,28 @@ impl EffectKind for Kind {
             });
         }
         Ok(Box::new(Shifted::new(
-            HotPixel { at, half_width_px },
+            HotPixel {
+                at,
+                half_width_px,
+                stands_for: 1.0,
+            },
             vec![strength],
         )))
     }
     fn candidates(&self, scene: &Scene<'_>) -> Vec<Box<dyn Candidate>> {
-        let Some(rows) = scene.rows.filter(|_| scene.has_stars) else {
+        let Some(warm) = scene.warm.filter(|_| scene.has_stars) else {
             return Vec::new();
         };
-        let camera = scene.surroundings.camera;
-        let mut seen: BTreeMap<(i64, i64), usize> = BTreeMap::new();
-        for i in 0..rows.len() {
-            let [column, row] = pixel_of(camera, rows.landed(i));
-            *seen.entry((column, row)).or_default() += 1;
-        }
-        // ties go to the lower coordinates: the list never depends on the order of a hash
-        let mut pixels: Vec<_> = seen.into_iter().filter(|(_, n)| *n >= LEAST_ROWS).collect();
-        pixels.sort_by_key(|&(pixel, rows)| (core::cmp::Reverse(rows), pixel));
-        pixels.truncate(MOST_PIXELS);
-        pixels
-            .into_iter()
-            .map(|((column, row), _)| hot_pixel_at(middle_of(camera, [column, row])))
+        let stands_for = warm.looked_at as f64 / warm.middles.len().max(1) as f64;
+        let proposed = warm.middles.iter();
+        proposed
+            .map(|&at| {
+                ShiftCandidate::boxed(HotPixel {
+                    at,
+                    half_width_px: HALF_WIDTH_PX,
+                    stands_for,
+                })
+            })
             .collect()
     }
 }
@@ -102,18 +96,19 @@ pub fn hot_pixel_at(at: Pixel) -> Box<dyn Candidate> {
     ShiftCandidate::boxed(HotPixel {
         at,
         half_width_px: HALF_WIDTH_PX,
+        stands_for: 1.0,
     })
 }
 
 /// Number of the pixel in which a point lies.
-fn pixel_of(camera: &Camera, at: Pixel) -> [i64; 2] {
+pub(crate) fn pixel_of(camera: &Camera, at: Pixel) -> [i64; 2] {
     let edge = 0.5 - camera.pixel_centre();
     #[expect(clippy::cast_possible_truncation, reason = "pixel numbers are small")]
     [at.x, at.y].map(|p| (p + edge).floor() as i64)
 }
 
 /// Middle of a pixel.
-fn middle_of(camera: &Camera, pixel: [i64; 2]) -> Pixel {
+pub(crate) fn middle_of(camera: &Camera, pixel: [i64; 2]) -> Pixel {
     let [x, y] = pixel.map(|p| p as f64 + camera.pixel_centre());
     Pixel { x, y }
 }
@@ -122,6 +117,8 @@ fn middle_of(camera: &Camera, pixel: [i64; 2]) -> Pixel {
 struct HotPixel {
     at: Pixel,
     half_width_px: f64,
+    /// How many that were looked at it is proposed for.
+    stands_for: f64,
 }
 
 impl Shift for HotPixel {
@@ -135,7 +132,8 @@ impl Shift for HotPixel {
         }
     }
     fn coefficients(&self) -> Vec<Coefficient> {
-        vec![Coefficient::new("strength", "", 0.03)]
+        // charge of its own pulls, it does not push
+        vec![Coefficient::new("strength", "", 0.03).at_least(0.0)]
     }
     fn reaches(&self, at: Pixel) -> bool {
         (self.at.x - at.x).abs() <= self.half_width_px
@@ -151,6 +149,9 @@ impl Shift for HotPixel {
     /// The direction of the pull: a star at rest has pixels on all sides.
     fn choices(&self) -> usize {
         1
+    }
+    fn stands_for(&self) -> f64 {
+        self.stands_for
     }
     fn parameters(&self, values: &[f64]) -> Vec<Parameter> {
         vec![

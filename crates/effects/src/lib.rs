@@ -44,6 +44,7 @@ mod step_misalignment;
 mod thermal_misalignment;
 mod time_tag_offset;
 mod velocity_aberration;
+mod warm_pixels;
 
 pub use candidate::{AttitudeRows, Candidate, Coefficient, Nonlinear, StarRows, reported};
 pub use catalogue::{build, catalogue, kind};
@@ -56,3 +57,4 @@ pub use periodic_misalignment::line_at;
 pub use pixel_phase_harmonics::harmonics_of;
 pub use scene::{FrameGeometry, Scene, StarFacts, Surroundings, VectorFrame};
 pub use step_misalignment::step_at;
+pub use warm_pixels::WarmPixels;

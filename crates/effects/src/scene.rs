@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use focal_plane::{Camera, Series};
 use nalgebra::Vector3;
 
-use crate::StarRows;
+use crate::WarmPixels;
 
 /// Frame in which housekeeping vectors are given.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -89,8 +89,8 @@ pub struct Scene<'a> {
     pub exposure_s: Option<f64>,
     /// Median step between frames, s; infinite for one frame.
     pub step_s: f64,
-    /// The star rows, for effects whose candidates depend on where stars have been.
-    pub rows: Option<&'a StarRows<'a>>,
+    /// Pixels that may be warm, of those that stars have been on.
+    pub warm: Option<&'a WarmPixels>,
 }
 
 impl Scene<'_> {

@@ -65,6 +65,10 @@ pub(crate) trait Shift: Clone + Debug + Send + Sync + 'static {
     fn choices(&self) -> usize {
         0
     }
+    /// See [`Candidate::stands_for`].
+    fn stands_for(&self) -> f64 {
+        1.0
+    }
 }
 
 /// A shift with its values.
@@ -145,6 +149,9 @@ impl<S: Shift> Candidate for ShiftCandidate<S> {
     }
     fn choices(&self) -> usize {
         self.shift.choices()
+    }
+    fn stands_for(&self) -> f64 {
+        self.shift.stands_for()
     }
     fn acts_on_stars(&self) -> bool {
         true

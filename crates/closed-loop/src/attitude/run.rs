@@ -209,7 +209,7 @@ fn scene<'a>(situation: &'a Situation<'_>, data: &AttitudeData) -> Scene<'a> {
         stars: &[],
         exposure_s: situation.exposure_s(),
         step_s: median_step(&data.t_s).unwrap_or(f64::INFINITY),
-        rows: None,
+        warm: None,
     }
 }
 

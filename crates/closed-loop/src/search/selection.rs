@@ -11,7 +11,9 @@
 //!
 //! whose inverses add up to 1 (weighted Bonferroni). That is between paying by
 //! groups, with which a scale of one column would pay for hundreds of warm
-//! pixels, and by kinds, with which these would pay alone. Of the eligible ones the largest gain
+//! pixels, and by kinds, with which these would pay alone. Groups that were
+//! picked by the same data out of m times as many pay m times that: so do
+//! the inverses of all that were looked at add up to 1. Of the eligible ones the largest gain
 //! after a price per parameter wins, so that a flexible wrong effect does not
 //! beat a stiff right one:
 //!
@@ -52,6 +54,8 @@ pub(crate) struct Group {
     pub(crate) family: String,
     /// Groups of one kind are one effect, whatever it acts on.
     pub(crate) kind: &'static str,
+    /// How many of its kind were looked at for each that is tried.
+    pub(crate) stands_for: f64,
 }
 
 /// One group's standing beside the chosen ones.
@@ -132,7 +136,8 @@ pub(crate) fn costs(groups: &[Group], may: &[bool]) -> Vec<f64> {
     }
     let all: f64 = of_kind.values().map(|n| n.sqrt()).sum();
     let root = |g: &Group| of_kind.get(g.kind).map_or(1.0, |n| n.sqrt());
-    groups.iter().map(|g| root(g) * all.max(1.0)).collect()
+    let pays = |g: &Group| g.stands_for * root(g) * all.max(1.0);
+    groups.iter().map(pays).collect()
 }
 
 /// Groups that may be added to `chosen`, best first: by the gain out of fold after
@@ -257,6 +262,7 @@ mod tests {
             shapes: 0,
             family: kind.to_owned(),
             kind,
+            stands_for: 1.0,
         }
     }
 
@@ -274,6 +280,9 @@ mod tests {
         let counted = (0..groups.len()).filter(|&g| may[g] && !groups[g].columns.is_empty());
         let shares: f64 = counted.map(|g| cost[g].recip()).sum();
         assert!((shares - 1.0).abs() < 1e-12, "{shares}");
+        groups[3].stands_for = 20.0;
+        let picked = costs(&groups, &may);
+        assert!((picked[3] - 20.0 * cost[3]).abs() < 1e-9 && picked[4..] == cost[4..]);
         // sqrt(1) and sqrt(100), each times 1 + 10 + sqrt(14)
         assert!((cost[0] - 14.742).abs() < 1e-3 && (cost[3] - 147.42).abs() < 1e-2);
     }

@@ -8,7 +8,7 @@
 //! Not physics: the order of the steps.
 
 use block_regression::Folds;
-use effects::{Scene, StarFacts, StarRows};
+use effects::{Scene, StarFacts, StarRows, WarmPixels};
 use focal_plane::Points;
 use nalgebra::DVector;
 use spectra::robust::median_step;
@@ -196,7 +196,8 @@ fn explain(
         })
         .collect();
     let rows = data.rows(0..data.t_s.len(), source(motion));
-    let scene = scene(situation, data, &facts, &rows);
+    let warm = warm_pixels(data, &rows, &settled.before, &measured.weight);
+    let scene = scene(situation, data, &facts, &warm);
     let image = match &sides {
         Some(sides) => {
             let mut others = catalogue_candidates(&scene);
@@ -264,11 +265,28 @@ fn explain(
     Ok(Explained::Closed(Box::new(finish(&whole, after)?)))
 }
 
+/// Where a warm pixel may be by what the declared model leaves.
+fn warm_pixels(
+    data: &StarData,
+    rows: &StarRows<'_>,
+    before: &Residuals,
+    weight: &[f64],
+) -> WarmPixels {
+    let scale = data.camera.arcsec_per_px();
+    let [x, y] = [0, 1].map(|a| -> Vec<f64> {
+        let left = before.axes[a].iter();
+        left.map(|r| r / scale[a]).collect()
+    });
+    let outlier = data.outlier.iter().zip(weight);
+    let weight: Vec<f64> = outlier.map(|(o, w)| if *o { 0.0 } else { *w }).collect();
+    WarmPixels::look(&data.camera, rows, [&x, &y], &weight)
+}
+
 fn scene<'a>(
     situation: &'a Situation<'_>,
     data: &StarData,
     facts: &'a [StarFacts],
-    rows: &'a StarRows<'a>,
+    warm: &'a WarmPixels,
 ) -> Scene<'a> {
     Scene {
         surroundings: situation.surroundings(),
@@ -279,7 +297,7 @@ fn scene<'a>(
         stars: facts,
         exposure_s: situation.exposure_s(),
         step_s: median_step(&data.frames.t_s).unwrap_or(f64::INFINITY),
-        rows: Some(rows),
+        warm: Some(warm),
     }
 }
 

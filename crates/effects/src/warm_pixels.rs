@@ -1,0 +1,252 @@
+//! Where a warm pixel may be: one look at all pixels under the stars.
+//!
+//! ```text
+//! z(H) = sum w^2 c r / sqrt(sum w^2 c c)      c = H - P while |c| <= 1.5 px on both axes,  r what is left there
+//! ```
+//!
+//! over the rows near a pixel of middle H: what one coefficient would gain, in units of the noise. What is
+//! constant for a star may be the catalogue's or the lens', so that z is also taken with the mean of c and
+//! r over each star's own rows there taken off, and the larger counts. A warm pixel pulls toward itself:
+//! z is positive. The best are proposed, and stand for all that were looked at.
+//!
+//! Source: the score of a linear coefficient at zero (Rao 1948).
+
+use std::collections::HashMap;
+
+use focal_plane::{Camera, Pixel};
+
+use crate::StarRows;
+use crate::hot_pixel::{HALF_WIDTH_PX, middle_of, pixel_of};
+
+/// Pixels that are proposed.
+const MOST_PIXELS: usize = 48;
+/// Rows under which a pixel is worth looking at.
+const LEAST_ROWS: u32 = 10;
+/// Pixels of which a star within the half-width of one may be: its own and those around.
+const NEAR: usize = 9;
+const NOWHERE: usize = usize::MAX;
+
+/// The pixels that are proposed, best first.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct WarmPixels {
+    /// Middles.
+    pub(crate) middles: Vec<Pixel>,
+    /// How many were looked at.
+    pub(crate) looked_at: usize,
+}
+
+/// Weighted sums over the rows of one star near one pixel.
+#[derive(Clone, Copy, Default)]
+struct Sums {
+    weight: f64,
+    c: [f64; 2],
+    r: [f64; 2],
+    cr: f64,
+    cc: f64,
+}
+
+/// Of the star that was seen last in a slot of the table: its pixel, and where the sums of it and of the
+/// pixels around are.
+#[derive(Clone, Copy)]
+struct Last {
+    pixel: [i64; 2],
+    sums: [usize; NEAR],
+}
+
+impl WarmPixels {
+    /// Looks at all pixels under `rows`, of which `left_px` is left (x, y), with these weights; a row of
+    /// weight 0 does not count.
+    ///
+    /// # Panics
+    /// When the lengths differ.
+    pub fn look(
+        camera: &Camera,
+        rows: &StarRows<'_>,
+        left_px: [&[f64]; 2],
+        weight: &[f64],
+    ) -> Self {
+        assert!(left_px.iter().all(|l| l.len() == rows.len()), "residuals");
+        assert_eq!(weight.len(), rows.len(), "weights");
+        let mut visits: HashMap<[i64; 2], u32> = HashMap::new();
+        for i in (0..rows.len()).filter(|&i| weight[i] > 0.0) {
+            *visits.entry(pixel_of(camera, rows.landed(i))).or_default() += 1;
+        }
+        let mut pixels: Vec<([i64; 2], u32)> = visits.into_iter().collect();
+        pixels.retain(|(_, rows)| *rows >= LEAST_ROWS);
+        pixels.sort_unstable();
+        let index: HashMap<[i64; 2], usize> =
+            pixels.iter().enumerate().map(|(k, p)| (p.0, k)).collect();
+        let mut sums: Vec<(usize, Sums)> = Vec::new();
+        let mut place: HashMap<(usize, i64), usize> = HashMap::new();
+        let mut last: HashMap<i64, Last> = HashMap::new();
+        for i in (0..rows.len()).filter(|&i| weight[i] > 0.0) {
+            let star = rows.star_id[i];
+            let at = rows.landed(i);
+            let pixel = pixel_of(camera, at);
+            let mut find = || Last {
+                pixel,
+                sums: std::array::from_fn(|k| {
+                    let near = [0, 1].map(|a| pixel[a] + [k % 3, k / 3][a] as i64 - 1);
+                    index.get(&near).map_or(NOWHERE, |&p| {
+                        *place.entry((p, star)).or_insert_with(|| {
+                            sums.push((p, Sums::default()));
+                            sums.len() - 1
+                        })
+                    })
+                }),
+            };
+            let seen = last.entry(star).or_insert_with(&mut find);
+            if seen.pixel != pixel {
+                *seen = find();
+            }
+            for &k in seen.sums.iter().filter(|&&k| k != NOWHERE) {
+                let (p, sums) = &mut sums[k];
+                let middle = middle_of(camera, pixels[*p].0);
+                let c = [middle.x - at.x, middle.y - at.y];
+                if c.iter().all(|c| c.abs() <= HALF_WIDTH_PX) {
+                    sums.add(c, left_px.map(|l| l[i]), weight[i] * weight[i]);
+                }
+            }
+        }
+        let mut whole = vec![[Sums::default(); 2]; pixels.len()];
+        for (p, own) in &sums {
+            whole[*p][0].join(own);
+            whole[*p][1].join(&own.centred());
+        }
+        let mut ranked: Vec<(f64, usize)> = whole
+            .iter()
+            .map(|both| both.each_ref().map(Sums::score))
+            .map(|[plain, centred]| plain.max(centred))
+            .zip(0..)
+            .collect();
+        // ties go to the longer visit, then to the lower coordinates
+        ranked.sort_by(|a, b| {
+            let visits = |k: usize| pixels[k].1;
+            let longer = visits(b.1).cmp(&visits(a.1));
+            b.0.total_cmp(&a.0).then(longer).then(a.1.cmp(&b.1))
+        });
+        Self {
+            middles: ranked
+                .iter()
+                .take(MOST_PIXELS)
+                .map(|(_, k)| middle_of(camera, pixels[*k].0))
+                .collect(),
+            looked_at: pixels.len(),
+        }
+    }
+}
+
+impl Sums {
+    fn add(&mut self, c: [f64; 2], r: [f64; 2], w: f64) {
+        if r.iter().any(|r| !r.is_finite()) {
+            return;
+        }
+        self.weight += w;
+        for axis in 0..2 {
+            self.c[axis] += w * c[axis];
+            self.r[axis] += w * r[axis];
+            self.cr += w * c[axis] * r[axis];
+            self.cc += w * c[axis] * c[axis];
+        }
+    }
+
+    /// The same about the means.
+    fn centred(&self) -> Self {
+        let mut out = *self;
+        if self.weight > 0.0 {
+            for axis in 0..2 {
+                out.cr -= self.c[axis] * self.r[axis] / self.weight;
+                out.cc -= self.c[axis] * self.c[axis] / self.weight;
+            }
+        }
+        out
+    }
+
+    fn join(&mut self, other: &Self) {
+        self.cr += other.cr;
+        self.cc += other.cc;
+    }
+
+    fn score(&self) -> f64 {
+        // what a star at rest leaves of its mean is rounding
+        if self.cc > 1e-9 {
+            self.cr / self.cc.sqrt()
+        } else {
+            0.0
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Twelve stars drift over some 240 pixels each, one of which is warm and visited no longer than others;
+    /// its pull, 0.02 of up to 1.5 px, is six sigma of noise of 0.02 px (a mean of 0.012 px over two axes of
+    /// 60 rows). In the first places it is, although the star has an offset of its own that is as large.
+    #[test]
+    fn a_warm_pixel_is_looked_at_first_however_short_its_visit() {
+        let camera = Camera::from_fov_deg([1024, 1024], [20.0, 20.0]).unwrap();
+        let warm = Pixel { x: 30.5, y: 21.5 };
+        let mut state = 9_u64;
+        let mut noise = || {
+            let sum: f64 = (0..12)
+                .map(|_| {
+                    state = state
+                        .wrapping_mul(6_364_136_223_846_793_005)
+                        .wrapping_add(1);
+                    (state >> 33) as f64 / f64::from(1_u32 << 31)
+                })
+                .sum();
+            0.02 * (sum - 6.0)
+        };
+        let (mut x, mut y, mut left, mut star) = (vec![], vec![], [vec![], vec![]], vec![]);
+        for k in 0..2400 {
+            for s in 0..12_i64 {
+                let t = f64::from(k) * 0.05;
+                let at = [
+                    10.2 + t + 0.3 * (s as f64),
+                    20.7 + 0.05 * t - 40.0 * (s as f64),
+                ];
+                let c = [warm.x - at[0], warm.y - at[1]];
+                let near = c.iter().all(|c| c.abs() <= 1.5);
+                for axis in 0..2 {
+                    let pull = if near { 0.02 * c[axis] } else { 0.0 };
+                    left[axis].push(pull + noise());
+                }
+                x.push(at[0]);
+                y.push(at[1]);
+                star.push(s);
+            }
+        }
+        let n = x.len();
+        let (none, slot) = (vec![0.0; n], vec![0; n]);
+        let rows = StarRows {
+            t_s: &none,
+            x_px: &x,
+            y_px: &y,
+            landed_px: [&x, &y],
+            landed_variance_px2: [&none, &none],
+            vx_px_s: &none,
+            vy_px_s: &none,
+            ax_px_s2: &none,
+            ay_px_s2: &none,
+            mag: &none,
+            bv: &none,
+            log_flux: &none,
+            window_px: [&none, &none],
+            slot: &slot,
+            star_id: &star,
+            attitude: None,
+        };
+        let look = |left: [&[f64]; 2]| WarmPixels::look(&camera, &rows, left, &vec![1.0; n]);
+        let found = look([&left[0], &left[1]]);
+        assert!(found.looked_at > 1000, "{}", found.looked_at);
+        assert_eq!(found.middles.len(), MOST_PIXELS);
+        assert_eq!(found.middles[0], warm, "{:?}", &found.middles[..4]);
+        // a pixel that pushes is none
+        let away = left.map(|l| l.iter().map(|v| -v).collect::<Vec<f64>>());
+        let found = look([&away[0], &away[1]]);
+        assert!(!found.middles[..8].contains(&warm));
+    }
+}
