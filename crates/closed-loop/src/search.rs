@@ -102,6 +102,7 @@ pub(crate) fn fit_grams(
             columns,
             bounds,
             choices: candidate.choices(),
+            picked_from: candidate.picked_from(),
             shapes: candidate.nonlinear().len(),
             family: family(*candidate),
             kind: candidate.id(),

@@ -48,6 +48,10 @@ pub(crate) trait Bending: Clone + Debug + Send + Sync + 'static {
     fn nonlinear(&self) -> Vec<Nonlinear> {
         Vec::new()
     }
+    /// Forms that it was picked from by looking at the data.
+    fn picked_from(&self) -> usize {
+        1
+    }
     /// With other non-linear parameters.
     fn with_nonlinear(&self, values: &[f64]) -> Option<Self> {
         let _ = values;
@@ -127,6 +131,9 @@ impl<B: Bending> Candidate for BendingCandidate<B> {
     }
     fn nonlinear(&self) -> Vec<Nonlinear> {
         self.bending.nonlinear()
+    }
+    fn picked_from(&self) -> usize {
+        self.bending.picked_from()
     }
     fn with_nonlinear(&self, values: &[f64]) -> Option<Box<dyn Candidate>> {
         assert_eq!(

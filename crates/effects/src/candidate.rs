@@ -183,6 +183,11 @@ pub trait Candidate: Debug + Send + Sync {
     fn choices(&self) -> usize {
         0
     }
+    /// How many forms this one was picked from by looking at the data (the frequencies of a spectrum):
+    /// a search pays for all of them.
+    fn picked_from(&self) -> usize {
+        1
+    }
     /// The same candidate with other values of [`nonlinear`](Self::nonlinear), in its order; `None`
     /// when a value is out of range or there is nothing to change.
     fn with_nonlinear(&self, values: &[f64]) -> Option<Box<dyn Candidate>> {

@@ -28,8 +28,8 @@ const NAMES: [&str; 6] = [
 
 /// A line goes round at least twice in the data: what does not is a drift.
 const FEWEST_CYCLES: u32 = 2;
-/// Frequencies that the catalogue proposes: the first harmonics of the span. A line above them is
-/// found in a spectrum, and [`line_at`] makes its candidate.
+/// Frequencies that the catalogue proposes: the first harmonics of the span. A line above them, or
+/// between them, is found in a spectrum, and [`line_at`] makes its candidate.
 const HARMONICS: u32 = 24;
 
 /// The kind.
@@ -66,6 +66,7 @@ impl EffectKind for Kind {
             frequency_hz,
             range: [frequency_hz; 2],
             step: 0.0,
+            picked_from: 1,
         };
         Ok(Box::new(Bent {
             bending,
@@ -73,29 +74,31 @@ impl EffectKind for Kind {
         }))
     }
     fn candidates(&self, scene: &Scene<'_>) -> Vec<Box<dyn Candidate>> {
-        let span = scene.surroundings.length_s();
+        let (span_s, span) = (scene.surroundings.span_s, scene.surroundings.length_s());
         if !scene.sees_misalignment() || span <= 0.0 {
             return Vec::new();
         }
         (FEWEST_CYCLES..=HARMONICS)
             .map(|k| f64::from(k) / span)
             .take_while(|f| *f < 0.5 / scene.step_s)
-            .map(|f| line_at(f, span))
+            .map(|f| line_at(f, span_s, 1))
             .collect()
     }
 }
 
-/// A line of unknown amplitude at `frequency_hz`, in data `span_s` long.
+/// A line of unknown amplitude at `frequency_hz`, in data from `span_s[0]` to `span_s[1]`, picked from
+/// so many frequencies by looking at the data.
 ///
 /// Frequency is refined within half a bin `1 / span_s` to either side: what a line leaves at a slightly
 /// wrong frequency would pass for another line.
-pub fn line_at(frequency_hz: f64, span_s: f64) -> Box<dyn Candidate> {
-    let bin = 1.0 / span_s;
+pub fn line_at(frequency_hz: f64, span_s: [f64; 2], picked_from: usize) -> Box<dyn Candidate> {
+    let bin = 1.0 / (span_s[1] - span_s[0]);
     let range = [(frequency_hz - bin).max(1.5 * bin), frequency_hz + bin];
     BendingCandidate::boxed(Line {
         frequency_hz,
         range,
         step: 0.5 * bin,
+        picked_from,
     })
 }
 
@@ -104,6 +107,7 @@ struct Line {
     frequency_hz: f64,
     range: [f64; 2],
     step: f64,
+    picked_from: usize,
 }
 
 impl Bending for Line {
@@ -133,6 +137,9 @@ impl Bending for Line {
             range: self.range,
             step: self.step,
         }]
+    }
+    fn picked_from(&self) -> usize {
+        self.picked_from
     }
     fn with_nonlinear(&self, values: &[f64]) -> Option<Self> {
         let [low, high] = self.range;

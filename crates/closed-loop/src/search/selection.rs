@@ -11,9 +11,12 @@
 //!
 //! whose inverses add up to 1 (weighted Bonferroni). That is between paying by
 //! groups, with which a scale of one column would pay for hundreds of warm
-//! pixels, and by kinds, with which these would pay alone. Of the eligible ones the largest gain
-//! after a price per parameter wins, so that a flexible wrong effect does not
-//! beat a stiff right one:
+//! pixels, and by kinds, with which these would pay alone. A group that was picked by
+//! looking at the data (the best line of a spectrum) counts for all that it was picked
+//! from, as if each of them had been tried.
+//!
+//! Of the eligible ones the largest gain after a price per parameter wins, so that a
+//! flexible wrong effect does not beat a stiff right one:
 //!
 //! ```text
 //! rank = delta loglik - (p/2) ln n
@@ -46,6 +49,8 @@ pub(crate) struct Group {
     /// Choices among discrete forms that the group stands for, each paid for like
     /// a parameter.
     pub(crate) choices: usize,
+    /// Forms that it was picked from by looking at the data.
+    pub(crate) picked_from: usize,
     /// Parameters that the columns follow non-linearly, found by scanning.
     pub(crate) shapes: usize,
     /// Groups of one family are forms of one cause: at most one is chosen.
@@ -123,7 +128,7 @@ pub(crate) fn costs(groups: &[Group], may: &[bool]) -> Vec<f64> {
     let mut of_kind: BTreeMap<&str, f64> = BTreeMap::new();
     let tried = groups.iter().zip(may);
     for (group, _) in tried.filter(|(g, may)| **may && !g.columns.is_empty()) {
-        *of_kind.entry(group.kind).or_default() += 1.0;
+        *of_kind.entry(group.kind).or_default() += group.picked_from as f64;
     }
     let all: f64 = of_kind.values().map(|n| n.sqrt()).sum();
     let root = |g: &Group| of_kind.get(g.kind).map_or(1.0, |n| n.sqrt());
@@ -237,5 +242,38 @@ fn judge(
             .all(|([low, high], &i)| (*low..=*high).contains(&estimate.value[i])),
         p_value: (estimate.p_value(&which) * cost[g]).min(1.0),
         observable: true,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn group(kind: &'static str, picked_from: usize) -> Group {
+        Group {
+            columns: vec![0],
+            bounds: Vec::new(),
+            choices: 0,
+            picked_from,
+            shapes: 0,
+            family: String::new(),
+            kind,
+        }
+    }
+
+    /// One line picked from 1600 and 23 tried, and one of a kind: all that was looked at adds up to 1.
+    #[test]
+    fn what_was_picked_pays_for_all_that_it_was_picked_from() {
+        let mut groups = vec![group("line", 1); 23];
+        groups.push(group("line", 1600));
+        groups.push(group("step", 1));
+        let cost = costs(&groups, &[true; 25]);
+        let total: f64 = groups
+            .iter()
+            .zip(&cost)
+            .map(|(g, c)| g.picked_from as f64 / c)
+            .sum();
+        assert!((total - 1.0).abs() < 1e-12, "{total}");
+        assert!(cost[23] > 1600.0 && cost[24] < 50.0, "{cost:?}");
     }
 }

@@ -3,6 +3,7 @@
 mod inputs;
 mod invariances;
 mod kit;
+mod lines;
 mod noise;
 mod nulls;
 mod patterns;
