@@ -373,7 +373,7 @@ mod tests {
     #[test]
     fn a_line_that_all_stars_share_is_told_once() {
         let own = OwnSeries {
-            line_hz: Some(0.5235),
+            line_hz: Some(0.6235),
             bin_hz: 0.002,
             explained: 0.3,
             ..OwnSeries::default()
@@ -386,9 +386,9 @@ mod tests {
             own.tell(&mut left, 1.0);
             left
         };
-        assert_eq!(told(0.523).lines_hz, [0.523]);
-        assert!(told(0.523).depends_on.is_empty());
-        assert_eq!(told(0.53).lines_hz, [0.5235, 0.53]);
-        assert_eq!(told(0.53).depends_on[0].variable, "time*star");
+        assert_eq!(told(0.623).lines_hz, [0.623]);
+        assert!(told(0.623).depends_on.is_empty());
+        assert_eq!(told(0.63).lines_hz, [0.6235, 0.63]);
+        assert_eq!(told(0.63).depends_on[0].variable, "time*star");
     }
 }
