@@ -2,10 +2,10 @@
 
 use closed_loop::close;
 use scenarios::{Scenario, simulate};
-use telemetry::report::{Report, Verdict};
+use telemetry::report::{Errors, Report, Verdict};
 
-/// The report on a tracker at rest that swings by `effect`.
-fn report(tables: &str, duration_s: f64, rate_hz: f64, seed: u64, effect: &str) -> Report {
+/// A tracker at rest that swings by `effect`.
+fn scenario(tables: &str, duration_s: f64, rate_hz: f64, seed: u64, effect: &str) -> Scenario {
     let text = format!(
         r#"
 format = "boresight-model/1"
@@ -29,7 +29,11 @@ seed = {seed}
 tables = [{tables}]
 "#
     );
-    let scenario = Scenario::parse(&text, "lines.toml").unwrap();
+    Scenario::parse(&text, "lines.toml").unwrap()
+}
+
+fn report(tables: &str, duration_s: f64, rate_hz: f64, seed: u64, effect: &str) -> Report {
+    let scenario = scenario(tables, duration_s, rate_hz, seed, effect);
     let bundle = simulate(&scenario).unwrap();
     let model = scenario.model_without_effects();
     close(&model, &bundle, &|_| ()).unwrap().report
@@ -74,4 +78,44 @@ fn a_line_beyond_the_harmonics_is_named() {
 fn a_line_that_means_would_hide_is_named() {
     // 0.044 arcsec an amplitude: 6.8 sigma each, or 3.7 in pairs, which a scan of 7000 does not let pass
     assert_named(&report(ATTITUDE, 700.0, 5.0, 4, &line(1.6, 0.3)), 1.6);
+}
+
+/// Seconds since an epoch seventeen years ago. At t = 0 nothing would be known of the line's phase; from the
+/// middle of the run amplitudes have the sigma of theory, s sqrt(2/n) = 0.107 arcsec (s = 7.43/sqrt(2 * 8), n = 600),
+/// and the model as it is written takes the line away.
+#[test]
+fn amplitudes_of_a_line_mean_something_far_from_the_epoch() {
+    const LATE_S: f64 = 5.5e8;
+    let scenario = scenario(ATTITUDE, 300.0, 2.0, 5, &line(0.0213, 1.5));
+    let mut bundle = simulate(&scenario).unwrap();
+    let attitude = bundle.attitude.as_mut().unwrap();
+    attitude.t_s.iter_mut().for_each(|t| *t += LATE_S);
+    let reference = bundle.reference.as_mut().unwrap();
+    reference.t_s.iter_mut().for_each(|t| *t += LATE_S);
+    let closed = close(&scenario.model_without_effects(), &bundle, &|_| ()).unwrap();
+    assert_eq!(closed.report.effects.len(), 1);
+    let found = &closed.report.effects[0].parameters;
+    let from_s = found["from_s"].value;
+    assert!((from_s - LATE_S - 149.75).abs() < 0.3, "{from_s}");
+    let (sin, cos) = (std::f64::consts::TAU * 0.0213 * (from_s - LATE_S)).sin_cos();
+    for (name, truth) in [
+        ("x_cos_arcsec", 1.5 * cos),
+        ("x_sin_arcsec", -1.5 * sin),
+        ("y_cos_arcsec", 1.5 * sin),
+        ("y_sin_arcsec", 1.5 * cos),
+    ] {
+        let (value, sigma) = (found[name].value, found[name].sigma.unwrap());
+        assert!((0.08..0.16).contains(&sigma), "{name}: {sigma}");
+        assert!(
+            (value - truth).abs() < 5.0 * sigma,
+            "{name}: {value} {truth}"
+        );
+    }
+    let again = close(&closed.model, &bundle, &|_| ()).unwrap().report;
+    assert_eq!(again.verdict, Verdict::Consistent);
+    // what that leaves is what the fit left, but for what the other folds did not know: (1 + 6/480)^1/2
+    let rms = |errors: &Errors| errors.attitude_rms_arcsec.unwrap();
+    for (left, after) in rms(&again.before).iter().zip(rms(&closed.report.after)) {
+        assert!((left / after - 1.0).abs() < 0.02, "{left} {after}");
+    }
 }
