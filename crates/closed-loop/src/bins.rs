@@ -30,6 +30,11 @@ pub(crate) struct Bins {
 }
 
 impl Bins {
+    /// Whether a line at this frequency survives the means.
+    pub(crate) fn resolve(&self, frequency_hz: f64) -> bool {
+        median_step(&self.t_s).is_some_and(|step| frequency_hz < 0.5 / step)
+    }
+
     /// Cuts the rows at `t_s`, whose folds are `folds`, into about `most` at most.
     pub(crate) fn cut(t_s: &[f64], folds: &Folds, most: usize) -> Self {
         let size = t_s.len().div_ceil(most).max(1);

@@ -213,7 +213,9 @@ fn every_description_builds_the_same_effect_again() {
         all.extend(candidates(&bench, kind.id()));
     }
     all.push(step_at(40.0, [0.0, 120.0]));
-    all.push(line_at(0.0123, 120.0));
+    all.push(line_at(0.0123, [0.0, 120.0], 1));
+    // the phase counts from the middle of data this late
+    all.push(line_at(0.0123, [500.0, 620.0], 1));
     assert!(all.len() > 60);
     for candidate in all {
         let values = a_third(candidate.as_ref());

@@ -48,6 +48,10 @@ pub(crate) trait Bending: Clone + Debug + Send + Sync + 'static {
     fn nonlinear(&self) -> Vec<Nonlinear> {
         Vec::new()
     }
+    /// See [`Candidate::stands_for`].
+    fn stands_for(&self) -> f64 {
+        1.0
+    }
     /// With other non-linear parameters.
     fn with_nonlinear(&self, values: &[f64]) -> Option<Self> {
         let _ = values;
@@ -127,6 +131,9 @@ impl<B: Bending> Candidate for BendingCandidate<B> {
     }
     fn nonlinear(&self) -> Vec<Nonlinear> {
         self.bending.nonlinear()
+    }
+    fn stands_for(&self) -> f64 {
+        self.bending.stands_for()
     }
     fn with_nonlinear(&self, values: &[f64]) -> Option<Box<dyn Candidate>> {
         assert_eq!(

@@ -242,8 +242,10 @@ mod tests {
             ..bench.scene(None)
         };
         let tried = Kind.candidates(&scene);
-        let id = |c: &Box<dyn Candidate>| c.selectors()["star_id"].parse::<i64>().unwrap();
-        let ids: Vec<i64> = tried.iter().map(id).collect();
+        let ids: Vec<i64> = tried
+            .iter()
+            .map(|c| c.selectors()["star_id"].parse().unwrap())
+            .collect();
         let expected: Vec<i64> = (0..200).filter(|k| (37 * k) % 200 >= 136).collect();
         assert_eq!(ids, expected);
         assert!(tried.iter().all(|c| (c.stands_for() - 3.125).abs() < 1e-12));

@@ -1,8 +1,12 @@
 //! Periodic misalignment: one line in the attitude, of any cause.
 //!
 //! ```text
-//! theta_a(t) = a_cos cos(2 pi f t) + a_sin sin(2 pi f t),    a = x, y, z      arcsec, tracker axes
+//! theta_a(t) = a_cos cos(2 pi f (t - from)) + a_sin sin(2 pi f (t - from)),    a = x, y, z      arcsec, tracker axes
 //! ```
+//!
+//! The phase counts from `from_s`, which is 0 where it is not given. A frequency that is known to `s_f` turns the
+//! phase by 2 pi `s_f` (t - from), so that amplitudes far from the data are those of no line: where t = 0 lies more
+//! than the data's own span from their middle, a line is found with the middle as `from_s`.
 //!
 //! Source: definition; harmonics of the orbit, for instance.
 
@@ -28,8 +32,8 @@ const NAMES: [&str; 6] = [
 
 /// A line goes round at least twice in the data: what does not is a drift.
 const FEWEST_CYCLES: u32 = 2;
-/// Frequencies that the catalogue proposes: the first harmonics of the span. A line above them is
-/// found in a spectrum, and [`line_at`] makes its candidate.
+/// Frequencies that the catalogue proposes: the first harmonics of the span. A line above them, or
+/// between them, is found in a spectrum, and [`line_at`] makes its candidate.
 const HARMONICS: u32 = 24;
 
 /// The kind.
@@ -57,15 +61,17 @@ impl EffectKind for Kind {
         parameters: &Parameters,
         _: &Surroundings<'_>,
     ) -> Result<Box<dyn Effect>, EffectError> {
-        let mut known = vec!["frequency_hz"];
+        let mut known = vec!["frequency_hz", "from_s"];
         known.extend(NAMES);
         let reader = Reader::new(ID, parameters, &known)?;
         let frequency_hz = reader.within("frequency_hz", [1e-12, 1e6], "positive")?;
         let values = reader.axes(NAMES)?;
         let bending = Line {
             frequency_hz,
+            from_s: reader.number("from_s")?.unwrap_or(0.0),
             range: [frequency_hz; 2],
             step: 0.0,
+            picked_from: 1,
         };
         Ok(Box::new(Bent {
             bending,
@@ -73,37 +79,43 @@ impl EffectKind for Kind {
         }))
     }
     fn candidates(&self, scene: &Scene<'_>) -> Vec<Box<dyn Candidate>> {
-        let span = scene.surroundings.length_s();
+        let (span_s, span) = (scene.surroundings.span_s, scene.surroundings.length_s());
         if !scene.sees_misalignment() || span <= 0.0 {
             return Vec::new();
         }
         (FEWEST_CYCLES..=HARMONICS)
             .map(|k| f64::from(k) / span)
             .take_while(|f| *f < 0.5 / scene.step_s)
-            .map(|f| line_at(f, span))
+            .map(|f| line_at(f, span_s, 1))
             .collect()
     }
 }
 
-/// A line of unknown amplitude at `frequency_hz`, in data `span_s` long.
+/// A line of unknown amplitude at `frequency_hz`, in data from `span_s[0]` to `span_s[1]`, picked from
+/// so many frequencies by looking at the data.
 ///
 /// Frequency is refined within half a bin `1 / span_s` to either side: what a line leaves at a slightly
 /// wrong frequency would pass for another line.
-pub fn line_at(frequency_hz: f64, span_s: f64) -> Box<dyn Candidate> {
-    let bin = 1.0 / span_s;
+pub fn line_at(frequency_hz: f64, span_s: [f64; 2], picked_from: usize) -> Box<dyn Candidate> {
+    let (span, middle) = (span_s[1] - span_s[0], 0.5 * (span_s[0] + span_s[1]));
+    let bin = 1.0 / span;
     let range = [(frequency_hz - bin).max(1.5 * bin), frequency_hz + bin];
     BendingCandidate::boxed(Line {
         frequency_hz,
+        from_s: if middle.abs() > span { middle } else { 0.0 },
         range,
         step: 0.5 * bin,
+        picked_from,
     })
 }
 
 #[derive(Clone, Debug)]
 struct Line {
     frequency_hz: f64,
+    from_s: f64,
     range: [f64; 2],
     step: f64,
+    picked_from: usize,
 }
 
 impl Bending for Line {
@@ -119,11 +131,16 @@ impl Bending for Line {
         2
     }
     fn at(&self, t_s: f64, out: &mut [f64]) {
-        let (sin, cos) = (TAU * (self.frequency_hz * t_s).fract()).sin_cos();
+        let turns = self.frequency_hz * (t_s - self.from_s);
+        let (sin, cos) = (TAU * turns.fract()).sin_cos();
         out.copy_from_slice(&[cos, sin]);
     }
     fn fixed(&self) -> Vec<Parameter> {
-        vec![Parameter::new("frequency_hz", self.frequency_hz, "Hz")]
+        let mut all = vec![Parameter::new("frequency_hz", self.frequency_hz, "Hz")];
+        if self.from_s != 0.0 {
+            all.push(Parameter::new("from_s", self.from_s, "s"));
+        }
+        all
     }
     fn nonlinear(&self) -> Vec<Nonlinear> {
         vec![Nonlinear {
@@ -133,6 +150,9 @@ impl Bending for Line {
             range: self.range,
             step: self.step,
         }]
+    }
+    fn stands_for(&self) -> f64 {
+        self.picked_from as f64
     }
     fn with_nonlinear(&self, values: &[f64]) -> Option<Self> {
         let [low, high] = self.range;

@@ -84,9 +84,9 @@ impl AttitudeData {
         }
     }
 
-    /// Cuts the bins and counts what counts in them.
-    pub(crate) fn rebin(&mut self, folds: &Folds) {
-        self.bins = Bins::cut(&self.t_s, folds, MOST);
+    /// Cuts about `most` bins at most, and counts what counts in them.
+    pub(crate) fn rebin(&mut self, folds: &Folds, most: usize) {
+        self.bins = Bins::cut(&self.t_s, folds, most);
         self.count = std::array::from_fn(|axis| {
             let kept =
                 |rows: &Range<usize>| rows.clone().filter(|&k| !self.outlier[axis][k]).count();

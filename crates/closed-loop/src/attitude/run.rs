@@ -9,6 +9,7 @@ use effects::{Candidate, Scene};
 use crate::attitude::data::{AttitudeData, AttitudeEvidence};
 use crate::attitude::search;
 use crate::attitude::spatial_errors::SpatialErrors;
+use crate::bins;
 use crate::close::{Closed, Rival, catalogue_candidates};
 use crate::declared;
 use crate::error::CloseError;
@@ -23,7 +24,8 @@ use crate::search::instants;
 use crate::search::selection::columns_of;
 use crate::search::{Found, amplitudes, borrowed, fit};
 use crate::situation::{Situation, channels_of_interest};
-use crate::unexplained::leftover;
+use crate::unexplained::leftover::lines::SharedLine;
+use crate::unexplained::leftover::{self, Series};
 use nalgebra::{DVector, UnitQuaternion};
 use spectra::robust::{self, median_step};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -72,15 +74,30 @@ pub(crate) fn run(
     let before = settle(&mut data, situation, &folds, motion)?;
 
     progress("searching for causes");
-    let mut candidates = catalogue_candidates(&scene(situation, &data));
-    candidates.retain(|c| c.acts_on_attitude());
-    candidates.extend(leftover_terms(situation, &data));
-    let with_noise = |noise: [Coloured; 3]| evidence(&data, situation, noise, motion);
-    let start = fit_noise(&data, &before);
+    let scene = scene(situation, &data);
     let changes = SpatialErrors::declared(situation, &data.t_s);
+    let search = |data: &AttitudeData, line: Option<SharedLine>| {
+        let mut list = catalogue_candidates(&scene);
+        list.retain(|c| c.acts_on_attitude());
+        list.extend(leftover_terms(situation, data));
+        list.extend(line.map(|line| line.candidate(&scene)));
+        let with_noise = |noise: [Coloured; 3]| evidence(data, situation, noise, motion);
+        let (bins, start) = (&data.bins.folds, fit_noise(data, &before));
+        let (found, noise) = search::search(&with_noise, data, bins, &folds, list, changes, start)?;
+        let inside = in_sample(&with_noise(noise), data.t_s.len(), &found);
+        let series = inside.map(|inside| tracks(data, &inside, changes));
+        Ok::<_, CloseError>((found, noise, series))
+    };
+    let (mut found, mut noise, mut series) = search(&data, None)?;
+    if let Some(line) = series.as_ref().and_then(Series::shared_line) {
+        progress("searching again with the line that is left");
+        if !data.bins.resolve(line.frequency_hz) {
+            data.rebin(&folds, leftover::MOST_POINTS);
+        }
+        (found, noise, series) = search(&data, Some(line))?;
+    }
     let bins = &data.bins.folds;
-    let (found, noise) =
-        search::search(&with_noise, &data, bins, &folds, candidates, changes, start)?;
+    let with_noise = |noise: [Coloured; 3]| evidence(&data, situation, noise, motion);
     let after = residuals(&with_noise(noise), &folds, &found, &found.selection.chosen)?;
     let mut rivals = Vec::new();
     for (set, gain) in search::rivals(&with_noise, &data, bins, &found, noise) {
@@ -95,7 +112,7 @@ pub(crate) fn run(
     }
     progress("figures");
     finish(
-        situation, &data, &folds, noise, motion, &found, before, after, rivals, changes,
+        situation, &data, &folds, noise, motion, &found, before, after, rivals, changes, series,
     )
 }
 
@@ -124,7 +141,7 @@ fn settle(
 ) -> Result<Residuals, CloseError> {
     let white = [Coloured::WHITE; 3];
     loop {
-        data.rebin(folds);
+        data.rebin(folds, bins::MOST);
         let evidence = evidence(data, situation, white, motion);
         let fitted = fit(&evidence, &data.bins.folds, &[])?;
         let amplitudes = amplitudes(&fitted, folds, &[], 0).ok_or(CloseError::Singular)?;
@@ -300,6 +317,14 @@ fn in_sample(evidence: &AttitudeEvidence<'_>, rows: usize, found: &Found) -> Opt
     Some(evidence.residuals(&Folds::whole(rows), &list, &amplitudes))
 }
 
+/// What lines and jumps are looked for in.
+fn tracks(data: &AttitudeData, residual: &Residuals, changes: Option<SpatialErrors>) -> Series {
+    let (axes, outlier) = (&residual.axes, &data.outlier);
+    Series::of(&leftover::attitude_tracks(
+        &data.t_s, axes, outlier, changes,
+    ))
+}
+
 /// Squared length of each candidate column about its mean on every axis, arcsec^2.
 fn column_lengths(evidence: &AttitudeEvidence<'_>, found: &Found) -> Vec<f64> {
     let data = evidence.data;
@@ -348,6 +373,7 @@ fn finish(
     after: Residuals,
     rivals: Vec<Rival>,
     changes: Option<SpatialErrors>,
+    series: Option<Series>,
 ) -> Result<Closed, CloseError> {
     let chosen = &found.selection.chosen;
     let evidence = evidence(data, situation, noise, motion);
@@ -409,14 +435,8 @@ fn finish(
         let declared = changes.map_or([0.0; 3], |c| c.slow_arcsec);
         slow_leftover(data, &plain, declared, &mut unattributed, last / whole);
     }
-    let inside = in_sample(&evidence, data.t_s.len(), found);
-    let tracks = leftover::attitude_tracks(
-        &data.t_s,
-        &inside.as_ref().unwrap_or(&plain).axes,
-        &data.outlier,
-        changes,
-    );
-    leftover::describe(&tracks).tell(&mut unattributed);
+    let series = series.unwrap_or_else(|| tracks(data, &plain, changes));
+    series.describe().tell(&mut unattributed);
     let errors = |r: &Residuals| Errors {
         star_rms_arcsec: None,
         attitude_rms_arcsec: Some(std::array::from_fn(|a| {

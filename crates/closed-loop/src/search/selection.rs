@@ -11,11 +11,12 @@
 //!
 //! whose inverses add up to 1 (weighted Bonferroni). That is between paying by
 //! groups, with which a scale of one column would pay for hundreds of warm
-//! pixels, and by kinds, with which these would pay alone. Groups that were
-//! picked by the same data out of m times as many pay m times that: so do
-//! the inverses of all that were looked at add up to 1. Of the eligible ones the largest gain
-//! after a price per parameter wins, so that a flexible wrong effect does not
-//! beat a stiff right one:
+//! pixels, and by kinds, with which these would pay alone. A group that was picked by
+//! looking at the data (the best line of a spectrum) counts for all that it was picked
+//! from, as if each of them had been tried.
+//!
+//! Of the eligible ones the largest gain after a price per parameter wins, so that a
+//! flexible wrong effect does not beat a stiff right one:
 //!
 //! ```text
 //! rank = delta loglik - (p/2) ln n
@@ -132,12 +133,11 @@ pub(crate) fn costs(groups: &[Group], may: &[bool]) -> Vec<f64> {
     let mut of_kind: BTreeMap<&str, f64> = BTreeMap::new();
     let tried = groups.iter().zip(may);
     for (group, _) in tried.filter(|(g, may)| **may && !g.columns.is_empty()) {
-        *of_kind.entry(group.kind).or_default() += 1.0;
+        *of_kind.entry(group.kind).or_default() += group.stands_for;
     }
     let all: f64 = of_kind.values().map(|n| n.sqrt()).sum();
     let root = |g: &Group| of_kind.get(g.kind).map_or(1.0, |n| n.sqrt());
-    let pays = |g: &Group| g.stands_for * root(g) * all.max(1.0);
-    groups.iter().map(pays).collect()
+    groups.iter().map(|g| root(g) * all.max(1.0)).collect()
 }
 
 /// Groups that may be added to `chosen`, best first: by the gain out of fold after
@@ -280,10 +280,12 @@ mod tests {
         let counted = (0..groups.len()).filter(|&g| may[g] && !groups[g].columns.is_empty());
         let shares: f64 = counted.map(|g| cost[g].recip()).sum();
         assert!((shares - 1.0).abs() < 1e-12, "{shares}");
-        groups[3].stands_for = 20.0;
-        let picked = costs(&groups, &may);
-        assert!((picked[3] - 20.0 * cost[3]).abs() < 1e-9 && picked[4..] == cost[4..]);
         // sqrt(1) and sqrt(100), each times 1 + 10 + sqrt(14)
         assert!((cost[0] - 14.742).abs() < 1e-3 && (cost[3] - 147.42).abs() < 1e-2);
+        // a pixel that was picked from 301, and all others of its kind, pay for 400
+        groups[3].stands_for = 301.0;
+        let picked = costs(&groups, &may);
+        let each = 20.0 * (1.0 + 20.0 + 14.0_f64.sqrt());
+        assert!((picked[3] - each).abs() < 1e-9 && (picked[4] - each).abs() < 1e-9);
     }
 }

@@ -39,9 +39,10 @@ use crate::star::evidence::StarEvidence;
 use crate::star::own_attitude;
 use crate::star::pointed::Pointed;
 use crate::star::reference_wander::{self, REFERENCE_ERROR};
-use crate::star::search::Wander;
+use crate::star::search::{Searched, Wander};
 use crate::star::settling::{Settled, settle};
-use crate::unexplained::leftover;
+use crate::unexplained::leftover::lines::SharedLine;
+use crate::unexplained::leftover::{self, Series};
 use crate::unexplained::pattern::{self, Rotation, less_rotation};
 use crate::unexplained::star_series;
 
@@ -208,25 +209,42 @@ fn explain(
     let own = own.and_then(|(image, formed)| image.level(formed));
     let own = own.map(|(variants, zero_px)| anew(variants, &zero_px));
     let level = own.as_ref().unwrap_or(&measured);
-    let candidates = || {
-        let mut list = catalogue_candidates(&scene);
-        // With raw windows a warm pixel is the dark map's business.
-        list.retain(|c| c.acts_on_stars() && !(formed.is_some() && c.id() == "hot_pixel"));
-        list
+    let ways = description::ways(situation, data);
+    let named = |line: Option<SharedLine>| {
+        let candidates = || {
+            let mut list = catalogue_candidates(&scene);
+            // With raw windows a warm pixel is the dark map's business.
+            list.retain(|c| c.acts_on_stars() && !(formed.is_some() && c.id() == "hot_pixel"));
+            list.extend(line.map(|line| line.candidate(&scene)));
+            list
+        };
+        let quest = Quest {
+            candidates: &candidates,
+            terms: &|| description::terms(situation, data),
+            ways: &ways,
+            surroundings: situation.surroundings(),
+        };
+        causes::run(level, folds, &quest)
     };
-    let quest = Quest {
-        candidates: &candidates,
-        terms: &|| description::terms(situation, data),
-        ways: &description::ways(situation, data),
-        surroundings: situation.surroundings(),
+    let left = |searched: &Searched<'_>| {
+        let level = searched.evidence.as_ref().unwrap_or(level);
+        let residual = noise_effects::in_sample(level, &searched.found)?;
+        let series = Series::of(&leftover::star_tracks(data, &residual, &level.weight));
+        Some((residual, series))
     };
+    let mut outcome = named(None)?;
+    let mut inside = left(&outcome.searched);
+    if let Some(line) = inside.as_ref().and_then(|(_, series)| series.shared_line()) {
+        progress("searching again with the line that is left");
+        outcome = named(Some(line))?;
+        inside = left(&outcome.searched);
+    }
     let Named {
-        searched,
+        mut searched,
         described,
         slow,
         oversize,
-    } = causes::run(level, folds, &quest)?;
-    let mut searched = searched;
+    } = outcome;
     if situation.questions.empirical {
         description::offer(
             searched.evidence.as_ref().unwrap_or(level),
@@ -256,7 +274,7 @@ fn explain(
         return Ok(Explained::Elsewhere([whole.fitted()?, after.modelled]));
     }
     progress("figures");
-    Ok(Explained::Closed(Box::new(finish(&whole, after)?)))
+    Ok(Explained::Closed(Box::new(finish(&whole, after, inside)?)))
 }
 
 fn scene<'a>(
@@ -352,8 +370,13 @@ impl Finish<'_> {
     }
 }
 
-/// `plain`: what the chosen effects leave.
-fn finish(f: &Finish<'_>, plain: Residuals) -> Result<Closed, CloseError> {
+/// `plain`: what the chosen effects leave out of fold; `inside`: in sample, where that is known, with its
+/// series.
+fn finish(
+    f: &Finish<'_>,
+    plain: Residuals,
+    inside: Option<(Vec<Vec<f64>>, Series)>,
+) -> Result<Closed, CloseError> {
     let chosen = &f.found.selection.chosen;
     let whole = f.power(&f.settled.before);
     let mut explained = Vec::new();
@@ -409,9 +432,11 @@ fn finish(f: &Finish<'_>, plain: Residuals) -> Result<Closed, CloseError> {
         effects.push(effect);
         entries.push(entry);
     }
-    let inside = noise_effects::in_sample(f.level, f.found);
-    let residual = inside.as_deref().unwrap_or(&plain.axes);
     let weight = &f.level.weight;
+    let (inside, series) = inside.unzip();
+    let residual = inside.as_deref().unwrap_or(&plain.axes);
+    let series =
+        series.unwrap_or_else(|| Series::of(&leftover::star_tracks(f.data, residual, weight)));
     let both = [residual[0].as_slice(), &residual[1]];
     let turned = |rotation| less_rotation(f.data, both, weight, rotation);
     let known = turned(Rotation::Known);
@@ -428,7 +453,7 @@ fn finish(f: &Finish<'_>, plain: Residuals) -> Result<Closed, CloseError> {
                         None => [residual, residual],
                     };
                     (
-                        leftover::describe(&leftover::star_tracks(f.data, residual, weight)),
+                        series.describe(),
                         star_series::search(f.data, own, alone, weight),
                     )
                 },

@@ -8,9 +8,8 @@
 //! ```
 //!
 //! with M frequencies on a grid four times finer than 1/span, and n independent ones
-//! around f that the mean is of: noise whose density is smooth there passes P < alpha
-//! that rarely, whatever its colour. What is found is refined to the top of z, taken out
-//! of the series as it was before whitening, and the search goes on. Steps then,
+//! around f that the mean is of ([`lines`]). What is found is refined to the top of z, taken
+//! out of the series as it was before whitening, and the search goes on. Steps then,
 //!
 //! ```text
 //! P = M chi2_1 of 2 (L(step, its best noise) - L(best noise)) / 1.3
@@ -24,8 +23,8 @@ use block_regression::Folds;
 use coloured_noise::Coloured;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3, Vector4};
 use rayon::prelude::*;
+use spectra::robust;
 use spectra::robust::median_step;
-use spectra::{LombScargle, LombScargleSettings, robust};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use crate::attitude::spatial_errors::SpatialErrors;
@@ -34,23 +33,17 @@ use crate::search::selection::FAMILY_ALPHA;
 use crate::star::data::StarData;
 use crate::star::frame_rotation::rotation_row;
 use crate::star::search::WIDENING;
+use lines::Spectrum;
 use telemetry::report::Unattributed;
 
+pub(crate) mod lines;
 #[cfg(test)]
 mod tests;
 
 /// Fewest points of a series that is searched.
 const MIN_POINTS: usize = 60;
-/// Grid points in 1/span.
-const FINER: usize = 4;
-/// Independent frequencies on each side that the mean power is of.
-const AROUND: usize = 15;
-/// Nearer ones hold the line's own power.
-const GUARD: usize = 2;
-/// Fewer cycles in the span are no line but a trend.
-const MIN_CYCLES: f64 = 3.0;
 /// Points of a series beyond which neighbours are averaged.
-const MOST_POINTS: usize = 4800;
+pub(crate) const MOST_POINTS: usize = 4800;
 /// Lines, and jumps, of one series.
 const MOST: usize = 5;
 /// Instants tried before the neighbours of the best are.
@@ -78,6 +71,8 @@ pub(crate) struct Track {
     pub(crate) weight: Vec<f64>,
     /// Jumps that the declared model makes on this axis.
     pub(crate) changes: Option<(SpatialErrors, usize)>,
+    /// It is about an axis that the tracker turns about.
+    pub(crate) turns: bool,
 }
 
 /// Lines and jumps of one bundle.
@@ -96,48 +91,59 @@ impl Leftover {
     }
 }
 
-/// Searches `tracks`.
-pub(crate) fn describe(tracks: &[Track]) -> Leftover {
-    let alpha = FAMILY_ALPHA / (2.0 * tracks.len().max(1) as f64);
-    let thinned: Vec<Track> = tracks
-        .par_iter()
-        .map(Track::thinned)
-        .filter(|track| track.t_s.len() >= MIN_POINTS)
-        .collect();
-    // most series have the same times, and one plan serves them
-    let first = |k: usize| thinned[..k].iter().position(|t| t.t_s == thinned[k].t_s);
-    let plans: Vec<Option<LombScargle>> = (0..thinned.len())
-        .into_par_iter()
-        .map(|k| first(k).is_none().then(|| thinned[k].plan())?)
-        .collect();
-    let each: Vec<_> = (0..thinned.len())
-        .into_par_iter()
-        .map(|k| {
-            let mut track = thinned[k].clone();
-            let lines = track.lines(alpha, plans[first(k).unwrap_or(k)].as_ref());
-            let jumps = track.jumps(alpha);
-            (track, lines, jumps)
-        })
-        .collect();
-    let mut out = Leftover::default();
-    for (track, lines, jumps) in each {
-        let span = track.span();
-        for f in lines {
-            // the same line in two series is one
-            if out.lines_hz.iter().all(|g| (f - g).abs() > 1.0 / span) {
-                out.lines_hz.push(f);
-            }
-        }
-        let step = median_step(&track.t_s).unwrap_or(0.0);
-        for t in jumps {
-            if out.jumps_s.iter().all(|s| (t - s).abs() > 2.5 * step) {
-                out.jumps_s.push(t);
-            }
+/// Series with their spectra: what lines and jumps are looked for in.
+pub(crate) struct Series {
+    each: Vec<(Track, Option<Spectrum>)>,
+    /// Chance that one of them shows a line, or a jump, that is none.
+    alpha: f64,
+}
+
+impl Series {
+    pub(crate) fn of(tracks: &[Track]) -> Self {
+        let thinned: Vec<Track> = tracks
+            .par_iter()
+            .map(Track::thinned)
+            .filter(|track| track.t_s.len() >= MIN_POINTS)
+            .collect();
+        let spectra = lines::spectra(&thinned);
+        Self {
+            each: thinned.into_iter().zip(spectra).collect(),
+            alpha: FAMILY_ALPHA / (2.0 * tracks.len().max(1) as f64),
         }
     }
-    out.lines_hz.sort_by(f64::total_cmp);
-    out.jumps_s.sort_by(f64::total_cmp);
-    out
+
+    /// Lines and jumps of all of them.
+    pub(crate) fn describe(self) -> Leftover {
+        let alpha = self.alpha;
+        let each: Vec<_> = self
+            .each
+            .into_par_iter()
+            .map(|(mut track, spectrum)| {
+                let lines = spectrum.map_or_else(Vec::new, |s| track.lines(alpha, s));
+                let jumps = track.jumps(alpha);
+                (track, lines, jumps)
+            })
+            .collect();
+        let mut out = Leftover::default();
+        for (track, lines, jumps) in each {
+            let span = track.span();
+            for f in lines {
+                // the same line in two series is one
+                if out.lines_hz.iter().all(|g| (f - g).abs() > 1.0 / span) {
+                    out.lines_hz.push(f);
+                }
+            }
+            let step = median_step(&track.t_s).unwrap_or(0.0);
+            for t in jumps {
+                if out.jumps_s.iter().all(|s| (t - s).abs() > 2.5 * step) {
+                    out.jumps_s.push(t);
+                }
+            }
+        }
+        out.lines_hz.sort_by(f64::total_cmp);
+        out.jumps_s.sort_by(f64::total_cmp);
+        out
+    }
 }
 
 /// What the stars of a frame share, of residuals (arcsec, per axis over all rows) of this
@@ -150,8 +156,10 @@ pub(crate) fn star_tracks(data: &StarData, residual: &[Vec<f64>], weight: &[f64]
         value: vec![0.0; frames],
         weight: vec![0.0; frames],
         changes: None,
+        turns: false,
     };
     let mut tracks = vec![empty(); 3 + STRETCHES.len()];
+    tracks[..3].iter_mut().for_each(|t| t.turns = true);
     let half = data.camera.half_size_px();
     for frame in 0..frames {
         let rows: Vec<usize> = data
@@ -211,6 +219,7 @@ pub(crate) fn attitude_tracks(
         .enumerate()
         .map(|(axis, (value, outlier))| Track {
             changes: changes.map(|c| (c, axis)),
+            turns: true,
             t_s: t_s.to_vec(),
             value: value.clone(),
             weight: outlier.iter().map(|o| f64::from(u8::from(!o))).collect(),
@@ -243,6 +252,7 @@ impl Track {
             value: Vec::new(),
             weight: Vec::new(),
             changes: self.changes,
+            turns: self.turns,
         };
         for rows in rows {
             let (mut t, mut v, mut w) = (0.0, 0.0, 0.0);
@@ -307,139 +317,6 @@ impl Track {
             }
         }
         Some((beta.iter().copied().collect(), left))
-    }
-
-    /// Frequencies of lines that the declared model does not make; all are taken out of the series.
-    fn lines(&mut self, alpha: f64, plan: Option<&LombScargle>) -> Vec<f64> {
-        let mut found: Vec<f64> = Vec::new();
-        let whole = self.clone();
-        while found.len() < MOST {
-            let Some(f) = plan.and_then(|plan| self.strongest_line(alpha, plan)) else {
-                break;
-            };
-            found.push(f);
-            let noise = self.noise();
-            let Some((_, left)) = whole.take_out(&noise, &whole.sinusoids(&found)) else {
-                found.pop();
-                break;
-            };
-            *self = left;
-        }
-        // once more each, without what the others left in it
-        for k in 0..found.len() {
-            let others: Vec<f64> = (0..found.len())
-                .filter(|&j| j != k)
-                .map(|j| found[j])
-                .collect();
-            let noise = self.noise();
-            if let Some((_, left)) = whole.take_out(&noise, &whole.sinusoids(&others)) {
-                let step = 1.0 / (FINER as f64 * self.span());
-                found[k] = left.top(&left.whitened(&noise, &left.value), found[k], step);
-            }
-        }
-        if let Some((size, left)) = whole.take_out(&self.noise(), &whole.sinusoids(&found)) {
-            *self = left;
-            let declared = self.changes.map_or(0.0, |(c, axis)| c.slow_arcsec[axis]);
-            let rms = |k: usize| size[1 + 2 * k].hypot(size[2 + 2 * k]) / std::f64::consts::SQRT_2;
-            let each = found.into_iter().enumerate();
-            found = each
-                .filter(|(k, _)| rms(*k) > declared)
-                .map(|(_, f)| f)
-                .collect();
-        }
-        found
-    }
-
-    fn sinusoids(&self, frequencies: &[f64]) -> Vec<Vec<f64>> {
-        let mut columns = vec![vec![1.0; self.t_s.len()]];
-        for f in frequencies {
-            let phase = |t: &f64| std::f64::consts::TAU * f * (t - self.t_s[0]);
-            columns.push(self.t_s.iter().map(|t| phase(t).cos()).collect());
-            columns.push(self.t_s.iter().map(|t| phase(t).sin()).collect());
-        }
-        columns
-    }
-
-    /// Frequencies at which lines are looked for; `None` where the span is too short for any.
-    fn plan(&self) -> Option<LombScargle> {
-        let span = self.span();
-        let highest = 0.5 / median_step(&self.t_s)?;
-        let step = 1.0 / (FINER as f64 * span);
-        let first = MIN_CYCLES / span;
-        let bins = ((highest - first) / step).floor();
-        if bins.is_nan() || bins < (4 * FINER * AROUND) as f64 {
-            return None;
-        }
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "a positive number of grid points, limited by the number of samples"
-        )]
-        let bins = bins as usize;
-        let settings = LombScargleSettings {
-            first_hz: first,
-            step_hz: step,
-            bins,
-            floating_mean: true,
-            fs_hz: 1.0,
-        };
-        LombScargle::new(&self.t_s, settings).ok()
-    }
-
-    /// The frequency of the most certain line, if it is beyond doubt.
-    fn strongest_line(&self, alpha: f64, plan: &LombScargle) -> Option<f64> {
-        let (span, bins) = (self.span(), plan.bins());
-        let step = 1.0 / (FINER as f64 * span);
-        let first = MIN_CYCLES / span;
-        let white = self.whitened(&self.noise(), &self.value);
-        let power = plan.process(&white).ok()?.psd;
-        let near = |k: usize| -> (f64, f64) {
-            let (mut sum, mut count) = (0.0, 0.0);
-            for j in GUARD + 1..=GUARD + AROUND {
-                let off = j * FINER;
-                for at in [k.checked_sub(off), Some(k + off)].into_iter().flatten() {
-                    if let Some(p) = power.get(at) {
-                        sum += p;
-                        count += 1.0;
-                    }
-                }
-            }
-            (sum / count, count)
-        };
-        let log_p = |k: usize| {
-            let (mean, n) = near(k);
-            -n * (power[k] / mean / n).ln_1p()
-        };
-        let best = (0..bins).min_by(|&a, &b| log_p(a).total_cmp(&log_p(b)))?;
-        let p = log_p(best) + (bins as f64).ln();
-        (p < alpha.ln()).then(|| self.top(&white, first + best as f64 * step, step))
-    }
-
-    /// The top of the power near `f`, to a thousandth of a grid point.
-    fn top(&self, white: &[f64], f: f64, step: f64) -> f64 {
-        let power = |f: f64| {
-            let settings = LombScargleSettings {
-                first_hz: f,
-                step_hz: 1.0,
-                bins: 1,
-                floating_mean: true,
-                fs_hz: 1.0,
-            };
-            LombScargle::new(&self.t_s, settings)
-                .and_then(|plan| plan.process(white))
-                .map_or(0.0, |psd| psd.psd[0])
-        };
-        let (mut centre, mut width) = (f, step);
-        for _ in 0..12 {
-            let best = [-1.0, -0.5, 0.0, 0.5, 1.0]
-                .map(|s| centre + s * width)
-                .into_iter()
-                .filter(|f| *f > 0.0)
-                .max_by(|a, b| power(*a).total_cmp(&power(*b)));
-            centre = best.unwrap_or(centre);
-            width *= 0.5;
-        }
-        centre
     }
 
     /// Instants of jumps: the middle between the points on either side.

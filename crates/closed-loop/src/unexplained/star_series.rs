@@ -54,6 +54,8 @@ const SLOW_SHARE: f64 = 0.2;
 pub(crate) struct OwnSeries {
     pub(crate) line_hz: Option<f64>,
     pub(crate) jump_s: Option<f64>,
+    /// Lines nearer to each other are one.
+    bin_hz: f64,
     p_value: f64,
     explained: f64,
 }
@@ -62,11 +64,15 @@ impl OwnSeries {
     /// Writes it where it is reported; the stars' own time is what is left unless it is known what
     /// they follow. `left` is the share of the before variance that is left.
     pub(crate) fn tell(&self, unattributed: &mut Unattributed, left: f64) {
-        if self.line_hz.is_none() && self.jump_s.is_none() {
+        // a line that the stars of a frame share is in each of them, too
+        let lines = &mut unattributed.lines_hz;
+        let new = |f: &f64| lines.iter().all(|g| (f - g).abs() > self.bin_hz);
+        let line = self.line_hz.filter(new);
+        if line.is_none() && self.jump_s.is_none() {
             return;
         }
-        unattributed.lines_hz.extend(self.line_hz);
-        unattributed.lines_hz.sort_by(f64::total_cmp);
+        lines.extend(line);
+        lines.sort_by(f64::total_cmp);
         unattributed.jumps_s.extend(self.jump_s);
         unattributed.jumps_s.sort_by(f64::total_cmp);
         if !unattributed.present {
@@ -115,6 +121,7 @@ pub(crate) fn search(
     let (Some(&first), Some(&last)) = (data.frames.t_s.first(), data.frames.t_s.last()) else {
         return out;
     };
+    out.bin_hz = 1.0 / (last - first);
     if let Some((f, p, squares)) = line(&series, last - first) {
         out.line_hz = Some(f);
         out.p_value = p;
@@ -355,5 +362,33 @@ impl Own {
                 squares
             })
             .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A line that is listed already, and nothing else: it is told once, and the stars do nothing by themselves.
+    #[test]
+    fn a_line_that_all_stars_share_is_told_once() {
+        let own = OwnSeries {
+            line_hz: Some(0.6235),
+            bin_hz: 0.002,
+            explained: 0.3,
+            ..OwnSeries::default()
+        };
+        let told = |known: f64| {
+            let mut left = Unattributed {
+                lines_hz: vec![known],
+                ..Unattributed::default()
+            };
+            own.tell(&mut left, 1.0);
+            left
+        };
+        assert_eq!(told(0.623).lines_hz, [0.623]);
+        assert!(told(0.623).depends_on.is_empty());
+        assert_eq!(told(0.63).lines_hz, [0.6235, 0.63]);
+        assert_eq!(told(0.63).depends_on[0].variable, "time*star");
     }
 }

@@ -5,6 +5,7 @@ mod inputs;
 mod invariances;
 mod kit;
 mod light;
+mod lines;
 mod noise;
 mod nulls;
 mod patterns;

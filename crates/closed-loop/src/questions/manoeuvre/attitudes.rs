@@ -9,6 +9,7 @@ use nalgebra::DMatrix;
 
 use super::{Flown, information};
 use crate::attitude::data::{AttitudeData, AttitudeEvidence};
+use crate::bins::MOST;
 
 /// Information on the candidates' columns along a manoeuvre, with frames every `step_s`.
 pub(crate) fn fly(
@@ -23,7 +24,7 @@ pub(crate) fn fly(
     let series = flown.series(&t_s)?;
     let mut data = AttitudeData::against(&t_s, series.quaternions(), &series);
     let folds = Folds::cut(data.t_s.len());
-    data.rebin(&folds);
+    data.rebin(&folds, MOST);
     let thinned = (count as f64 / whole).sqrt();
     let evidence = AttitudeEvidence {
         data: &data,

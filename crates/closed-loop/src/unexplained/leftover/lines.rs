@@ -1,0 +1,299 @@
+//! Lines in series of one number a frame, and the one that several series share.
+//!
+//! ```text
+//! z(f) = power of the best sinusoid at f / mean power around f,    P = (1 + z/n)^-n
+//! P3(f) = chance that the product of as many P is as small         Fisher: -2 sum ln P ~ chi2_2k
+//! ```
+//!
+//! n independent frequencies around f are what the mean is of: noise whose density is smooth
+//! there passes P < alpha that rarely, whatever its colour. A line of the attitude acts on all
+//! axes, so that a product shows it where no axis does by itself.
+//!
+//! Source: Scargle 1982 (periodogram), the F law of a ratio of two mean powers; Fisher 1932 (the
+//! product of chances).
+
+use std::sync::Arc;
+
+use effects::{Candidate, Scene};
+use rayon::prelude::*;
+use spectra::robust::median_step;
+use spectra::{LombScargle, LombScargleSettings};
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+
+use super::{MOST, Series, Track};
+
+/// Grid points in 1/span.
+const FINER: usize = 4;
+/// Independent frequencies on each side that the mean power is of.
+const AROUND: usize = 15;
+/// Nearer ones hold the line's own power.
+const GUARD: usize = 2;
+/// Fewer cycles in the span are no line but a trend.
+const MIN_CYCLES: f64 = 3.0;
+/// Chance below which a line is worth a search with it: that judges it, and more strictly.
+const WORTH_A_SEARCH: f64 = 0.1;
+/// Grids whose points lie nearer than this share of their step are the same.
+const ALIKE: f64 = 0.1;
+
+/// Frequencies at which lines are looked for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Grid {
+    first_hz: f64,
+    step_hz: f64,
+    bins: usize,
+}
+
+impl Grid {
+    /// Of the span and the sampling of `track`; `None` where the span is too short for any.
+    fn of(track: &Track) -> Option<Self> {
+        let span = track.span();
+        let highest = 0.5 / median_step(&track.t_s)?;
+        let step_hz = 1.0 / (FINER as f64 * span);
+        let first_hz = MIN_CYCLES / span;
+        let bins = ((highest - first_hz) / step_hz).floor();
+        if bins.is_nan() || bins < (4 * FINER * AROUND) as f64 {
+            return None;
+        }
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a positive number of grid points, limited by the number of samples"
+        )]
+        let bins = bins as usize;
+        Some(Self {
+            first_hz,
+            step_hz,
+            bins,
+        })
+    }
+
+    fn at(&self, k: usize) -> f64 {
+        self.first_hz + k as f64 * self.step_hz
+    }
+
+    fn plan(&self, t_s: &[f64]) -> Option<LombScargle> {
+        let settings = LombScargleSettings {
+            first_hz: self.first_hz,
+            step_hz: self.step_hz,
+            bins: self.bins,
+            floating_mean: true,
+            fs_hz: 1.0,
+        };
+        LombScargle::new(t_s, settings).ok()
+    }
+
+    fn is_like(&self, other: &Self) -> bool {
+        let last = self.bins.min(other.bins) - 1;
+        let apart = |k| (self.at(k) - other.at(k)).abs();
+        apart(0).max(apart(last)) < ALIKE * self.step_hz
+    }
+}
+
+/// A series without its colour, and the chance of the power at every frequency.
+#[derive(Clone, Debug)]
+pub(crate) struct Spectrum {
+    grid: Grid,
+    plan: Arc<LombScargle>,
+    white: Vec<f64>,
+    /// Logarithms.
+    chance: Vec<f64>,
+}
+
+impl Spectrum {
+    fn of(track: &Track, grid: Grid, plan: Arc<LombScargle>) -> Option<Self> {
+        let white = track.whitened(&track.noise(), &track.value);
+        let power = plan.process(&white).ok()?.psd;
+        let chance = |k: usize| {
+            let (mut sum, mut n) = (0.0, 0.0);
+            for j in GUARD + 1..=GUARD + AROUND {
+                let off = j * FINER;
+                for at in [k.checked_sub(off), Some(k + off)].into_iter().flatten() {
+                    if let Some(p) = power.get(at) {
+                        sum += p;
+                        n += 1.0;
+                    }
+                }
+            }
+            -n * (power[k] / sum).ln_1p()
+        };
+        let chance = (0..grid.bins).map(chance).collect();
+        Some(Self {
+            grid,
+            plan,
+            white,
+            chance,
+        })
+    }
+
+    /// The frequency of the most certain line, if it is beyond doubt.
+    fn strongest(&self, alpha: f64, track: &Track) -> Option<f64> {
+        let (best, chance) = least(&self.chance)?;
+        let certain = chance + (self.grid.bins as f64).ln() < alpha.ln();
+        certain.then(|| track.top(&self.white, self.grid.at(best), self.grid.step_hz))
+    }
+}
+
+/// The least of some numbers, and where it is.
+fn least(values: &[f64]) -> Option<(usize, f64)> {
+    let all = values.iter().copied().enumerate();
+    all.min_by(|a, b| a.1.total_cmp(&b.1))
+}
+
+/// The spectrum of each series; `None` where the span is too short for any line.
+pub(super) fn spectra(tracks: &[Track]) -> Vec<Option<Spectrum>> {
+    // most series have the same times, and one plan serves them
+    let first = |k: usize| tracks[..k].iter().position(|t| t.t_s == tracks[k].t_s);
+    let plans: Vec<Option<(Grid, Arc<LombScargle>)>> = (0..tracks.len())
+        .into_par_iter()
+        .map(|k| {
+            first(k).is_none().then(|| {
+                let grid = Grid::of(&tracks[k])?;
+                Some((grid, Arc::new(grid.plan(&tracks[k].t_s)?)))
+            })?
+        })
+        .collect();
+    (0..tracks.len())
+        .into_par_iter()
+        .map(|k| {
+            let (grid, plan) = plans[first(k).unwrap_or(k)].clone()?;
+            Spectrum::of(&tracks[k], grid, plan)
+        })
+        .collect()
+}
+
+/// A line about all axes at once.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct SharedLine {
+    pub(crate) frequency_hz: f64,
+    /// Frequencies that were looked at.
+    pub(crate) tried: usize,
+}
+
+impl SharedLine {
+    /// The effect that makes it.
+    pub(crate) fn candidate(self, scene: &Scene<'_>) -> Box<dyn Candidate> {
+        effects::line_at(self.frequency_hz, scene.surroundings.span_s, self.tried)
+    }
+}
+
+impl Series {
+    /// The line that the tracker most likely turns with, if it is worth a search, and more than
+    /// the declared model makes by itself.
+    pub(crate) fn shared_line(&self) -> Option<SharedLine> {
+        let turns: Vec<(&Track, &Spectrum)> = self
+            .each
+            .iter()
+            .filter(|(track, _)| track.turns)
+            .filter_map(|(track, spectrum)| Some((track, spectrum.as_ref()?)))
+            .collect();
+        let grid = turns.first()?.1.grid;
+        let turns: Vec<_> = turns
+            .into_iter()
+            .filter(|(_, s)| s.grid.is_like(&grid))
+            .collect();
+        let bins = turns.iter().map(|(_, s)| s.grid.bins).min()?;
+        let sums: Vec<f64> = (0..bins)
+            .map(|k| turns.iter().map(|(_, s)| s.chance[k]).sum())
+            .collect();
+        let (best, sum) = least(&sums)?;
+        let law = ChiSquared::new(2.0 * turns.len() as f64).ok()?;
+        let frequency_hz = grid.at(best);
+        let likely = law.sf(-2.0 * sum) * (bins as f64) < WORTH_A_SEARCH;
+        let seen = turns.iter().any(|(track, _)| {
+            let noise = track.noise();
+            let size = track.take_out(&noise, &track.sinusoids(&[frequency_hz]));
+            size.is_some_and(|(size, _)| track.is_beyond_declared([size[1], size[2]]))
+        });
+        (likely && seen).then_some(SharedLine {
+            frequency_hz,
+            tried: bins,
+        })
+    }
+}
+
+impl Track {
+    /// Frequencies of lines that the declared model does not make; all are taken out of the series,
+    /// whose `spectrum` this is.
+    pub(super) fn lines(&mut self, alpha: f64, spectrum: Spectrum) -> Vec<f64> {
+        let mut found: Vec<f64> = Vec::new();
+        let whole = self.clone();
+        let Spectrum { grid, plan, .. } = &spectrum;
+        let (grid, plan) = (*grid, Arc::clone(plan));
+        let mut now = Some(spectrum);
+        while found.len() < MOST {
+            let Some(f) = now.and_then(|s| s.strongest(alpha, self)) else {
+                break;
+            };
+            found.push(f);
+            let noise = self.noise();
+            let Some((_, left)) = whole.take_out(&noise, &whole.sinusoids(&found)) else {
+                found.pop();
+                break;
+            };
+            *self = left;
+            now = Spectrum::of(self, grid, Arc::clone(&plan));
+        }
+        // once more each, without what the others left in it
+        for k in 0..found.len() {
+            let others: Vec<f64> = (0..found.len())
+                .filter(|&j| j != k)
+                .map(|j| found[j])
+                .collect();
+            let noise = self.noise();
+            if let Some((_, left)) = whole.take_out(&noise, &whole.sinusoids(&others)) {
+                let white = left.whitened(&noise, &left.value);
+                found[k] = left.top(&white, found[k], grid.step_hz);
+            }
+        }
+        if let Some((size, left)) = whole.take_out(&self.noise(), &whole.sinusoids(&found)) {
+            *self = left;
+            let each = found.into_iter().enumerate();
+            found = each
+                .filter(|(k, _)| self.is_beyond_declared([size[1 + 2 * k], size[2 + 2 * k]]))
+                .map(|(_, f)| f)
+                .collect();
+        }
+        found
+    }
+
+    /// Whether a line with these amplitudes of cosine and sine is more than the declared model makes.
+    fn is_beyond_declared(&self, [cos, sin]: [f64; 2]) -> bool {
+        let declared = self.changes.map_or(0.0, |(c, axis)| c.slow_arcsec[axis]);
+        cos.hypot(sin) / std::f64::consts::SQRT_2 > declared
+    }
+
+    fn sinusoids(&self, frequencies: &[f64]) -> Vec<Vec<f64>> {
+        let mut columns = vec![vec![1.0; self.t_s.len()]];
+        for f in frequencies {
+            let phase = |t: &f64| std::f64::consts::TAU * f * (t - self.t_s[0]);
+            columns.push(self.t_s.iter().map(|t| phase(t).cos()).collect());
+            columns.push(self.t_s.iter().map(|t| phase(t).sin()).collect());
+        }
+        columns
+    }
+
+    /// The top of the power near `f`, to a thousandth of a grid point.
+    fn top(&self, white: &[f64], f: f64, step: f64) -> f64 {
+        let power = |f: f64| {
+            let one = Grid {
+                first_hz: f,
+                step_hz: 1.0,
+                bins: 1,
+            };
+            one.plan(&self.t_s)
+                .and_then(|plan| plan.process(white).ok())
+                .map_or(0.0, |psd| psd.psd[0])
+        };
+        let (mut centre, mut width) = (f, step);
+        for _ in 0..12 {
+            let best = [-1.0, -0.5, 0.0, 0.5, 1.0]
+                .map(|s| centre + s * width)
+                .into_iter()
+                .filter(|f| *f > 0.0)
+                .max_by(|a, b| power(*a).total_cmp(&power(*b)));
+            centre = best.unwrap_or(centre);
+            width *= 0.5;
+        }
+        centre
+    }
+}
