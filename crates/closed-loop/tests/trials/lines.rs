@@ -1,5 +1,7 @@
 //! Lines anywhere in the spectrum: far above the harmonics that the catalogue proposes, and between them.
 
+#![expect(clippy::unwrap_used, reason = "helpers of tests")]
+
 use closed_loop::close;
 use scenarios::{Scenario, simulate};
 use telemetry::report::{Errors, Report, Verdict};
