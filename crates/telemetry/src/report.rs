@@ -74,7 +74,7 @@ pub struct Rows {
     pub used: usize,
     /// Rows beyond 8 robust sigma of the before residual.
     pub outliers: usize,
-    /// Rows outside the span of the reference.
+    /// Rows outside the span of the reference, or around which too little of it is known.
     pub outside_reference: usize,
 }
 
