@@ -14,6 +14,7 @@
 //! evidence        data, noise and products as what the search asks of a measurement
 //! settling        the declared model at its best, and the outliers beside it
 //! search          the search where the reference itself may err
+//! pointed         which of many stars and pixels the residual points at
 //! reference_wander, own_attitude    two things to tell beside the effects
 //! ```
 //!
@@ -29,6 +30,7 @@ mod misalignment;
 mod moments;
 pub(crate) mod nuisance;
 mod own_attitude;
+mod pointed;
 mod reference_wander;
 mod run;
 pub(crate) mod search;

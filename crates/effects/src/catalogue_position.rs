@@ -22,13 +22,17 @@ use crate::path::Held;
 use crate::velocity_aberration::moved_px;
 use crate::{
     ActsOn, AttitudeRows, Candidate, Coefficient, Effect, EffectError, EffectKind, Parameter,
-    Parameters, Scene, StarRows, Surroundings,
+    Parameters, Scene, StarFacts, StarRows, Surroundings,
 };
 
 const ID: &str = "catalogue_position";
 
 /// Error of one star that would not surprise, arcsec.
 const PLAUSIBLE_ARCSEC: f64 = 10.0;
+
+/// Stars of which each is tried by itself. The products of all columns grow with the square of their
+/// number: a tracker that spins past 1298 stars would need 14 GB for stars that it saw four times each.
+const MOST_STARS: usize = 64;
 
 /// The kind.
 #[derive(Debug)]
@@ -71,14 +75,27 @@ impl EffectKind for Kind {
         }
         let coefficients = ["east_arcsec", "north_arcsec"]
             .map(|name| Coefficient::new(name, "arcsec", PLAUSIBLE_ARCSEC));
-        scene
-            .stars
-            .iter()
+        let mut stars: Vec<&StarFacts> = scene.stars.iter().collect();
+        let stands_for = if stars.len() > MOST_STARS {
+            // the order of those that are left is that of the list
+            let mut ranked: Vec<(f64, usize)> =
+                stars.iter().map(|s| s.remarkable).zip(0..).collect();
+            ranked.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+            ranked.truncate(MOST_STARS);
+            ranked.sort_by_key(|(_, at)| *at);
+            stars = ranked.into_iter().map(|(_, at)| stars[at]).collect();
+            scene.stars.len() as f64 / MOST_STARS as f64
+        } else {
+            1.0
+        };
+        stars
+            .into_iter()
             .map(|star| {
                 let coefficients = coefficients.clone();
                 Box::new(PositionCandidate {
                     star_id: star.star_id,
                     coefficients,
+                    stands_for,
                 }) as Box<dyn Candidate>
             })
             .collect()
@@ -136,6 +153,8 @@ impl Effect for CataloguePosition {
 struct PositionCandidate {
     star_id: i64,
     coefficients: [Coefficient; 2],
+    /// How many stars that were looked at it is proposed for.
+    stands_for: f64,
 }
 
 impl Candidate for PositionCandidate {
@@ -147,6 +166,9 @@ impl Candidate for PositionCandidate {
     }
     fn coefficients(&self) -> &[Coefficient] {
         &self.coefficients
+    }
+    fn stands_for(&self) -> f64 {
+        self.stands_for
     }
     fn acts_on_stars(&self) -> bool {
         true
@@ -191,5 +213,41 @@ impl Candidate for PositionCandidate {
             east_arcsec,
             north_arcsec,
         }))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::harness::Bench;
+
+    /// Of 200 stars the 64 most remarkable are tried, in the order of the list, and each pays for 200/64; of
+    /// the bench's dozen all are.
+    #[test]
+    fn of_many_stars_the_most_remarkable_are_tried() {
+        let bench = Bench::new();
+        let few = Kind.candidates(&bench.scene(None));
+        assert_eq!(few.len(), 12);
+        assert!(few.iter().all(|c| c.stands_for() <= 1.0));
+        let many: Vec<StarFacts> = (0..200)
+            .map(|k| StarFacts {
+                star_id: k,
+                mag: 5.0,
+                bv: 0.5,
+                remarkable: f64::from((37 * i32::try_from(k).unwrap()) % 200),
+            })
+            .collect();
+        let scene = Scene {
+            stars: &many,
+            ..bench.scene(None)
+        };
+        let tried = Kind.candidates(&scene);
+        let ids: Vec<i64> = tried
+            .iter()
+            .map(|c| c.selectors()["star_id"].parse().unwrap())
+            .collect();
+        let expected: Vec<i64> = (0..200).filter(|k| (37 * k) % 200 >= 136).collect();
+        assert_eq!(ids, expected);
+        assert!(tried.iter().all(|c| (c.stands_for() - 3.125).abs() < 1e-12));
     }
 }

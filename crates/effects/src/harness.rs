@@ -104,6 +104,7 @@ impl Bench {
                     star_id: 100 + i64::from(s),
                     mag: 2.0 + 0.3 * f64::from(s),
                     bv: -0.2 + 0.15 * f64::from(s),
+                    remarkable: 0.0,
                 };
                 (
                     facts,

@@ -188,7 +188,7 @@ impl Shift for Phase {
         }
     }
     fn average(&self, variance_px2: [f64; 2], terms: &mut [[f64; 2]]) {
-        if variance_px2 == [0.0; 2] {
+        if variance_px2.iter().all(|v| *v <= 0.0) {
             return;
         }
         for (terms, &k) in terms.chunks_exact_mut(4).zip(&self.orders) {

@@ -68,6 +68,9 @@ pub struct StarFacts {
     pub mag: f64,
     /// Colour B - V; NaN unknown.
     pub bv: f64,
+    /// How far its mean residual is from nothing: square over that of its sigma, but for a unit that all
+    /// stars share. Of many stars, those with most are tried by themselves.
+    pub remarkable: f64,
 }
 
 /// The data that candidates are to explain.

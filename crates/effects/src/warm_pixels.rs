@@ -22,8 +22,18 @@ use crate::hot_pixel::{HALF_WIDTH_PX, middle_of, pixel_of};
 const MOST_PIXELS: usize = 48;
 /// Rows under which a pixel is worth looking at.
 const LEAST_ROWS: u32 = 10;
-/// Pixels of which a star within the half-width of one may be: its own and those around.
-const NEAR: usize = 9;
+/// Pixels within whose half-width a star may be: its own and those around.
+const NEAR: [[i64; 2]; 9] = [
+    [-1, -1],
+    [0, -1],
+    [1, -1],
+    [-1, 0],
+    [0, 0],
+    [1, 0],
+    [-1, 1],
+    [0, 1],
+    [1, 1],
+];
 const NOWHERE: usize = usize::MAX;
 
 /// The pixels that are proposed, best first.
@@ -50,7 +60,7 @@ struct Sums {
 #[derive(Clone, Copy)]
 struct Last {
     pixel: [i64; 2],
-    sums: [usize; NEAR],
+    sums: [usize; NEAR.len()],
 }
 
 impl WarmPixels {
@@ -85,8 +95,8 @@ impl WarmPixels {
             let pixel = pixel_of(camera, at);
             let mut find = || Last {
                 pixel,
-                sums: std::array::from_fn(|k| {
-                    let near = [0, 1].map(|a| pixel[a] + [k % 3, k / 3][a] as i64 - 1);
+                sums: NEAR.map(|[x, y]| {
+                    let near = [pixel[0] + x, pixel[1] + y];
                     index.get(&near).map_or(NOWHERE, |&p| {
                         *place.entry((p, star)).or_insert_with(|| {
                             sums.push((p, Sums::default()));

@@ -143,7 +143,7 @@ mod tests {
         let effects: [Arc<dyn Effect>; 1] = [tag.into()];
         let places = [[0.05, 0.08], [-0.07, 0.03], [0.02, -0.09]];
         let star = |id: i64| {
-            let [x, y] = *places.get(id as usize)?;
+            let [x, y] = *places.get(usize::try_from(id).ok()?)?;
             let direction = Vector3::new(x, y, 1.0).normalize();
             Some(Star {
                 id,

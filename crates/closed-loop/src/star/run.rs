@@ -8,7 +8,7 @@
 //! Not physics: the order of the steps.
 
 use block_regression::Folds;
-use effects::{Scene, StarFacts, StarRows, WarmPixels};
+use effects::{Scene, StarFacts, WarmPixels};
 use focal_plane::Points;
 use nalgebra::DVector;
 use spectra::robust::median_step;
@@ -37,6 +37,7 @@ use crate::situation::Situation;
 use crate::star::data::{Inputs, Star, StarData};
 use crate::star::evidence::StarEvidence;
 use crate::star::own_attitude;
+use crate::star::pointed::Pointed;
 use crate::star::reference_wander::{self, REFERENCE_ERROR};
 use crate::star::search::Wander;
 use crate::star::settling::{Settled, settle};
@@ -186,17 +187,10 @@ fn explain(
     });
 
     progress("searching for causes");
-    let facts: Vec<StarFacts> = data
-        .stars
-        .iter()
-        .map(|s| StarFacts {
-            star_id: s.id,
-            mag: s.mag,
-            bv: s.bv,
-        })
-        .collect();
+    let pointed = Pointed::of(data, &settled.before, &measured.weight);
+    let facts = pointed.stars();
     let rows = data.rows(0..data.t_s.len(), source(motion));
-    let warm = warm_pixels(data, &rows, &settled.before, &measured.weight);
+    let warm = pointed.pixels(&rows);
     let scene = scene(situation, data, &facts, &warm);
     let image = match &sides {
         Some(sides) => {
@@ -263,23 +257,6 @@ fn explain(
     }
     progress("figures");
     Ok(Explained::Closed(Box::new(finish(&whole, after)?)))
-}
-
-/// Where a warm pixel may be by what the declared model leaves.
-fn warm_pixels(
-    data: &StarData,
-    rows: &StarRows<'_>,
-    before: &Residuals,
-    weight: &[f64],
-) -> WarmPixels {
-    let scale = data.camera.arcsec_per_px();
-    let [x, y] = [0, 1].map(|a| -> Vec<f64> {
-        let left = before.axes[a].iter();
-        left.map(|r| r / scale[a]).collect()
-    });
-    let outlier = data.outlier.iter().zip(weight);
-    let weight: Vec<f64> = outlier.map(|(o, w)| if *o { 0.0 } else { *w }).collect();
-    WarmPixels::look(&data.camera, rows, [&x, &y], &weight)
 }
 
 fn scene<'a>(

@@ -17,6 +17,8 @@ pub(crate) enum Path {
     Slews,
     /// To and fro every 8 s: the image reverses again and again.
     Turns,
+    /// About two axes at two frequencies, over the same pixels again and again: a hundred under each star.
+    Nods,
 }
 
 impl Path {
@@ -57,6 +59,11 @@ impl Path {
                 }
                 text
             }
+            Self::Nods => format!(
+                "[motion]\nkind = \"hold\"\n{start}\n\
+                 [[motion.sinusoid]]\naxis = [1.0, 0.0, 0.0]\namplitude_arcsec = 350.0\nfrequency_hz = 0.017\n\
+                 [[motion.sinusoid]]\naxis = [0.0, 1.0, 0.0]\namplitude_arcsec = 350.0\nfrequency_hz = 0.0123\n"
+            ),
             Self::Turns => format!(
                 "[motion]\nkind = \"hold\"\n{start}\ndrift_arcsec_s = [1.5, -2.5, 0.5]\n\
                  [[motion.sinusoid]]\naxis = [1.0, 0.4, 0.0]\namplitude_arcsec = 400.0\nfrequency_hz = 0.11\n\

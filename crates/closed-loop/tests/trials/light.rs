@@ -42,7 +42,6 @@ fn a_pixel_phase_error_keeps_its_size_under_noisy_attitudes() {
             assert_eq!(effect.id, "pixel_phase_harmonics", "{reference}, {seed}");
             let got = &effect.parameters["x1_amplitude_arcsec"];
             let sigma = got.sigma.unwrap();
-            println!("{reference} {seed}: {} +- {sigma}", got.value);
             assert!(
                 (got.value - 3.0).abs() < 4.0 * sigma,
                 "{reference}: {got:?}"
@@ -53,6 +52,5 @@ fn a_pixel_phase_error_keeps_its_size_under_noisy_attitudes() {
     let weight = |(_, s): &(f64, f64)| s.powi(-2);
     let information: f64 = all.iter().map(weight).sum();
     let mean = all.iter().map(|v| v.0 * weight(v)).sum::<f64>() / information;
-    println!("{mean} +- {}", information.powf(-0.5));
     assert!((mean - 3.0).abs() < 3.0 * information.powf(-0.5), "{mean}");
 }

@@ -211,3 +211,39 @@ fn a_long_exposure_that_nobody_declared() {
     assert!((2.3..2.9).contains(&refused.value), "{refused:?}");
     assert!((refused.believed[1] - 2.0).abs() < 1e-9, "{refused:?}");
 }
+
+/// A warm pixel that sixty others are visited longer than, in three fifths of the run and more, is looked at
+/// like any other; its pull, all pixels paid for, is named with its place.
+#[test]
+fn a_warm_pixel_that_is_visited_no_longer_than_others() {
+    let mut case = Case::new(Path::Nods, 7);
+    case.duration_s = 1200.0;
+    let (_, bundle) = case.make();
+    let stars = bundle.stars.as_ref().unwrap();
+    let mut visits = std::collections::BTreeMap::<[i32; 2], Vec<usize>>::new();
+    for frame in 0..stars.frames() {
+        for row in stars.rows_of(frame) {
+            #[expect(clippy::cast_possible_truncation, reason = "within the detector")]
+            let pixel = [stars.x_px[row], stars.y_px[row]].map(|p| p.floor() as i32);
+            visits.entry(pixel).or_default().push(frame);
+        }
+    }
+    let fifth = stars.frames().div_ceil(5);
+    let mut pixels: Vec<_> = visits.into_iter().collect();
+    pixels.sort_by_key(|(pixel, frames)| (std::cmp::Reverse(frames.len()), *pixel));
+    let at = pixels.iter().skip(60).find(|(_, frames)| {
+        let fifths: std::collections::BTreeSet<_> = frames.iter().map(|f| f / fifth).collect();
+        fifths.len() >= 3
+    });
+    let (pixel, _) = at.expect("such a pixel");
+    let [x, y] = pixel.map(|p| f64::from(p) + 0.5);
+    let lines = format!("x_px = {x:?}\ny_px = {y:?}\nstrength = 0.06");
+    let report = case.with("hot_pixel", &lines).close().report;
+    assert_eq!(report.effects.len(), 1, "{:?}", report.effects);
+    let effect = &report.effects[0];
+    let of = |name: &str| effect.parameters[name].value;
+    assert_eq!(effect.id, "hot_pixel");
+    assert!((of("x_px") - x).abs() < 1e-9 && (of("y_px") - y).abs() < 1e-9);
+    let sigma = effect.parameters["strength"].sigma.unwrap();
+    assert!((of("strength") - 0.06).abs() < 4.0 * sigma, "{effect:?}");
+}
