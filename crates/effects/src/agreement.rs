@@ -212,7 +212,7 @@ fn every_description_builds_the_same_effect_again() {
     for kind in catalogue() {
         all.extend(candidates(&bench, kind.id()));
     }
-    all.push(step_at(40.0, [0.0, 120.0]));
+    all.push(step_at(40.0, [0.0, 120.0], 1));
     all.push(line_at(0.0123, [0.0, 120.0], 1));
     // the phase counts from the middle of data this late
     all.push(line_at(0.0123, [500.0, 620.0], 1));

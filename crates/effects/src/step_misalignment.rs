@@ -54,6 +54,7 @@ impl EffectKind for Kind {
             bending: Step {
                 at_s,
                 range: [at_s, at_s],
+                picked_from: 1,
             },
             values: values.to_vec(),
         }))
@@ -65,16 +66,18 @@ impl EffectKind for Kind {
         }
         (1..=INSTANTS)
             .map(|k| f64::from(k) / f64::from(INSTANTS + 1))
-            .map(|share| step_at(span[0] + share * (span[1] - span[0]), span))
+            .map(|share| step_at(span[0] + share * (span[1] - span[0]), span, 1))
             .collect()
     }
 }
 
-/// A step of unknown size at `at_s`, inside the data's `span_s`.
-pub fn step_at(at_s: f64, span_s: [f64; 2]) -> Box<dyn Candidate> {
+/// A step of unknown size at `at_s`, inside the data's `span_s`, picked from so many instants by looking
+/// at the data.
+pub fn step_at(at_s: f64, span_s: [f64; 2], picked_from: usize) -> Box<dyn Candidate> {
     BendingCandidate::boxed(Step {
         at_s,
         range: span_s,
+        picked_from,
     })
 }
 
@@ -82,6 +85,7 @@ pub fn step_at(at_s: f64, span_s: [f64; 2]) -> Box<dyn Candidate> {
 struct Step {
     at_s: f64,
     range: [f64; 2],
+    picked_from: usize,
 }
 
 impl Bending for Step {
@@ -112,11 +116,14 @@ impl Bending for Step {
             step,
         }]
     }
+    fn stands_for(&self) -> f64 {
+        self.picked_from as f64
+    }
     fn with_nonlinear(&self, values: &[f64]) -> Option<Self> {
         let [low, high] = self.range;
         (low..=high).contains(&values[0]).then(|| Self {
             at_s: values[0],
-            range: self.range,
+            ..self.clone()
         })
     }
 }

@@ -24,6 +24,7 @@ use crate::search::instants;
 use crate::search::selection::columns_of;
 use crate::search::{Found, amplitudes, borrowed, fit};
 use crate::situation::{Situation, channels_of_interest};
+use crate::unexplained::leftover::jumps::SharedJump;
 use crate::unexplained::leftover::lines::SharedLine;
 use crate::unexplained::leftover::{self, Series};
 use nalgebra::{DVector, UnitQuaternion};
@@ -76,11 +77,12 @@ pub(crate) fn run(
     progress("searching for causes");
     let scene = scene(situation, &data);
     let changes = SpatialErrors::declared(situation, &data.t_s);
-    let search = |data: &AttitudeData, line: Option<SharedLine>| {
+    let search = |data: &AttitudeData, line: Option<SharedLine>, jump: Option<SharedJump>| {
         let mut list = catalogue_candidates(&scene);
         list.retain(|c| c.acts_on_attitude());
         list.extend(leftover_terms(situation, data));
         list.extend(line.map(|line| line.candidate(&scene)));
+        list.extend(jump.map(|jump| jump.candidate(&scene)));
         let with_noise = |noise: [Coloured; 3]| evidence(data, situation, noise, motion);
         let (bins, start) = (&data.bins.folds, fit_noise(data, &before));
         let (found, noise) = search::search(&with_noise, data, bins, &folds, list, changes, start)?;
@@ -88,19 +90,21 @@ pub(crate) fn run(
         let series = inside.map(|inside| tracks(data, &inside, changes));
         Ok::<_, CloseError>((found, noise, series))
     };
-    let (mut found, mut noise, mut series) = search(&data, None)?;
-    if let Some(line) = series.as_ref().and_then(Series::shared_line) {
-        progress("searching again with the line that is left");
-        if !data.bins.resolve(line.frequency_hz) {
+    let (mut found, mut noise, mut series) = search(&data, None, None)?;
+    let line = series.as_ref().and_then(Series::shared_line);
+    let jump = series.as_ref().and_then(Series::shared_jump);
+    if line.is_some() || jump.is_some() {
+        progress("searching again with the line or jump that is left");
+        if line.is_some_and(|line| !data.bins.resolve(line.frequency_hz)) {
             data.rebin(&folds, leftover::MOST_POINTS);
         }
-        (found, noise, series) = search(&data, Some(line))?;
+        (found, noise, series) = search(&data, line, jump)?;
     }
     let bins = &data.bins.folds;
     let with_noise = |noise: [Coloured; 3]| evidence(&data, situation, noise, motion);
     let after = residuals(&with_noise(noise), &folds, &found, &found.selection.chosen)?;
     let mut rivals = Vec::new();
-    for (set, gain) in search::rivals(&with_noise, &data, bins, &found, noise) {
+    for (set, gain) in search::rivals(&with_noise, &data, bins, &found, noise)? {
         let residual = residuals(&with_noise(noise), &folds, &found, &set)?;
         rivals.push(Rival {
             what: names(&found, &set),

@@ -8,7 +8,9 @@
 //! L(H) = max over noise, amplitudes of ln p(data | H)       2 (L(H1) - L(H0)) ~ chi2_p
 //! ```
 //!
-//! by alternating generalised least squares and the noise fit. The p-value pays
+//! by alternating generalised least squares and the noise fit. That climb ends on the hill it starts on:
+//! an effect that the noise has swallowed stays swallowed. So there are two, from the noise of the last
+//! choice and from little slow noise, and the likelier counts. The p-value pays
 //! for the whole search; the gain that is reported and ranked is out of fold, each
 //! side predicted with amplitudes of the other folds under its own noise.
 //!
@@ -39,9 +41,23 @@ const STEP: &str = "step_misalignment";
 
 /// Rounds of generalised least squares and noise fit.
 const ALTERNATIONS: usize = 3;
+/// Slow noise that a climb starts with: so many sigmas of a row, over this share of the span.
+const FAINT: f64 = 0.2;
+const FAINT_SHARE: f64 = 0.2;
+/// Nats that two parameters of slow noise have to be worth.
+const EARNED: f64 = 2.0;
+/// Nats that an effect gains under white noise below which no noise makes it significant.
+const LITTLE: f64 = 8.0;
 /// The ratio statistic of a noise model that is only nearly right runs this much
 /// wider than chi-squared (red-noise nulls: rms t of 1.13).
 const WIDENING: f64 = 1.3;
+
+/// Where the climb to a hypothesis' own noise starts.
+#[derive(Clone, Copy, Debug)]
+enum Start {
+    Given,
+    Faint,
+}
 
 /// Builds the evidence of one noise.
 pub(crate) type WithNoise<'d> = dyn Fn([Coloured; 3]) -> AttitudeEvidence<'d> + Sync + 'd;
@@ -81,17 +97,16 @@ pub(crate) fn search<'d>(
             folds,
             &borrowed(&candidates),
         )?;
-        let trial = Trial {
+        let trial = Trial::new(
             with_noise,
             data,
             folds,
-            fitted: &fitted,
-            candidates: &candidates,
+            &candidates,
+            &fitted,
             binned,
-            changes,
             noise,
-            cost: cost(&fitted, &candidates),
-        };
+            changes,
+        )?;
         let base = trial.score(&chosen).ok_or(CloseError::Singular)?;
         let judged: Vec<Judgement> = (0..candidates.len())
             .into_par_iter()
@@ -139,20 +154,19 @@ pub(crate) fn rivals(
     folds: &Folds,
     found: &Found,
     noise: [Coloured; 3],
-) -> Vec<(Vec<usize>, f64)> {
+) -> Result<Vec<(Vec<usize>, f64)>, CloseError> {
     let candidates = &found.candidates;
     let binned = with_noise(noise).binned(&borrowed(candidates));
-    let trial = Trial {
+    let trial = Trial::new(
         with_noise,
         data,
         folds,
-        fitted: &found.fitted,
         candidates,
+        &found.fitted,
         binned,
-        changes: None,
         noise,
-        cost: cost(&found.fitted, candidates),
-    };
+        None,
+    )?;
     let mut sets: Vec<Vec<usize>> = vec![Vec::new()];
     sets.extend(found.selection.chosen.first().map(|&g| vec![g]));
     let channels = (0..candidates.len()).filter(|&g| {
@@ -184,7 +198,7 @@ pub(crate) fn rivals(
     for entry in &mut scored {
         entry.1 -= zero;
     }
-    scored
+    Ok(scored)
 }
 
 /// What the p-value of each candidate is multiplied by: descriptions are not tried.
@@ -199,17 +213,64 @@ struct Trial<'a, 'd> {
     data: &'a AttitudeData,
     folds: &'a Folds,
     fitted: &'a Fitted,
+    /// The same under white noise.
+    plain: Fitted,
     candidates: &'a [Box<dyn Candidate>],
     /// Columns of all candidates, averaged over the bins.
     binned: DMatrix<f64>,
     /// Jumps that are no step.
     changes: Option<SpatialErrors>,
     noise: [Coloured; 3],
+    /// Its white part alone, and beside little slow noise.
+    white: [Coloured; 3],
+    faint: [Coloured; 3],
     /// What the p-value of each candidate is multiplied by.
     cost: Vec<f64>,
 }
 
-impl Trial<'_, '_> {
+impl<'a, 'd> Trial<'a, 'd> {
+    /// `fitted` and `binned` are of the candidates under `noise`.
+    fn new(
+        with_noise: &'a WithNoise<'d>,
+        data: &'a AttitudeData,
+        folds: &'a Folds,
+        candidates: &'a [Box<dyn Candidate>],
+        fitted: &'a Fitted,
+        binned: DMatrix<f64>,
+        noise: [Coloured; 3],
+        changes: Option<SpatialErrors>,
+    ) -> Result<Self, CloseError> {
+        let t_s = &data.bins.t_s;
+        let span_s = t_s.last().zip(t_s.first()).map_or(0.0, |(l, f)| l - f);
+        let white = noise.map(|n| Coloured { slow: 0.0, ..n });
+        let faint = std::array::from_fn(|axis| {
+            let rows: f64 = data.count[axis].iter().sum();
+            let usual = (rows / t_s.len().max(1) as f64).max(1.0);
+            Coloured {
+                white: noise[axis].white,
+                slow: FAINT * noise[axis].white / usual.sqrt(),
+                tau_s: FAINT_SHARE * span_s,
+            }
+        });
+        let evidence = with_noise(white);
+        let list = borrowed(candidates);
+        let design = evidence.whitened(&binned);
+        Ok(Self {
+            with_noise,
+            data,
+            folds,
+            fitted,
+            plain: fit_design(&evidence, design.as_ref(), folds, &list)?,
+            candidates,
+            binned,
+            changes,
+            noise,
+            white,
+            faint,
+            cost: cost(fitted, candidates),
+        })
+    }
+
     /// Candidates that may be added, best first: by the gain out of fold after a
     /// price for every parameter and choice.
     fn ranked(&self, chosen: &[usize], banned: &[bool], judged: &[Judgement]) -> Vec<usize> {
@@ -292,8 +353,35 @@ impl Trial<'_, '_> {
         changes.chance([step(0), step(1), step(2)])
     }
 
-    /// `chosen` at its own best noise.
+    /// `chosen` at its own best noise: the likelier of two climbs, from the present noise and, where
+    /// white noise would believe all of it, from little slow noise beside it.
     fn score(&self, chosen: &[usize]) -> Option<Scored> {
+        let (given, faint) = rayon::join(
+            || self.climb(chosen, Start::Given),
+            || {
+                self.believed(chosen)
+                    .then(|| self.climb(chosen, Start::Faint))?
+            },
+        );
+        let both = [given, faint].into_iter().flatten();
+        both.max_by(|a, b| a.loglik.total_cmp(&b.loglik))
+    }
+
+    /// Whether each of `chosen` explains something beside the others if the noise is white.
+    fn believed(&self, chosen: &[usize]) -> bool {
+        let fits = &self.plain.fits;
+        let error = |set: &[usize]| fits.error(&columns_of(&self.plain.groups, set));
+        let Some(all) = error(chosen) else {
+            return false;
+        };
+        chosen.iter().all(|g| {
+            let others: Vec<usize> = chosen.iter().copied().filter(|c| c != g).collect();
+            error(&others).is_some_and(|e| 0.5 * self.plain.scalars * (e / all).ln() > LITTLE)
+        })
+    }
+
+    /// `chosen`, and its noise uphill from the present one, or each time from little slow noise.
+    fn climb(&self, chosen: &[usize], start: Start) -> Option<Scored> {
         let candidates: Vec<&dyn Candidate> = chosen
             .iter()
             .map(|&g| self.candidates[g].as_ref())
@@ -301,7 +389,10 @@ impl Trial<'_, '_> {
         let columns = candidates.iter().map(|c| c.coefficients().len()).sum();
         let all: Vec<usize> = (0..candidates.len()).collect();
         let binned = self.columns(chosen);
-        let mut noise = self.noise;
+        let mut noise = match start {
+            Start::Given => self.noise,
+            Start::Faint => self.white,
+        };
         let mut last = None;
         for _ in 0..ALTERNATIONS {
             let evidence = (self.with_noise)(noise);
@@ -310,8 +401,11 @@ impl Trial<'_, '_> {
             let set = columns_of(&fitted.groups, &all);
             let estimate = fitted.fits.estimate(&set)?;
             let residual = self.left(&evidence, &binned, &fitted, &set, &estimate.value);
-            noise = std::array::from_fn(|axis| {
-                noise[axis].refit(&self.data.bins.t_s, &residual[axis], &self.data.count[axis])
+            noise = std::array::from_fn(|axis| match start {
+                Start::Given => {
+                    noise[axis].refit(&self.data.bins.t_s, &residual[axis], &self.data.count[axis])
+                }
+                Start::Faint => self.from_faint(axis, &residual[axis]),
             });
             let credible = fitted.groups.iter().all(|group| {
                 group
@@ -343,6 +437,24 @@ impl Trial<'_, '_> {
             credible,
             amplitudes: values,
         })
+    }
+
+    /// Noise of a residual: white, unless slow noise beside it earns its two parameters (Akaike).
+    fn from_faint(&self, axis: usize, residual: &[f64]) -> Coloured {
+        let (t_s, count) = (&self.data.bins.t_s, &self.data.count[axis]);
+        let rows = count.iter().filter(|n| **n > 0.0).count().max(1) as f64;
+        let square: f64 = residual.iter().zip(count).map(|(y, n)| n * y * y).sum();
+        let white = Coloured {
+            white: (square / rows).sqrt().max(f64::MIN_POSITIVE),
+            ..self.white[axis]
+        };
+        let found = self.faint[axis].refit(t_s, residual, count);
+        let loglik = |noise: &Coloured| noise.log_likelihood(t_s, residual, count);
+        if loglik(&found) > loglik(&white) + EARNED {
+            found
+        } else {
+            white
+        }
     }
 
     /// Binned columns of some candidates, constants first.

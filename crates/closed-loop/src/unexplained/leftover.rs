@@ -9,15 +9,10 @@
 //!
 //! with M frequencies on a grid four times finer than 1/span, and n independent ones
 //! around f that the mean is of ([`lines`]). What is found is refined to the top of z, taken
-//! out of the series as it was before whitening, and the search goes on. Steps then,
+//! out of the series as it was before whitening, and the search goes on. Steps then ([`jumps`]).
+//! alpha is 1 % over all series, lines and jumps together.
 //!
-//! ```text
-//! P = M chi2_1 of 2 (L(step, its best noise) - L(best noise)) / 1.3
-//! ```
-//!
-//! with M instants. alpha is 1 % over all series, lines and jumps together.
-//!
-//! Source: Scargle 1982 (periodogram), the F law of a ratio of two mean powers; Wilks 1938.
+//! Source: Scargle 1982 (periodogram), the F law of a ratio of two mean powers.
 
 use block_regression::Folds;
 use coloured_noise::Coloured;
@@ -25,17 +20,16 @@ use nalgebra::{DMatrix, DVector, Matrix3, Vector3, Vector4};
 use rayon::prelude::*;
 use spectra::robust;
 use spectra::robust::median_step;
-use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use crate::attitude::spatial_errors::SpatialErrors;
 use crate::bins::{self, Bins};
 use crate::search::selection::FAMILY_ALPHA;
 use crate::star::data::StarData;
 use crate::star::frame_rotation::rotation_row;
-use crate::star::search::WIDENING;
 use lines::Spectrum;
 use telemetry::report::Unattributed;
 
+pub(crate) mod jumps;
 pub(crate) mod lines;
 #[cfg(test)]
 mod tests;
@@ -46,10 +40,8 @@ const MIN_POINTS: usize = 60;
 pub(crate) const MOST_POINTS: usize = 4800;
 /// Lines, and jumps, of one series.
 const MOST: usize = 5;
-/// Instants tried before the neighbours of the best are.
-const MOST_STEPS: usize = 1200;
-/// Points that a level on each side of a jump is of.
-const MIN_SIDE: usize = 5;
+/// Chance below which a line or a jump is worth a search with it: that judges it, and more strictly.
+const WORTH_A_SEARCH: f64 = 0.1;
 
 /// What the image can do besides turning: x and y of a shift per x and y of the place. It grows,
 /// or is sheared either way.
@@ -319,77 +311,7 @@ impl Track {
         Some((beta.iter().copied().collect(), left))
     }
 
-    /// Instants of jumps: the middle between the points on either side.
-    fn jumps(&mut self, alpha: f64) -> Vec<f64> {
-        let mut found = Vec::new();
-        while found.len() < MOST {
-            let noise = self.noise();
-            let before = self.loglik(&noise);
-            let tried = self.t_s.len() - 2 * MIN_SIDE;
-            let white = Coloured {
-                slow: 0.0,
-                white: noise.white.hypot(noise.slow),
-                tau_s: 1.0,
-            };
-            let best = [noise, white]
-                .iter()
-                .filter_map(|n| self.best_step(n))
-                .filter_map(|at| {
-                    let step: Vec<f64> = (0..self.t_s.len())
-                        .map(|k| f64::from(u8::from(k >= at)))
-                        .collect();
-                    let columns = [vec![1.0; step.len()], step];
-                    let mut its_noise = noise;
-                    let (mut size, mut left) = self.take_out(&white, &columns)?;
-                    for _ in 0..2 {
-                        its_noise = left.noise();
-                        (size, left) = self.take_out(&its_noise, &columns)?;
-                    }
-                    let after = left.loglik(&its_noise);
-                    Some((after, at, size[1], left))
-                })
-                .max_by(|a, b| a.0.total_cmp(&b.0));
-            let Some((after, at, size, left)) = best else {
-                break;
-            };
-            let ratio = 2.0 * (after - before) / WIDENING;
-            let p = ChiSquared::new(1.0).map_or(1.0, |law| law.sf(ratio.max(0.0)));
-            let change = |(c, axis): (SpatialErrors, usize)| c.chance_on(axis, size);
-            if p * tried as f64 >= alpha || self.changes.map_or(0.0, change) >= alpha {
-                break;
-            }
-            found.push(0.5 * (self.t_s[at - 1] + self.t_s[at]));
-            *self = left;
-        }
-        found
-    }
-
     fn loglik(&self, noise: &Coloured) -> f64 {
         noise.log_likelihood(&self.t_s, &self.value, &self.weight)
-    }
-
-    /// Where a step beside a constant explains most under `noise`.
-    fn best_step(&self, noise: &Coloured) -> Option<usize> {
-        let n = self.t_s.len();
-        let y = self.whitened(noise, &self.value);
-        let one = self.whitened(noise, &vec![1.0; n]);
-        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-        let (oo, oy) = (dot(&one, &one), dot(&one, &y));
-        let score = |at: &[usize]| -> Option<(usize, f64)> {
-            let scores = noise.steps(&self.t_s, &self.weight, at, [&one, &y]);
-            let scores = scores.into_iter().zip(at).map(|([ss, so, sy], &at)| {
-                let ss = ss - so * so / oo;
-                let score = sy - so * oy / oo;
-                (at, if ss > 0.0 { score * score / ss } else { 0.0 })
-            });
-            scores.max_by(|a, b| a.1.total_cmp(&b.1))
-        };
-        // coarse first: a step is seen from near by
-        let stride = n.div_ceil(MOST_STEPS);
-        let all: Vec<usize> = (MIN_SIDE..=n - MIN_SIDE).step_by(stride).collect();
-        let coarse = score(&all)?.0;
-        let first = coarse.saturating_sub(2 * stride).max(MIN_SIDE);
-        let fine: Vec<usize> = (first..=(coarse + 2 * stride).min(n - MIN_SIDE)).collect();
-        score(&fine).map(|(at, _)| at)
     }
 }

@@ -20,7 +20,7 @@ use spectra::robust::median_step;
 use spectra::{LombScargle, LombScargleSettings};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use super::{MOST, Series, Track};
+use super::{MOST, Series, Track, WORTH_A_SEARCH};
 
 /// Grid points in 1/span.
 const FINER: usize = 4;
@@ -30,8 +30,6 @@ const AROUND: usize = 15;
 const GUARD: usize = 2;
 /// Fewer cycles in the span are no line but a trend.
 const MIN_CYCLES: f64 = 3.0;
-/// Chance below which a line is worth a search with it: that judges it, and more strictly.
-const WORTH_A_SEARCH: f64 = 0.1;
 /// Grids whose points lie nearer than this share of their step are the same.
 const ALIKE: f64 = 0.1;
 
