@@ -405,7 +405,7 @@ impl<'a, 'd> Trial<'a, 'd> {
                 Start::Given => {
                     noise[axis].refit(&self.data.bins.t_s, &residual[axis], &self.data.count[axis])
                 }
-                Start::Faint => self.from_faint(axis, &residual[axis]),
+                Start::Faint => self.climbing_from_faint(axis, &residual[axis]),
             });
             let credible = fitted.groups.iter().all(|group| {
                 group
@@ -440,7 +440,7 @@ impl<'a, 'd> Trial<'a, 'd> {
     }
 
     /// Noise of a residual: white, unless slow noise beside it earns its two parameters (Akaike).
-    fn from_faint(&self, axis: usize, residual: &[f64]) -> Coloured {
+    fn climbing_from_faint(&self, axis: usize, residual: &[f64]) -> Coloured {
         let (t_s, count) = (&self.data.bins.t_s, &self.data.count[axis]);
         let rows = count.iter().filter(|n| **n > 0.0).count().max(1) as f64;
         let square: f64 = residual.iter().zip(count).map(|(y, n)| n * y * y).sum();
