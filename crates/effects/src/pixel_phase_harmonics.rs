@@ -213,3 +213,51 @@ impl Shift for Phase {
         all
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::StarRows;
+    use crate::harness::Bench;
+    use focal_plane::PointsMut;
+
+    /// Of a wave of order k at a position known to v, exp(-2 pi^2 k^2 v) is to be expected, along each axis by
+    /// its own v; what has all but gone counts for nothing.
+    #[test]
+    fn waves_fade_where_the_position_is_uncertain() {
+        let bench = Bench::new();
+        let candidate = harmonics_of(&bench.camera, &[1, 2]);
+        let columns = |v: [f64; 2]| {
+            bench.with_star_rows(|rows| {
+                let n = rows.len();
+                let variance = v.map(|v| vec![v; n]);
+                let rows = StarRows {
+                    landed_variance_px2: [&variance[0], &variance[1]],
+                    ..*rows
+                };
+                let (mut x, mut y) = (vec![0.0; 8 * n], vec![0.0; 8 * n]);
+                let out = PointsMut {
+                    x: &mut x,
+                    y: &mut y,
+                };
+                assert!(candidate.star_columns(&bench.camera, &rows, out));
+                [x, y].map(|axis| axis.chunks(n).map(<[f64]>::to_vec).collect::<Vec<_>>())
+            })
+        };
+        let (known, faded) = (columns([0.0; 2]), columns([0.01, 0.07]));
+        let left = |k: f64, v: f64| (-2.0 * PI * PI * k * k * v).exp();
+        // of the second order along y, exp(-5.5), less than a hundredth is left
+        let shares = [[left(1.0, 0.01), left(1.0, 0.07)], [left(2.0, 0.01), 0.0]];
+        for (order, shares) in shares.iter().enumerate() {
+            for (axis, share) in shares.iter().enumerate() {
+                for column in 4 * order..4 * (order + 1) {
+                    let both = known[axis][column].iter().zip(&faded[axis][column]);
+                    for (plain, got) in both {
+                        assert!((got - share * plain).abs() < 1e-15, "{order} {axis}");
+                    }
+                }
+            }
+        }
+        assert!(known[0][0].iter().any(|v| v.abs() > 1e-3));
+    }
+}

@@ -24,9 +24,8 @@ fn a_noisy_attitude_is_no_pixel_phase_error() {
     }
 }
 
-/// A true error of 3 arcsec along x comes back as large as it is: without the noise of the position in the
-/// columns a quarter would be lost, three sigma of the mean over these runs. Each estimate is within 4 sigma,
-/// and their mean within 3 of its own.
+/// A true error of 3 arcsec along x comes back as large as it is: taken where the reference says, 1.4 +- 0.2 does
+/// in the first run. Each estimate is within 4 sigma, and their mean within 3 of its own.
 #[test]
 fn a_pixel_phase_error_keeps_its_size_under_noisy_attitudes() {
     let acts = "x1_amplitude_arcsec = 3.0\nx1_phase_rad = 0.7";
