@@ -198,6 +198,7 @@ impl Assessment {
                 .considered
                 .iter()
                 .map(|c| ConsideredEffect {
+                    against: None,
                     id: c.term.id().into(),
                     delta_loglik: c.delta_loglik,
                     p_value: c.p_value,

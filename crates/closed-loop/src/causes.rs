@@ -12,7 +12,6 @@
 //!
 //! Not physics: the order of the steps.
 
-use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use block_regression::Folds;
@@ -24,6 +23,7 @@ use crate::error::CloseError;
 use crate::figures;
 use crate::noise_effects;
 use crate::search::empirical::Empirical;
+use crate::search::refusal::{Refusal, Refused};
 use crate::search::selection::{columns_of, costs};
 use crate::search::{Found, borrowed, family, fit};
 use crate::star::evidence::StarEvidence;
@@ -73,6 +73,8 @@ pub(crate) struct Named<'a> {
     pub(crate) slow: Option<Slow>,
     /// What the first search refused by size alone: a description that is kept since takes its place.
     pub(crate) oversize: Vec<ConsideredEffect>,
+    /// What was found and is not named.
+    pub(crate) refused: Refused,
 }
 
 /// The slow error that was found, if it is not the reference's.
@@ -100,29 +102,30 @@ pub(crate) fn run<'a>(
     } else {
         declared_noise(white, folds)?
     };
-    let mut refused: BTreeSet<String> = BTreeSet::new();
+    let mut refused = Refused::new();
     let mut kept: Vec<Arc<dyn Candidate>> = Vec::new();
     let mut oversize = Vec::new();
     for round in 0.. {
         let beside = white.keeping(&kept);
         let may: Vec<bool> = (quest.candidates)()
             .iter()
-            .map(|c| !refused.contains(&family(c.as_ref())))
+            .map(|c| !refused.contains_key(&family(c.as_ref())))
             .collect();
         let (mut searched, wander) = attempt(&beside, folds, quest.candidates, &may, start)?;
         let last = round == MOST_REFUSALS;
         if round == 0 {
-            oversize = figures::considered(&searched.found, 0.0, &quest.surroundings);
+            oversize = figures::considered(&searched.found, 0.0, &Refused::new(), &quest.surroundings);
             oversize.retain(|c| c.refused.is_some());
         }
         if !wander.is_empty() && !last {
             let all = &searched.found.candidates;
-            refused.extend(wander.into_iter().map(|g| family(all[g].as_ref())));
+            let families = wander.into_iter().map(|g| family(all[g].as_ref()));
+            refused.extend(families.map(|f| (f, Refusal::Wander)));
             continue;
         }
         let pile = pile(&searched.found, white.data.stars.len());
         if !pile.is_empty() && !last {
-            refused.extend(pile);
+            refused.extend(pile.into_iter().map(|f| (f, Refusal::Pile)));
             continue;
         }
         let level = searched.evidence.as_ref().unwrap_or(&beside);
@@ -143,23 +146,26 @@ pub(crate) fn run<'a>(
         if let Some(slow) = slow.filter(|_| !last) {
             let doubtful = doubtful(&described, &searched.found, slow.inflation(), &may);
             if !doubtful.is_empty() {
-                refused.extend(doubtful);
+                refused.extend(doubtful.into_iter().map(|f| (f, Refusal::SlowStars)));
                 continue;
             }
         }
         if !last {
             if let Some((set, instead)) = stand_ins(&described) {
                 let chosen = &searched.found.selection.chosen;
-                refused.extend(
-                    set.iter()
-                        .map(|&k| family(searched.found.candidates[chosen[k]].as_ref())),
-                );
+                let families = set
+                    .iter()
+                    .map(|&k| family(searched.found.candidates[chosen[k]].as_ref()));
+                refused.extend(families.map(|f| (f, Refusal::StandIn)));
                 kept.extend(whole(&described, instead));
                 continue;
             }
             if let Some(change) = changing(&described, best_beside(&searched.found, &may)) {
                 let g = searched.found.selection.chosen[change.chosen];
-                refused.insert(family(searched.found.candidates[g].as_ref()));
+                refused.insert(
+                    family(searched.found.candidates[g].as_ref()),
+                    Refusal::Change,
+                );
                 kept.extend(keep(&mut searched.found, g, change));
                 continue;
             }
@@ -174,11 +180,14 @@ pub(crate) fn run<'a>(
         if last {
             // nothing that is still spoken against is named
             let chosen = searched.found.selection.chosen.clone();
-            let spoken = stand_ins(&described).map(|(set, _)| set);
+            let spoken = stand_ins(&described).map(|(set, _)| (set, Refusal::StandIn));
             let beside = best_beside(&searched.found, &may);
-            let changes = changing(&described, beside).map(|c| vec![c.chosen]);
-            for k in spoken.or(changes).unwrap_or_default() {
-                searched.found.selection.chosen.retain(|g| *g != chosen[k]);
+            let changes = changing(&described, beside).map(|c| (vec![c.chosen], Refusal::Change));
+            let (spoken, why) = spoken.or(changes).unwrap_or((Vec::new(), Refusal::StandIn));
+            for k in spoken {
+                let g = chosen[k];
+                refused.insert(family(searched.found.candidates[g].as_ref()), why);
+                searched.found.selection.chosen.retain(|c| *c != g);
             }
         }
         if kept.is_empty() && !last {
@@ -187,6 +196,7 @@ pub(crate) fn run<'a>(
                 described,
                 slow,
                 oversize,
+                refused,
             });
         }
         // without what is only described
@@ -205,13 +215,13 @@ pub(crate) fn run<'a>(
         if let Some(change) = changing(&described, beside).filter(|_| !last) {
             let mut found = found;
             let g = found.selection.chosen[change.chosen];
-            refused.insert(family(found.candidates[g].as_ref()));
+            refused.insert(family(found.candidates[g].as_ref()), Refusal::Change);
             kept.extend(keep(&mut found, g, change));
             continue;
         }
         let small = remainders(&described, &found);
         if !small.is_empty() && !last {
-            refused.extend(small);
+            refused.extend(small.into_iter().map(|f| (f, Refusal::Remainder)));
             continue;
         }
         let searched = Searched {
@@ -224,6 +234,7 @@ pub(crate) fn run<'a>(
             described,
             searched,
             oversize,
+            refused,
         });
     }
     Err(CloseError::Singular)

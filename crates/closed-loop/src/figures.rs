@@ -23,9 +23,10 @@ use telemetry::{EffectEntry, EffectValue};
 use crate::error::CloseError;
 use crate::evidence::Residuals;
 use crate::questions::hypothesis::{Questions, Told};
-use crate::search::Found;
 use crate::search::empirical::EMPIRICAL;
+use crate::search::refusal::Refused;
 use crate::search::selection::{FAMILY_ALPHA, columns_of, each};
+use crate::search::{Found, family};
 use crate::star::data::StarData;
 
 /// Shares within this factor are the same.
@@ -168,6 +169,7 @@ fn confusable(found: &Found, g: usize, questions: &Questions) -> Vec<Confusable>
 pub(crate) fn considered(
     found: &Found,
     excess: f64,
+    against: &Refused,
     surroundings: &Surroundings<'_>,
 ) -> Vec<ConsideredEffect> {
     effects::catalogue()
@@ -179,7 +181,7 @@ pub(crate) fn considered(
                 .iter()
                 .any(|&g| found.candidates[g].id() == kind.id())
         })
-        .map(|kind| consider(found, kind.id(), excess, surroundings))
+        .map(|kind| consider(found, kind.id(), excess, against, surroundings))
         .collect()
 }
 
@@ -187,6 +189,7 @@ fn consider(
     found: &Found,
     id: &str,
     excess: f64,
+    against: &Refused,
     surroundings: &Surroundings<'_>,
 ) -> ConsideredEffect {
     let best = (0..found.candidates.len())
@@ -206,7 +209,14 @@ fn consider(
         parameter: None,
         unit: None,
         refused: refused(found, id, surroundings),
+        against: None,
     };
+    let is_meant = |of: &str| match best {
+        Some(g) => family(found.candidates[g].as_ref()) == of,
+        None => of.split('/').next() == Some(id),
+    };
+    let why = against.iter().find(|(of, _)| is_meant(of));
+    entry.against = why.map(|(_, refusal)| refusal.why().to_owned());
     let Some(g) = best else { return entry };
     let judged = &found.selection.judged[g];
     entry.delta_loglik = Some(judged.delta_loglik);

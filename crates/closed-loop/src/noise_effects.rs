@@ -293,6 +293,7 @@ impl NoiseEffects {
         if !judged.stands {
             let [value, sigma] = judged.values[0];
             self.considered.push(ConsideredEffect {
+                against: None,
                 id: id.to_owned(),
                 delta_loglik: Some(judged.gain),
                 p_value: Some(judged.p_value),

@@ -19,6 +19,7 @@ use selection::{Group, Selection, columns_of, select};
 
 pub(crate) mod empirical;
 pub(crate) mod instants;
+pub(crate) mod refusal;
 pub(crate) mod selection;
 
 /// Amplitudes beyond this many plausible sigmas are not credible.

@@ -5,7 +5,7 @@
 use closed_loop::close;
 use focal_plane::StarFrames;
 use scenarios::{Scenario, simulate};
-use telemetry::report::{Report, Verdict};
+use telemetry::report::{ConsideredEffect, Report, Verdict};
 
 /// Stars drift over three pixels.
 const DRIFT: &str = "kind = \"hold\"\ndrift_arcsec_s = [0.35, -0.27, 0.02]";
@@ -104,6 +104,9 @@ fn a_constant_s_curve_is_a_pixel_phase_error() {
 fn an_s_curve_that_grows_is_none() {
     let report = report_on(|stars, row, k| s_curve(stars, row, 0.32 * k as f64 / 1200.0));
     assert_eq!(named(&report), [""; 0], "{report:?}");
+    // it was found, and what speaks against it is told
+    let found = |c: &&ConsideredEffect| c.id == "pixel_phase_harmonics" && c.against.is_some();
+    assert_eq!(report.considered.iter().filter(found).count(), 1);
     assert_eq!(report.verdict, Verdict::Unexplained);
     assert!(
         left(&report)[0].starts_with("pixel_phase_"),

@@ -122,6 +122,7 @@ fn findings(stars: bool, attitude: bool) -> Report {
         }],
     };
     let tried = |id: &str, observable: bool| ConsideredEffect {
+        against: None,
         id: id.to_owned(),
         delta_loglik: observable.then_some(-0.42),
         p_value: observable.then_some(0.71),

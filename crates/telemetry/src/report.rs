@@ -259,6 +259,9 @@ pub struct ConsideredEffect {
     pub detectable: Option<f64>,
     /// Size at which it would explain the residual by itself, in `unit`.
     pub needed: Option<f64>,
+    /// What speaks against it, where the search found it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub against: Option<String>,
     /// The parameter whose size is meant.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub parameter: Option<String>,

@@ -21,6 +21,7 @@ use crate::questions::hypothesis::{self, Grounds};
 use crate::questions::manoeuvre::attitudes::fly;
 use crate::search::empirical::{Empirical, Variable, range};
 use crate::search::instants;
+use crate::search::refusal::Refused;
 use crate::search::selection::columns_of;
 use crate::search::{Found, amplitudes, borrowed, fit};
 use crate::situation::{Situation, channels_of_interest};
@@ -85,12 +86,13 @@ pub(crate) fn run(
         list.extend(jump.map(|jump| jump.candidate(&scene)));
         let with_noise = |noise: [Coloured; 3]| evidence(data, situation, noise, motion);
         let (bins, start) = (&data.bins.folds, fit_noise(data, &before));
-        let (found, noise) = search::search(&with_noise, data, bins, &folds, list, changes, start)?;
+        let (found, noise, refused) =
+            search::search(&with_noise, data, bins, &folds, list, changes, start)?;
         let inside = in_sample(&with_noise(noise), data.t_s.len(), &found);
         let series = inside.map(|inside| tracks(data, &inside, changes));
-        Ok::<_, CloseError>((found, noise, series))
+        Ok::<_, CloseError>((found, noise, refused, series))
     };
-    let (mut found, mut noise, mut series) = search(&data, None, None)?;
+    let (mut found, mut noise, mut refused, mut series) = search(&data, None, None)?;
     let line = series.as_ref().and_then(Series::shared_line);
     let jump = series.as_ref().and_then(Series::shared_jump);
     if line.is_some() || jump.is_some() {
@@ -98,7 +100,7 @@ pub(crate) fn run(
         if line.is_some_and(|line| !data.bins.resolve(line.frequency_hz)) {
             data.rebin(&folds, leftover::MOST_POINTS);
         }
-        (found, noise, series) = search(&data, line, jump)?;
+        (found, noise, refused, series) = search(&data, line, jump)?;
     }
     let bins = &data.bins.folds;
     let with_noise = |noise: [Coloured; 3]| evidence(&data, situation, noise, motion);
@@ -116,7 +118,8 @@ pub(crate) fn run(
     }
     progress("figures");
     finish(
-        situation, &data, &folds, noise, motion, &found, before, after, rivals, changes, series,
+        situation, &data, &folds, noise, motion, &found, &refused, before, after, rivals, changes,
+        series,
     )
 }
 
@@ -373,6 +376,7 @@ fn finish(
     noise: [Coloured; 3],
     motion: &Around,
     found: &Found,
+    refused: &Refused,
     before: Residuals,
     after: Residuals,
     rivals: Vec<Rival>,
@@ -450,7 +454,7 @@ fn finish(
         chi2_per_dof: None,
         loglik_per_frame: Some(loglik_per_frame(data, r)),
     };
-    let considered = figures::considered(found, 0.0, &situation.surroundings());
+    let considered = figures::considered(found, 0.0, refused, &situation.surroundings());
     let lengths = column_lengths(&evidence, found);
     let hypotheses = hypothesis::answer(
         situation.questions,

@@ -33,8 +33,9 @@ use crate::error::CloseError;
 use crate::evidence::{Amplitudes, Evidence};
 use crate::figures;
 use crate::search::empirical::EMPIRICAL;
+use crate::search::refusal::{Refusal, Refused};
 use crate::search::selection::{Judgement, Selection, columns_of, costs, price};
-use crate::search::{Fitted, Found, amplitudes, borrowed, fit, fit_design, polish};
+use crate::search::{Fitted, Found, amplitudes, borrowed, family, fit, fit_design, polish};
 
 /// The effect that a change of stars looks like.
 const STEP: &str = "step_misalignment";
@@ -76,7 +77,7 @@ struct Scored {
     amplitudes: Vec<f64>,
 }
 
-/// The search, and the noise it ends with; `rows` are the folds of the unbinned rows.
+/// The search, the noise it ends with, and what it found and did not add; `rows` are the folds of the unbinned rows.
 pub(crate) fn search<'d>(
     with_noise: &WithNoise<'d>,
     data: &AttitudeData,
@@ -85,9 +86,10 @@ pub(crate) fn search<'d>(
     mut candidates: Vec<Box<dyn Candidate>>,
     changes: Option<SpatialErrors>,
     start: [Coloured; 3],
-) -> Result<(Found, [Coloured; 3]), CloseError> {
+) -> Result<(Found, [Coloured; 3], Refused), CloseError> {
     let mut chosen: Vec<usize> = Vec::new();
     let mut banned = vec![false; candidates.len()];
+    let mut refused = Refused::new();
     let mut noise = start;
     loop {
         let binned = with_noise(noise).binned(&borrowed(&candidates));
@@ -114,6 +116,7 @@ pub(crate) fn search<'d>(
             .collect();
         if let Some(fallen) = chosen.iter().copied().find(|&g| !judged[g].stands()) {
             banned[fallen] = true;
+            refused.insert(family(candidates[fallen].as_ref()), Refusal::Fallen);
             chosen.retain(|&g| g != fallen);
             continue;
         }
@@ -122,6 +125,7 @@ pub(crate) fn search<'d>(
             && !trial.lowers_the_error(rows, &chosen, g)
         {
             banned[g] = true;
+            refused.insert(family(candidates[g].as_ref()), Refusal::NoLessError);
             ranked.remove(0);
         }
         noise = base.noise;
@@ -134,6 +138,7 @@ pub(crate) fn search<'d>(
                     selection: Selection { chosen, judged },
                 },
                 noise,
+                refused,
             ));
         };
         chosen.push(added);

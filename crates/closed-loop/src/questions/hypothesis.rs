@@ -139,7 +139,8 @@ impl Grounds<'_> {
             (answer.delta_loglik, answer.p_value) = (c.delta_loglik, c.p_value);
         }
         answer.added = self.effects.iter().any(|e| e.id == id);
-        answer.finding = finding(&answer);
+        let against = considered.and_then(|c| c.against.as_deref());
+        answer.finding = finding(&answer, against, !self.effects.is_empty());
         answer
     }
 
@@ -319,6 +320,8 @@ impl Grounds<'_> {
             "in this motion it shifts nothing, or only what the declared unknowns (misalignment, \
              attitude, distortion) take up"
                 .to_owned()
+        } else if self.effects.is_empty() {
+            "in this motion it cannot be told from what describes the residual".to_owned()
         } else {
             "in this motion it cannot be told from what was added".to_owned()
         };
@@ -428,8 +431,8 @@ fn of_size(size: &RefusedSize) -> String {
     )
 }
 
-/// The answer in a sentence or three.
-fn finding(h: &Hypothesis) -> String {
+/// The answer in a sentence or three. `against`: what speaks against it; `others`: something was added.
+fn finding(h: &Hypothesis, against: Option<&str>, others: bool) -> String {
     if let Some(reason) = &h.reason {
         return format!("not observable: {reason}");
     }
@@ -438,14 +441,20 @@ fn finding(h: &Hypothesis) -> String {
         (true, _, Some(p)) => format!("added: it predicts the residual out of fold (p = {p:.1e})"),
         (true, _, None) => "added".to_owned(),
         (false, true, Some(p)) => {
-            format!("significant (p = {p:.1e}), but not worth its parameters beside what was added")
+            let why = match (against, others) {
+                (Some(why), _) => why,
+                (None, true) => "not worth its parameters beside what was added",
+                (None, false) => "the search did not end with it",
+            };
+            format!("significant (p = {p:.1e}), but {why}")
         }
-        (false, false, Some(p)) => match &h.refused {
-            Some(size) => format!("refused (p = {p:.1e}): {}", of_size(size)),
-            None if p < FAMILY_ALPHA => {
+        (false, false, Some(p)) => match (&h.refused, against) {
+            (Some(size), _) => format!("refused (p = {p:.1e}): {}", of_size(size)),
+            (None, Some(why)) => format!("found, but {why}; beside that p = {p:.2}"),
+            (None, None) if p < FAMILY_ALPHA => {
                 format!("p = {p:.1e}, but it predicts nothing out of fold")
             }
-            None => format!("not significant (p = {p:.2})"),
+            (None, None) => format!("not significant (p = {p:.2})"),
         },
         (false, _, None) => "not significant".to_owned(),
     });
@@ -520,4 +529,28 @@ fn told_size(h: &Hypothesis, size: &HypothesisSize) -> Vec<String> {
         _ => {}
     }
     said
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Nothing is "beside what was added" where nothing was; what speaks against an effect is said.
+    #[test]
+    fn the_reason_is_the_true_one() {
+        let of = |significant: bool| Hypothesis {
+            significant,
+            observable: true,
+            p_value: Some(0.002),
+            ..Hypothesis::default()
+        };
+        let beside = "beside what was added";
+        assert!(finding(&of(true), None, true).contains(beside));
+        assert!(!finding(&of(true), None, false).contains(beside));
+        for (significant, others) in [(true, false), (true, true), (false, false), (false, true)] {
+            let said = finding(&of(significant), Some("the stars wander"), others);
+            assert!(said.contains("the stars wander"), "{said}");
+            assert!(!said.contains(beside), "{said}");
+        }
+    }
 }

@@ -57,6 +57,7 @@ pub(crate) fn consider(
     let sigma = white * ((1.0 - decay * decay) / (theta.len() as f64 * decay * decay)).sqrt();
     let rows = data.outlier.iter().filter(|o| !**o).count().max(1) as f64;
     Some(ConsideredEffect {
+        against: None,
         id: REFERENCE_ERROR.to_owned(),
         delta_loglik: None,
         p_value: None,

@@ -31,6 +31,7 @@ use crate::questions::confusion;
 use crate::questions::hypothesis::{self, Grounds};
 use crate::questions::manoeuvre::stars::Sky;
 use crate::search::instants;
+use crate::search::refusal::Refused;
 use crate::search::selection::columns_of;
 use crate::search::{Found, amplitudes_as, fit};
 use crate::situation::Situation;
@@ -244,6 +245,7 @@ fn explain(
         described,
         slow,
         oversize,
+        refused,
     } = outcome;
     if situation.questions.empirical {
         description::offer(
@@ -263,6 +265,7 @@ fn explain(
         level: searched.evidence.as_ref().unwrap_or(level),
         found: &searched.found,
         described: &described,
+        refused: &refused,
         slow,
         oversize,
         wander: searched.wander.as_ref(),
@@ -305,6 +308,7 @@ struct Finish<'a> {
     level: &'a StarEvidence<'a>,
     found: &'a Found,
     described: &'a Described,
+    refused: &'a Refused,
     slow: Option<Slow>,
     oversize: Vec<ConsideredEffect>,
     wander: Option<&'a Wander>,
@@ -493,7 +497,7 @@ fn finish(
     }
     noise_left.tell(&mut unattributed);
     let excess = excess(f, last);
-    let mut considered = figures::considered(f.found, excess, &surroundings);
+    let mut considered = figures::considered(f.found, excess, f.refused, &surroundings);
     for entry in &mut considered {
         if let Some(size) = f.oversize.iter().find(|c| c.id == entry.id) {
             entry.clone_from(size);

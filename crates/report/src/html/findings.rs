@@ -363,6 +363,9 @@ fn why_not(c: &ConsideredEffect, report: &Report) -> String {
         return format!("significant, but {}", of_size(size));
     }
     let gains = c.delta_loglik.is_some_and(|gain| gain > 0.0);
+    if let Some(why) = &c.against {
+        return format!("found, but not named: {why}");
+    }
     if gains && c.p_value.is_some_and(|p| p < SIGNIFICANT) {
         let why = if report.effects.is_empty() {
             "without less error"

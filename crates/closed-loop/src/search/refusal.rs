@@ -1,0 +1,41 @@
+//! Why an effect that the search found is not named.
+//!
+//! Not physics: reasons in words.
+
+use std::collections::BTreeMap;
+
+/// What speaks against an effect.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Refusal {
+    Wander,
+    Pile,
+    SlowStars,
+    StandIn,
+    Change,
+    Remainder,
+    NoLessError,
+    Fallen,
+}
+
+/// What was refused, by family ([`crate::search::family`]).
+pub(crate) type Refused = BTreeMap<String, Refusal>;
+
+impl Refusal {
+    /// In the words of the report.
+    pub(crate) fn why(self) -> &'static str {
+        match self {
+            Self::Wander => "a slow error of the reference is the likelier explanation",
+            Self::Pile => {
+                "more stars would be misplaced than a catalogue has: something moves them all"
+            }
+            Self::SlowStars => "slow noise of the stars makes as much",
+            Self::StandIn => "what the residual follows explains the same and more",
+            Self::Change => {
+                "it is not the same at all times, on all stars and all over the detector"
+            }
+            Self::Remainder => "it is next to nothing beside what no effect explains",
+            Self::NoLessError => "the error out of fold is no smaller with it",
+            Self::Fallen => "it does not stand beside what was added after it",
+        }
+    }
+}
