@@ -114,7 +114,8 @@ pub(crate) fn run<'a>(
         let (mut searched, wander) = attempt(&beside, folds, quest.candidates, &may, start)?;
         let last = round == MOST_REFUSALS;
         if round == 0 {
-            oversize = figures::considered(&searched.found, 0.0, &Refused::new(), &quest.surroundings);
+            oversize =
+                figures::considered(&searched.found, 0.0, &Refused::new(), &quest.surroundings);
             oversize.retain(|c| c.refused.is_some());
         }
         if !wander.is_empty() && !last {

@@ -191,6 +191,12 @@ pub(crate) struct Found {
 }
 
 impl Found {
+    /// Whether one of the candidates put forward last, `count` at the end of the list, was chosen.
+    pub(crate) fn names_one_of_the_last(&self, count: usize) -> bool {
+        let first = self.candidates.len() - count;
+        self.selection.chosen.iter().any(|g| *g >= first)
+    }
+
     /// Some of the candidates, and where their amplitudes stand among theirs alone:
     /// one place for each of [`columns_of`] them.
     pub(crate) fn only(&self, chosen: &[usize]) -> Only<'_> {

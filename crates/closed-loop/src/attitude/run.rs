@@ -34,8 +34,8 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 use telemetry::AttitudeResiduals;
 use telemetry::report::{Dependence, Errors, Report, Rows, Unattributed};
 
-/// A correlated part below this share of the variance, or that the likelihood
-/// hardly sees, is not worth a word.
+/// A correlated part below this share of the variance of its axis, or that the
+/// likelihood hardly sees, is not worth a word.
 const SLOW_SHARE: f64 = 0.1;
 const SLOW_GAIN: f64 = 20.0;
 /// Fewest frames from which an effect and its noise can both be had.
@@ -100,7 +100,14 @@ pub(crate) fn run(
         if line.is_some_and(|line| !data.bins.resolve(line.frequency_hz)) {
             data.rebin(&folds, leftover::MOST_POINTS);
         }
-        (found, noise, refused, series) = search(&data, line, jump)?;
+        let put_forward = usize::from(line.is_some()) + usize::from(jump.is_some());
+        let again = search(&data, line, jump)?;
+        // what was put forward in vain changes nothing
+        if again.0.names_one_of_the_last(put_forward) {
+            (found, noise, refused, series) = again;
+        } else {
+            data.rebin(&folds, bins::MOST);
+        }
     }
     let bins = &data.bins.folds;
     let with_noise = |noise: [Coloured; 3]| evidence(&data, situation, noise, motion);
@@ -265,7 +272,7 @@ fn slow_leftover(
     unattributed: &mut Unattributed,
     left: f64,
 ) {
-    let (mut slow, mut whole, mut gain) = (0.0, 0.0, 0.0);
+    let (mut slow, mut whole, mut gain, mut most) = (0.0, 0.0, 0.0, 0.0_f64);
     for axis in 0..3 {
         let means = data.binned(axis, &after.axes[axis]);
         let noise = Coloured::fit(&data.bins.t_s, &means, &data.count[axis]);
@@ -275,17 +282,20 @@ fn slow_leftover(
             ..noise
         };
         let loglik = |n: &Coloured| n.log_likelihood(&data.bins.t_s, &means, &data.count[axis]);
+        let square = figures::rms(&after.axes[axis], &data.outlier[axis]).map_or(0.0, |r| r * r);
+        whole += square;
         // what the declared model makes by itself is not left over
         if noise.slow > declared[axis] {
             slow += noise.slow * noise.slow;
+            // each axis by its own noise: that of the boresight would drown the others
+            most = most.max(noise.slow * noise.slow / square);
+            gain += (loglik(&noise) - loglik(&white)).max(0.0);
         }
-        whole += figures::rms(&after.axes[axis], &data.outlier[axis]).map_or(0.0, |r| r * r);
-        gain += (loglik(&noise) - loglik(&white)).max(0.0);
     }
-    let share = (slow / whole).min(1.0);
-    if share < SLOW_SHARE || gain < SLOW_GAIN {
+    if most < SLOW_SHARE || gain < SLOW_GAIN {
         return;
     }
+    let share = (slow / whole).min(1.0);
     unattributed.present = true;
     unattributed.variance_fraction = Some(
         unattributed
@@ -301,6 +311,7 @@ fn slow_leftover(
         p_value: ChiSquared::new(6.0).map_or(1.0, |law| law.sf(2.0 * gain)),
     };
     unattributed.depends_on.insert(0, entry);
+    unattributed.depends_on.retain(figures::certain);
     unattributed
         .depends_on
         .sort_by(|a, b| b.variance_explained.total_cmp(&a.variance_explained));

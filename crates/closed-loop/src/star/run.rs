@@ -237,8 +237,12 @@ fn explain(
     let mut inside = left(&outcome.searched);
     if let Some(line) = inside.as_ref().and_then(|(_, series)| series.shared_line()) {
         progress("searching again with the line that is left");
-        outcome = named(Some(line))?;
-        inside = left(&outcome.searched);
+        let again = named(Some(line))?;
+        // what was put forward in vain changes nothing
+        if again.searched.found.names_one_of_the_last(1) {
+            inside = left(&again.searched);
+            outcome = again;
+        }
     }
     let Named {
         mut searched,

@@ -1,11 +1,11 @@
 //! The loop on bundles of known truth.
 
 mod gaps;
+mod in_time;
 mod inputs;
 mod invariances;
 mod kit;
 mod light;
-mod lines;
 mod noise;
 mod nulls;
 mod patterns;
