@@ -54,7 +54,7 @@ pub use error::EffectError;
 pub use hot_pixel::hot_pixel_at;
 pub use parameters::{Parameter, ParameterValue, Parameters};
 pub use periodic_misalignment::line_at;
-pub use pixel_phase_harmonics::harmonics_of;
+pub use pixel_phase_harmonics::{harmonics_of, left_of_wave};
 pub use scene::{FrameGeometry, Scene, StarFacts, Surroundings, VectorFrame};
 pub use step_misalignment::step_at;
 pub use warm_pixels::WarmPixels;

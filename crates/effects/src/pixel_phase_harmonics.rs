@@ -137,6 +137,16 @@ struct Phase {
     orders: Vec<u32>,
 }
 
+/// What is to be expected of a wave of `order` cycles a pixel at a position known to
+/// `variance_px2`: exp(-2 pi^2 order^2 variance) of it.
+pub fn left_of_wave(order: u32, variance_px2: f64) -> f64 {
+    if variance_px2 <= 0.0 {
+        return 1.0;
+    }
+    let left = (-2.0 * (PI * f64::from(order)).powi(2) * variance_px2).exp();
+    if left < FADED { 0.0 } else { left }
+}
+
 /// Sine and cosine of a sum of two angles.
 fn turned((sin, cos): (f64, f64), (by_sin, by_cos): (f64, f64)) -> (f64, f64) {
     (sin * by_cos + cos * by_sin, cos * by_cos - sin * by_sin)
@@ -192,10 +202,7 @@ impl Shift for Phase {
             return;
         }
         for (terms, &k) in terms.chunks_exact_mut(4).zip(&self.orders) {
-            let order = f64::from(k);
-            let faded = variance_px2
-                .map(|v| (-2.0 * (PI * order).powi(2) * v).exp())
-                .map(|f| if f < FADED { 0.0 } else { f });
+            let faded = variance_px2.map(|v| left_of_wave(k, v));
             for term in terms {
                 term[0] *= faded[0];
                 term[1] *= faded[1];

@@ -365,10 +365,12 @@ impl Candidate for Empirical {
                 Variable::Phase(axis) => {
                     let (sin, cos) = camera.phase_rad(rows.landed_px[*axis][i]).sin_cos();
                     let along = [1.0 - *axis as f64, *axis as f64];
+                    let variance = rows.landed_variance_px2[*axis][i];
                     let (mut s, mut c) = (sin, cos);
-                    for k in 0..HARMONICS {
-                        put(2 * k, s * along[0], s * along[1]);
-                        put(2 * k + 1, c * along[0], c * along[1]);
+                    for (k, order) in (1..).enumerate().take(HARMONICS) {
+                        let [x, y] = along.map(|a| a * effects::left_of_wave(order, variance));
+                        put(2 * k, s * x, s * y);
+                        put(2 * k + 1, c * x, c * y);
                         (s, c) = (s * cos + c * sin, c * cos - s * sin);
                     }
                 }
