@@ -36,6 +36,7 @@ use stand_ins::{Part, describe, stand_ins};
 pub(crate) mod commonness;
 pub(crate) mod description;
 pub(crate) mod invariance;
+mod recurrence;
 mod stand_ins;
 
 /// Nats by which a description must be worth more than a slow error of the reference.

@@ -22,6 +22,8 @@ use spectra::robust::median_step;
 use statrs::function::erf::erfc;
 use telemetry::report::{Dependence, Unattributed};
 
+use crate::causes::recurrence;
+use crate::figures;
 use crate::star::data::StarData;
 use crate::star::frame_rotation::rotation_row;
 
@@ -56,14 +58,27 @@ pub(crate) struct Slow {
     /// The most certain star: its slow part over its sigma, and how many there are.
     star: f64,
     count: usize,
+    /// The axis along which it comes back with the pixel phase, if it does.
+    comes_back: Option<usize>,
 }
 
-/// Puts it first that every star does something of its own in time.
-pub(crate) fn stars_first(list: &mut Vec<Dependence>, variance_explained: f64, p_value: f64) {
-    const VARIABLE: &str = "time*star";
-    list.retain(|d| d.variable != VARIABLE);
+/// Every star does something of its own in time.
+pub(crate) const IN_TIME: &str = "time*star";
+/// The same by its pixel phase along an axis.
+const BY_PHASE: [&str; 2] = ["pixel_phase_x*star", "pixel_phase_y*star"];
+/// In the names of all terms of the phase.
+const PHASE: &str = "pixel_phase";
+
+/// Puts it first that every star does something of its own.
+pub(crate) fn stars_first(
+    list: &mut Vec<Dependence>,
+    variable: &str,
+    variance_explained: f64,
+    p_value: f64,
+) {
+    list.retain(|d| d.variable != variable);
     let entry = Dependence {
-        variable: VARIABLE.to_owned(),
+        variable: variable.to_owned(),
         variance_explained,
         p_value,
     };
@@ -89,7 +104,10 @@ impl Slow {
         };
         let surer = !unattributed.depends_on.iter().any(certain) && share > SURER * known;
         let little = share < MOSTLY * known && !surer;
-        if self.chance() >= ALPHA || unattributed.present && little {
+        // terms say more of the phase than that every star follows it by itself
+        let said = |d: &Dependence| figures::certain(d) && d.variable.contains(PHASE);
+        let said = self.comes_back.is_some() && unattributed.depends_on.iter().any(said);
+        if self.chance() >= ALPHA || unattributed.present && (little || said) {
             return;
         }
         if !unattributed.present {
@@ -97,7 +115,8 @@ impl Slow {
         }
         unattributed.present = true;
         unattributed.variance_fraction = Some(share * left);
-        stars_first(&mut unattributed.depends_on, share, self.chance());
+        let variable = self.comes_back.map_or(IN_TIME, |axis| BY_PHASE[axis]);
+        stars_first(&mut unattributed.depends_on, variable, share, self.chance());
     }
 
     /// The chance of as much slow noise of the stars, or of one of them, where there is none.
@@ -142,7 +161,7 @@ pub(crate) fn slow(
     let frames = data.frames.frames();
     // the rotation in units of its white noise; what is left of every star in units of its own
     let mut turn: Vec<Option<Vector3<f64>>> = vec![None; frames];
-    let mut left = vec![[0.0; 2]; data.t_s.len()];
+    let mut left = vec![[f64::NAN; 2]; data.t_s.len()];
     let mut freedom = vec![0.0; frames];
     for k in 0..frames {
         let rows: Vec<usize> = data.frames.rows_of(k).filter(counts).collect();
@@ -205,9 +224,11 @@ pub(crate) fn slow(
         }
         of_stars += products * freedom[k] / rows.len().max(1) as f64;
     }
+    let comes_back = recurrence::comes_back(data, &left, stars / of_stars, lags as f64 * step);
     (of_rotation > 0.0 && of_stars >= LEAST_PRODUCTS).then(|| Slow {
         rotation: rotation / of_rotation,
         stars: stars / of_stars,
+        comes_back,
         sigma: of_stars.sqrt().recip(),
         lags,
         star: own
@@ -252,6 +273,7 @@ mod tests {
             lags: 50,
             star,
             count: 14,
+            comes_back: None,
         }
     }
 

@@ -21,7 +21,7 @@ use spectra::robust::median_step;
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
 use telemetry::report::Unattributed;
 
-use crate::causes::commonness::{self, MOSTLY, stars_first};
+use crate::causes::commonness::{self, IN_TIME, MOSTLY, stars_first};
 use crate::star::data::StarData;
 
 /// Chance that either is told although there is none.
@@ -84,7 +84,7 @@ impl OwnSeries {
         let list = &mut unattributed.depends_on;
         let known = list.first().map_or(0.0, |d| d.variance_explained);
         if self.explained >= MOSTLY * known {
-            stars_first(list, self.explained, self.p_value);
+            stars_first(list, IN_TIME, self.explained, self.p_value);
         }
     }
 }
