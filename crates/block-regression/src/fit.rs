@@ -94,6 +94,12 @@ impl Layout {
             .collect()
     }
 
+    /// Squared length of each candidate column.
+    fn raw(&self, gram: &DMatrix<f64>) -> Vec<f64> {
+        let n = self.nuisance_precision.len();
+        (n..n + self.candidates).map(|c| gram[(c, c)]).collect()
+    }
+
     /// The residual column that belongs to `fold` (`None`: all data).
     pub fn residual(&self, fold: Option<usize>) -> usize {
         let first = self.nuisance_precision.len() + self.candidates;
@@ -299,6 +305,8 @@ pub struct Fits {
     fold_of_block: Vec<usize>,
     /// `G W - 2 G_nc` of each block with W of all data: what makes T^T G T of any few columns.
     inner: Vec<DMatrix<f64>>,
+    /// Squared length of each candidate column before the nuisance is out.
+    raw: Vec<f64>,
     /// [`Folds::prior_blocks`].
     prior: f64,
     /// What all columns say of the noise, once it is asked for.
@@ -359,6 +367,7 @@ impl Fits {
             grams: grams.clone(),
             fold_of_block: folds.fold_of_block.clone(),
             inner,
+            raw: layout.raw(&sums.all.0),
             prior: folds.prior_blocks,
             usual: OnceLock::new(),
         })
@@ -391,7 +400,8 @@ impl Fits {
     /// As [`new`](Self::new), on all data alone: for what asks nothing of folds and blocks. Neither
     /// [`estimate`](Self::estimate) nor the errors out of fold are to be had then.
     pub fn whole(grams: &BlockGrams, layout: &Layout, variance: f64) -> Option<Self> {
-        let all = Eliminated::new(&grams.total(), layout, variance, &layout.picked(None))?;
+        let total = grams.total();
+        let all = Eliminated::new(&total, layout, variance, &layout.picked(None))?;
         Some(Self {
             layout: layout.clone(),
             folds: Vec::new(),
@@ -400,6 +410,7 @@ impl Fits {
             grams: grams.clone(),
             fold_of_block: Vec::new(),
             inner: Vec::new(),
+            raw: layout.raw(&total.0),
             prior: 0.0,
             usual: OnceLock::new(),
         })
@@ -578,8 +589,7 @@ impl Fits {
 
     /// Whether anything is left of a column once the nuisance is out.
     pub fn shows(&self, c: usize) -> bool {
-        let n = self.layout.nuisance_precision.len();
-        let raw: f64 = self.grams.gram.iter().map(|g| g.at(n + c, n + c)).sum();
+        let raw = self.raw[c];
         raw > 0.0 && self.information(c) > OBSERVABLE_SHARE * raw
     }
 

@@ -13,10 +13,10 @@ use std::ops::Range;
 use block_regression::Folds;
 use spectra::robust::median_step;
 
+use crate::gaps::longest_step;
+
 /// About as many bins as an attitude series is cut into at most.
 pub(crate) const MOST: usize = 2400;
-/// A longer step than this many medians is a gap.
-const GAP_STEPS: f64 = 1.9;
 
 /// Consecutive rows that are averaged.
 #[derive(Clone, Debug)]
@@ -38,7 +38,7 @@ impl Bins {
     /// Cuts the rows at `t_s`, whose folds are `folds`, into about `most` at most.
     pub(crate) fn cut(t_s: &[f64], folds: &Folds, most: usize) -> Self {
         let size = t_s.len().div_ceil(most).max(1);
-        let gap = GAP_STEPS * median_step(t_s).unwrap_or(f64::INFINITY);
+        let gap = longest_step(t_s);
         let mut bins = Self {
             rows: Vec::new(),
             t_s: Vec::new(),

@@ -32,6 +32,7 @@ mod declared;
 mod error;
 mod evidence;
 mod figures;
+mod gaps;
 mod image_level;
 mod motion;
 mod noise_effects;

@@ -23,16 +23,15 @@ pub(crate) use around::Around;
 
 use focal_plane::{AttitudeSeries, AttitudeSource, rotation_vector};
 use nalgebra::{UnitQuaternion, Vector3};
-use spectra::robust::median_step;
+
+use crate::gaps::longest_step;
 
 /// Largest ratio of prediction error to step at which the motion is resolved.
 const RESOLVED: f64 = 0.3;
-/// A longer step than this many medians is a hole.
-const HOLE_STEPS: f64 = 1.9;
 
 /// Whether a series of attitudes tells how the tracker moved between them.
 fn resolved(t_s: &[f64], q: &[UnitQuaternion<f64>]) -> bool {
-    let longest = HOLE_STEPS * median_step(t_s).unwrap_or(f64::INFINITY);
+    let longest = longest_step(t_s);
     let (mut error, mut step, mut count) = (0.0, 0.0, 0_u32);
     for (t, w) in t_s.windows(5).zip(q.windows(5)) {
         if t.windows(2).any(|pair| pair[1] - pair[0] > longest) {

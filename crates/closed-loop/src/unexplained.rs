@@ -11,6 +11,7 @@
 //!
 //! Not physics: the contents of a folder.
 
+mod around;
 pub(crate) mod leftover;
 pub(crate) mod pattern;
 pub(crate) mod star_series;

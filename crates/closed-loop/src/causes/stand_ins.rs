@@ -11,17 +11,18 @@
 //! ```
 //!
 //! with m how many times white noise makes the gain of a set too large that turns whole frames
-//! (noise of the reference is theirs, too), and a set that a
-//! description beats by far is not named: it is said what the leftover follows. A term holds
-//! the effects that act through its variable as special cases with more parameters, so that it
-//! does not beat an effect that does act. Both pay for their k columns and for the c among which
-//! each of their parts was looked for: two misplaced stars are two choices of many, one slope is
-//! one. A description takes the columns that it needs, one axis of
-//! three, say: so the set pays for no more either, and is judged at its best part.
+//! (noise of the reference is theirs, too). A set that a description beats by far is not named:
+//! it is said what the leftover follows. A term holds the effects that act through its variable
+//! as special cases with more parameters, so that it does not beat an effect that does act.
+//!
+//! Both pay for their k columns and for the c among which each of their parts was looked for: two
+//! misplaced stars are two choices of many, one slope is one. A description takes the columns
+//! that it needs, one axis of three, say: so the set pays for no more either, and is judged at
+//! its best part.
 //!
 //! Source: Schwarz 1978 for the price of a parameter.
 
-use block_regression::Fits;
+use block_regression::{Estimate, Fits};
 
 use crate::causes::description::Described;
 use crate::search::selection::{FAMILY_ALPHA, columns_of, each};
@@ -71,10 +72,8 @@ fn too_large(described: &Described, set: &[usize], rest: &[usize]) -> Option<f64
     if !set.iter().all(|&k| described.turns[k]) {
         return Some(1.0);
     }
-    let mut with = rest.to_vec();
-    with.extend(columns_of(&described.fitted.groups, set));
-    let which: Vec<usize> = (rest.len()..with.len()).collect();
-    let estimate = described.fitted.fits.estimate(&with)?;
+    let part = columns_of(&described.fitted.groups, set);
+    let (estimate, which) = beside(&described.fitted.fits, rest, &part)?;
     Some(estimate.excess(&which)?.max(1.0))
 }
 
@@ -84,10 +83,10 @@ fn at_best(described: &Described, set: &[usize], rest: &[usize], times: f64) -> 
     let each = each(described.fitted.scalars);
     let mut part = columns_of(&described.fitted.groups, set);
     let paid: f64 = set.iter().map(|&k| described.paid[k]).sum();
-    let base = fits.out_of_fold(rest)?.total_loglik();
+    let base = likelihood(fits, rest, &[])?;
     let worth = |part: &[usize]| -> Option<f64> {
         let price = paid + each * part.len() as f64;
-        Some(base + gain(fits, rest, part)? / times - price)
+        Some(base + (likelihood(fits, rest, part)? - base) / times - price)
     };
     let mut best = worth(&part)?;
     while part.len() > 1 {
@@ -107,11 +106,24 @@ fn at_best(described: &Described, set: &[usize], rest: &[usize], times: f64) -> 
     Some(best)
 }
 
-/// What `part` adds to the likelihood of `rest` out of fold.
-fn gain(fits: &Fits, rest: &[usize], part: &[usize]) -> Option<f64> {
-    let mut with = rest.to_vec();
-    with.extend(part);
-    Some(fits.out_of_fold(&with)?.total_loglik() - fits.out_of_fold(rest)?.total_loglik())
+/// The term of a description that is worth most: by how much, and the likelihood with it.
+struct Best<'a> {
+    more: f64,
+    likelihood: f64,
+    term: usize,
+    part: &'a [usize],
+}
+
+/// Likelihood of `rest` and `part` out of fold.
+fn likelihood(fits: &Fits, rest: &[usize], part: &[usize]) -> Option<f64> {
+    let with = [rest, part].concat();
+    Some(fits.out_of_fold(&with)?.total_loglik())
+}
+
+/// The estimate of `rest` and `part`, and which of it are the part.
+fn beside(fits: &Fits, rest: &[usize], part: &[usize]) -> Option<(Estimate, Vec<usize>)> {
+    let with = [rest, part].concat();
+    Some((fits.estimate(&with)?, (rest.len()..with.len()).collect()))
 }
 
 /// The best description of what `rest` leaves: its likelihood after all prices.
@@ -125,38 +137,41 @@ fn describe_at(described: &Described, rest: &[usize], times: f64) -> Option<(f64
     let each = each(described.fitted.scalars);
     let tried = parts_of_all(described);
     let mut with = rest.to_vec();
-    let mut worth = fits.out_of_fold(&with)?.total_loglik();
+    let mut base = likelihood(fits, rest, &[])?;
+    let mut worth = base;
     let mut parts = Vec::new();
     while parts.len() < MOST_TERMS {
-        let mut best: Option<(f64, usize, &Vec<usize>)> = None;
+        let mut best: Option<Best<'_>> = None;
         for (k, term) in described.terms.iter().enumerate() {
             for part in &term.parts {
                 if part.iter().any(|c| with.contains(c)) {
                     continue;
                 }
-                let Some(more) = gain(fits, &with, part) else {
+                let Some(likelihood) = likelihood(fits, &with, part) else {
                     continue;
                 };
                 // what is in the description already has been paid for
-                let more = more / times - each * part.len() as f64;
+                let more = (likelihood - base) / times - each * part.len() as f64;
                 let certain = || {
-                    let mut trial = with.clone();
-                    trial.extend(part);
-                    let which: Vec<usize> = (with.len()..trial.len()).collect();
-                    fits.estimate(&trial)
-                        .is_some_and(|e| e.p_value(&which) * (tried as f64) < FAMILY_ALPHA)
+                    beside(fits, &with, part)
+                        .is_some_and(|(e, which)| e.p_value(&which) * (tried as f64) < FAMILY_ALPHA)
                 };
-                if more > WORTH && best.as_ref().is_none_or(|(most, ..)| more > *most) && certain()
-                {
-                    best = Some((more, k, part));
+                if more > WORTH && best.as_ref().is_none_or(|best| more > best.more) && certain() {
+                    best = Some(Best {
+                        more,
+                        likelihood,
+                        term: k,
+                        part,
+                    });
                 }
             }
         }
-        let Some((more, k, part)) = best else { break };
-        worth += more;
-        with.extend(part);
-        let first = described.terms[k].first;
-        parts.push((k, part.iter().map(|c| c - first).collect()));
+        let Some(best) = best else { break };
+        worth += best.more;
+        base = best.likelihood;
+        with.extend(best.part);
+        let first = described.terms[best.term].first;
+        parts.push((best.term, best.part.iter().map(|c| c - first).collect()));
     }
     (!parts.is_empty()).then_some((worth, parts))
 }

@@ -27,6 +27,8 @@ use focal_plane::{AttitudeSeries, AttitudeSource, rotation_from_vector, rotation
 use nalgebra::{UnitQuaternion, Vector3};
 use spectra::robust::median_step;
 
+use crate::gaps::GAP_STEPS;
+
 /// Neighbours on each side, without and with rates.
 const SIDE: usize = 3;
 const SIDE_WITH_RATES: usize = 2;
@@ -143,7 +145,7 @@ impl Piece {
     fn through_neighbours(mut self, series: &AttitudeSeries, step: f64, t_s: f64) -> Self {
         let times = series.t_s();
         let samples = series.quaternions();
-        let reach = series.max_gap_s().min(1.9 * step);
+        let reach = series.max_gap_s().min(GAP_STEPS * step);
         let before = times.partition_point(|&t| t <= t_s - NEAR * step);
         let after = times.partition_point(|&t| t < t_s + NEAR * step);
         let rates = series.given_rates_rad_s();

@@ -34,6 +34,7 @@ use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use rayon::prelude::*;
 use spectra::robust::median_step;
 
+use crate::gaps::GAP_STEPS;
 use crate::star::data::StarData;
 use crate::star::frame_rotation::{Turns, counts, rotation_row};
 use crate::star::weights;
@@ -41,8 +42,6 @@ use crate::star::weights;
 /// Frames on each side that predict one: fewest and most.
 const FEWEST: usize = 2;
 const MOST: usize = 16;
-/// A longer step than this many medians is a gap; nothing is predicted across it.
-const GAP_STEPS: f64 = 1.9;
 /// Fits over longer stretches agree with those over shorter ones within this many sigma.
 const AGREE: f64 = 2.0;
 /// Frames on each side by whose own prediction it is judged.

@@ -44,7 +44,7 @@ use crate::star::search::{Searched, Wander};
 use crate::star::settling::{Settled, settle};
 use crate::unexplained::leftover::lines::SharedLine;
 use crate::unexplained::leftover::{self, Series};
-use crate::unexplained::pattern::{self, Rotation, less_rotation};
+use crate::unexplained::pattern::{self, Turned};
 use crate::unexplained::star_series;
 
 /// Fewest frames: every fold needs data to be predicted from.
@@ -445,9 +445,8 @@ fn finish(
     let residual = inside.as_deref().unwrap_or(&plain.axes);
     let series =
         series.unwrap_or_else(|| Series::of(&leftover::star_tracks(f.data, residual, weight)));
-    let both = [residual[0].as_slice(), &residual[1]];
-    let turned = |rotation| less_rotation(f.data, both, weight, rotation);
-    let known = turned(Rotation::Known);
+    let learned = f.level.learned();
+    let turned = Turned::of(f.data, [&residual[0], &residual[1]], weight);
     let (noise, ((leftover, own), pattern)) = rayon::join(
         || noise_effects::claim(f.situation, f.level, residual, f.folds),
         || {
@@ -455,21 +454,20 @@ fn finish(
             rayon::join(
                 || {
                     // frames whose attitudes are free have turned already
-                    let alone = (!f.data.free_attitude).then(|| turned(Rotation::Whole));
-                    let [own, alone] = match &alone {
-                        Some(alone) => [known.as_slice(), alone],
-                        None => [residual, residual],
+                    let [own, alone]: [&[Vec<f64>]; 2] = if f.data.free_attitude {
+                        [residual, residual]
+                    } else {
+                        [&turned.known, &turned.whole]
                     };
-                    (
-                        series.describe(),
-                        star_series::search(f.data, own, alone, weight),
-                    )
+                    // a learned spot errs by where the star lies, and so slowly
+                    let own = if learned {
+                        star_series::OwnSeries::default()
+                    } else {
+                        star_series::search(f.data, own, alone, weight)
+                    };
+                    (series.describe(), own)
                 },
-                || {
-                    let own = known.each_ref().map(Vec::as_slice);
-                    let learned = f.level.learned();
-                    pattern::search(f.data, residual, own, weight, f.folds, order, learned)
-                },
+                || pattern::search(f.data, residual, &turned, weight, f.folds, order, learned),
             )
         },
     );
@@ -495,10 +493,7 @@ fn finish(
     if let Some(slow) = f.slow {
         slow.tell(&mut unattributed, last / whole);
     }
-    // a learned spot errs by where the star lies, and so slowly
-    if !f.level.learned() {
-        own.tell(&mut unattributed, last / whole);
-    }
+    own.tell(&mut unattributed, last / whole);
     noise_left.tell(&mut unattributed);
     let excess = excess(f, last);
     let mut considered = figures::considered(f.found, excess, f.refused, &surroundings);

@@ -17,13 +17,13 @@
 //!
 //! Source: Aitken 1935 (weighted least squares); Rousseeuw & Croux 1993 (the median's scale).
 
+use spectra::robust;
+
+use crate::gaps::longest_step;
 use crate::star::data::StarData;
-use spectra::robust::{self, median_step};
 
 /// Changes that the common noise counts for beside a star's own.
 const COMMON: f64 = 20.0;
-/// A longer step than this many medians is a gap.
-const GAP_STEPS: f64 = 1.9;
 /// A star is never taken for quieter than this share of the common noise.
 const QUIETEST: f64 = 0.1;
 /// Median of |x| for unit variance.
@@ -64,7 +64,7 @@ pub(crate) fn of(data: &StarData) -> Vec<f64> {
 fn changes(data: &StarData) -> Vec<Vec<f64>> {
     // what a misalignment leaves changes along the motion
     let residual = data.bare_residual(data.frames.positions());
-    let gap = GAP_STEPS * median_step(&data.frames.t_s).unwrap_or(f64::INFINITY);
+    let gap = longest_step(&data.frames.t_s);
     let mut last: Vec<Option<usize>> = vec![None; data.stars.len()];
     let mut out = vec![Vec::new(); data.stars.len()];
     for row in (0..data.t_s.len()).filter(|&r| !data.outlier[r]) {

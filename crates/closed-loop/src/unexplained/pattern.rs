@@ -49,7 +49,7 @@ mod tests;
 mod transform;
 mod turn;
 
-pub(crate) use turn::{Rotation, less_rotation};
+pub(crate) use turn::Turned;
 
 /// Peaks of the transform that are refined.
 const REFINED: usize = 6;
@@ -143,12 +143,12 @@ impl Pattern {
 }
 
 /// The pattern that `residual` (arcsec, per axis over all rows) follows, if one is beyond
-/// doubt. `own` is it less what is known of its frames' rotations. A star counts by the `weight` of its rows; `order` is the declared distortion's; with `own_spots`
-/// the stars' centroids were learned from windows.
+/// doubt. `turned` is it less its frames' rotations. A star counts by the `weight` of its rows; `order` is
+/// the declared distortion's; with `own_spots` the stars' centroids were learned from windows.
 pub(crate) fn search(
     data: &StarData,
     residual: &[Vec<f64>],
-    own: [&[f64]; 2],
+    turned: &Turned,
     weight: &[f64],
     folds: &Folds,
     order: Option<u32>,
@@ -167,18 +167,18 @@ pub(crate) fn search(
         of_star[data.star[row]].push(row);
     }
     let at = [data.modelled[0].as_slice(), &data.modelled[1]];
-    let field = |residual: [&[f64]; 2]| Field {
+    let field = |[x, y]: [&Vec<f64>; 2]| Field {
         own_spots,
-        ..Field::new(at, residual, &frame, &of_star, weight)
+        ..Field::new(at, [x, y], &frame, &of_star, weight)
     };
     let as_left = || field([rx, ry]);
     let turning = data.t_s.len() >= STARS_TO_TURN * data.frames.frames();
     if !turning {
         return as_left().pattern(&as_left, folds, order);
     }
-    let found = field(own).pattern(&as_left, folds, order)?;
-    let [x, y] = less_rotation(data, [rx, ry], weight, Rotation::Whole);
-    let power = field([&x, &y]).power_at(found.wave)?;
+    let known = field(turned.known.each_ref());
+    let found = known.pattern(&as_left, folds, order)?;
+    let power = field(turned.whole.each_ref()).power_at(found.wave)?;
     (power > LEAST_OWN * found.power).then_some(found)
 }
 

@@ -23,6 +23,7 @@ use telemetry::report::Unattributed;
 
 use crate::causes::commonness::{self, IN_TIME, MOSTLY, stars_first};
 use crate::star::data::StarData;
+use crate::unexplained::around::Around;
 
 /// Chance that either is told although there is none.
 const ALPHA: f64 = 0.001;
@@ -33,13 +34,14 @@ const MOST_POINTS: usize = 1200;
 const MIN_POINTS: usize = 60;
 /// Stars beyond which only the brightest sums of rows are looked at.
 const MOST_STARS: usize = 64;
-/// Fewer cycles in the span are no line; grid points in 1/span.
+/// Fewer cycles in the span are no line.
 const MIN_CYCLES: f64 = 4.0;
-const FINER: usize = 2;
-/// Independent frequencies on each side that the mean power is of, and nearer ones that hold the
-/// line's own.
-const AROUND: usize = 12;
-const GUARD: usize = 2;
+/// What a line's power is held against.
+const USUAL: Around = Around {
+    finer: 2,
+    count: 12,
+    guard: 2,
+};
 /// Points on each side of a step.
 const MIN_SIDE: usize = 8;
 /// Sums of squares have wider tails than chi-squared.
@@ -199,11 +201,11 @@ fn series(data: &StarData, own: &[Vec<f64>], weight: &[f64]) -> Vec<Own> {
 fn line(series: &[Own], span: f64) -> Option<(f64, f64, f64)> {
     let median = |s: &Own| median_step(&s.t_s).unwrap_or(f64::INFINITY);
     let step = series.iter().map(median).fold(0.0, f64::max);
-    let grid = 1.0 / (FINER as f64 * span);
+    let grid = 1.0 / (USUAL.finer as f64 * span);
     let first = MIN_CYCLES / span;
     let bins = ((0.5 / step - first) / grid).floor();
     // no series, or no time between points
-    if !bins.is_finite() || bins < (4 * FINER * (AROUND + GUARD)) as f64 {
+    if !bins.is_finite() || bins < (4 * USUAL.finer * (USUAL.count + USUAL.guard)) as f64 {
         return None;
     }
     #[expect(
@@ -218,15 +220,7 @@ fn line(series: &[Own], span: f64) -> Option<(f64, f64, f64)> {
         .collect();
     // power over what is usual around, and how many it is the mean of
     let relative = |p: &[f64], k: usize| -> (f64, f64) {
-        let (mut sum, mut count) = (0.0, 0.0);
-        for j in GUARD + 1..=GUARD + AROUND {
-            for at in [k.checked_sub(j * FINER), Some(k + j * FINER)] {
-                if let Some(v) = at.and_then(|at| p.get(at)) {
-                    sum += v;
-                    count += 1.0;
-                }
-            }
-        }
+        let (sum, count) = USUAL.sum(p, k);
         (p[k] * count / sum, count)
     };
     let chance = |mean: f64, of: f64, around: f64| -> f64 {

@@ -20,14 +20,16 @@ use spectra::robust::median_step;
 use spectra::{LombScargle, LombScargleSettings};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
+use crate::unexplained::around::Around;
+
 use super::{MOST, Series, Track, WORTH_A_SEARCH};
 
-/// Grid points in 1/span.
-const FINER: usize = 4;
-/// Independent frequencies on each side that the mean power is of.
-const AROUND: usize = 15;
-/// Nearer ones hold the line's own power.
-const GUARD: usize = 2;
+/// What a line's power is held against.
+const USUAL: Around = Around {
+    finer: 4,
+    count: 15,
+    guard: 2,
+};
 /// Fewer cycles in the span are no line but a trend.
 const MIN_CYCLES: f64 = 3.0;
 /// Grids whose points lie nearer than this share of their step are the same.
@@ -46,10 +48,10 @@ impl Grid {
     fn of(track: &Track) -> Option<Self> {
         let span = track.span();
         let highest = 0.5 / median_step(&track.t_s)?;
-        let step_hz = 1.0 / (FINER as f64 * span);
+        let step_hz = 1.0 / (USUAL.finer as f64 * span);
         let first_hz = MIN_CYCLES / span;
         let bins = ((highest - first_hz) / step_hz).floor();
-        if bins.is_nan() || bins < (4 * FINER * AROUND) as f64 {
+        if bins.is_nan() || bins < (4 * USUAL.finer * USUAL.count) as f64 {
             return None;
         }
         #[expect(
@@ -102,16 +104,7 @@ impl Spectrum {
         let white = track.whitened(&track.noise(), &track.value);
         let power = plan.process(&white).ok()?.psd;
         let chance = |k: usize| {
-            let (mut sum, mut n) = (0.0, 0.0);
-            for j in GUARD + 1..=GUARD + AROUND {
-                let off = j * FINER;
-                for at in [k.checked_sub(off), Some(k + off)].into_iter().flatten() {
-                    if let Some(p) = power.get(at) {
-                        sum += p;
-                        n += 1.0;
-                    }
-                }
-            }
+            let (sum, n) = USUAL.sum(&power, k);
             -n * (power[k] / sum).ln_1p()
         };
         let chance = (0..grid.bins).map(chance).collect();

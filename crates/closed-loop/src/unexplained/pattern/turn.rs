@@ -19,40 +19,36 @@ use nalgebra::Vector3;
 use crate::star::data::StarData;
 use crate::star::frame_rotation::{Turns, rotation_row};
 
-/// What is taken off.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Rotation {
-    /// As much as a reference with white noise turns a frame by.
-    Known,
-    /// All that the stars of a frame share.
-    Whole,
+/// Residuals of both axes over all rows, arcsec, less rotations of their frames.
+#[derive(Clone, Debug)]
+pub(crate) struct Turned {
+    /// Less as much as a reference with white noise turns a frame by.
+    pub(crate) known: [Vec<f64>; 2],
+    /// Less all that the stars of a frame share.
+    pub(crate) whole: [Vec<f64>; 2],
 }
 
-/// See the module.
-pub(crate) fn less_rotation(
-    data: &StarData,
-    residual: [&[f64]; 2],
-    weight: &[f64],
-    rotation: Rotation,
-) -> [Vec<f64>; 2] {
-    let turns = Turns::of(data, residual, weight);
-    let mut out = residual.map(<[f64]>::to_vec);
-    for (k, turn) in turns.frames.iter().enumerate() {
-        let Some(turn) = turn else { continue };
-        let of_reference = turns.reference;
-        let share = |a: usize| of_reference[a] / (of_reference[a] + turns.noise * turn.variance[a]);
-        let theta = Vector3::from_fn(|a, _| {
-            let share = match rotation {
-                Rotation::Known => share(a),
-                Rotation::Whole => 1.0,
-            };
-            turn.theta[a] * if share.is_finite() { share } else { 0.0 }
-        });
-        for row in data.frames.rows_of(k) {
-            for (axis, a) in rotation_row(data, row).into_iter().enumerate() {
-                out[axis][row] -= Vector3::from(a).dot(&theta);
+impl Turned {
+    /// See the module; rows count by their `weight`.
+    pub(crate) fn of(data: &StarData, residual: [&[f64]; 2], weight: &[f64]) -> Self {
+        let turns = Turns::of(data, residual, weight);
+        let start = || residual.map(<[f64]>::to_vec);
+        let (mut known, mut whole) = (start(), start());
+        for (k, turn) in turns.frames.iter().enumerate() {
+            let Some(turn) = turn else { continue };
+            let of_reference = turns.reference;
+            let drawn = Vector3::from_fn(|a, _| {
+                let share = of_reference[a] / (of_reference[a] + turns.noise * turn.variance[a]);
+                turn.theta[a] * if share.is_finite() { share } else { 0.0 }
+            });
+            for row in data.frames.rows_of(k) {
+                for (axis, a) in rotation_row(data, row).into_iter().enumerate() {
+                    let a = Vector3::from(a);
+                    known[axis][row] -= a.dot(&drawn);
+                    whole[axis][row] -= a.dot(&turn.theta);
+                }
             }
         }
+        Self { known, whole }
     }
-    out
 }
