@@ -74,7 +74,7 @@ pub(crate) fn interrupted() {
 const DRAWS: u64 = 40;
 /// A long run has many periods in every band, and needs fewer draws of it.
 const FLOWN_FRAMES: u64 = 400_000;
-const FEWEST_DRAWS: u64 = 12;
+const FEWEST_DRAWS: u64 = 8;
 
 fn draws(frames: usize) -> u64 {
     (FLOWN_FRAMES / frames.max(1) as u64).clamp(FEWEST_DRAWS, DRAWS)

@@ -18,6 +18,7 @@
 //! Source: an analysis of variance within and between (Fisher 1925) of lagged products.
 
 use nalgebra::{Matrix3, Vector3};
+use rayon::prelude::*;
 use spectra::robust::median_step;
 use statrs::function::erf::erfc;
 use telemetry::report::{Dependence, Unattributed};
@@ -153,77 +154,62 @@ pub(crate) fn slow(
     )]
     let lags = (0.5 * tau_s / step).clamp(1.0, MOST_LAGS as f64) as usize;
     let weight = weights(data, residual);
-    let counts = |r: &usize| {
-        !data.outlier[*r]
-            && weight[data.star[*r]] > 0.0
-            && residual.iter().all(|a| a[*r].is_finite())
-    };
-    let frames = data.frames.frames();
-    // the rotation in units of its white noise; what is left of every star in units of its own
-    let mut turn: Vec<Option<Vector3<f64>>> = vec![None; frames];
+    let parts: Vec<Option<Parts>> = (0..data.frames.frames())
+        .into_par_iter()
+        .map(|k| Parts::of(data, residual, &weight, k))
+        .collect();
     let mut left = vec![[f64::NAN; 2]; data.t_s.len()];
-    let mut freedom = vec![0.0; frames];
-    for k in 0..frames {
-        let rows: Vec<usize> = data.frames.rows_of(k).filter(counts).collect();
-        if rows.len() < 3 {
-            continue;
+    let mut rows_of: Vec<Vec<usize>> = vec![Vec::new(); data.stars.len()];
+    // directions that a row stands for
+    let mut freedom = vec![0.0; data.t_s.len()];
+    for parts in parts.iter().flatten() {
+        let n = parts.left.len() as f64;
+        for &(row, own) in &parts.left {
+            left[row] = own;
+            freedom[row] = (2.0 * n - 3.0) / n;
+            rows_of[data.star[row]].push(row);
         }
-        let (mut normal, mut moment) = (Matrix3::zeros(), Vector3::zeros());
-        for &r in &rows {
-            let w = weight[data.star[r]];
-            for (axis, a) in rotation_row(data, r).map(Vector3::from).iter().enumerate() {
-                normal += a * a.transpose() * w;
-                moment += a * (w * residual[axis][r]);
-            }
-        }
-        let Some(covariance) = normal.try_inverse() else {
-            continue;
-        };
-        let theta = covariance * moment;
-        turn[k] = Some(Vector3::from_fn(|a, _| {
-            theta[a] / covariance[(a, a)].sqrt()
-        }));
-        for &r in &rows {
-            let root = weight[data.star[r]].sqrt();
-            for (axis, a) in rotation_row(data, r).map(Vector3::from).iter().enumerate() {
-                left[r][axis] = root * (residual[axis][r] - a.dot(&theta));
-            }
-        }
-        freedom[k] = 2.0 * rows.len() as f64 - 3.0;
     }
+    let t_s = &data.frames.t_s;
+    let near = |now: f64, before: f64| now - before <= (lags as f64 + 0.5) * step;
     let asked: Vec<usize> = (0..3).filter(|&a| axes[a]).collect();
-    let (mut rotation, mut of_rotation, mut stars, mut of_stars) = (0.0, 0.0, 0.0, 0.0);
-    let mut last: Vec<Vec<usize>> = vec![Vec::new(); data.stars.len()];
-    let mut own = vec![[0.0; 2]; data.stars.len()];
-    for k in 0..frames {
-        let Some(now) = turn[k] else { continue };
-        for lag in 1..=lags.min(k) {
-            if data.frames.t_s[k] - data.frames.t_s[k - lag] > (lags as f64 + 0.5) * step {
+    let (mut rotation, mut of_rotation) = (0.0, 0.0);
+    for (k, now) in parts.iter().enumerate() {
+        let Some(now) = now else { continue };
+        for before in (k.saturating_sub(lags)..k).rev() {
+            if !near(t_s[k], t_s[before]) {
                 break;
             }
-            if let Some(before) = turn[k - lag] {
-                rotation += asked.iter().map(|&a| now[a] * before[a]).sum::<f64>();
+            if let Some(before) = &parts[before] {
+                rotation += asked
+                    .iter()
+                    .map(|&a| now.turn[a] * before.turn[a])
+                    .sum::<f64>();
                 of_rotation += asked.len() as f64;
             }
         }
-        let mut products = 0.0;
-        let rows: Vec<usize> = data.frames.rows_of(k).filter(counts).collect();
-        for &r in &rows {
-            let past = &mut last[data.star[r]];
-            for &p in past.iter().rev().take(lags) {
-                if data.t_s[r] - data.t_s[p] > (lags as f64 + 0.5) * step {
-                    break;
-                }
-                let product = left[r][0] * left[p][0] + left[r][1] * left[p][1];
-                stars += product;
-                products += 1.0;
-                own[data.star[r]][0] += product;
-                own[data.star[r]][1] += 2.0;
-            }
-            past.push(r);
-        }
-        of_stars += products * freedom[k] / rows.len().max(1) as f64;
     }
+    let each: Vec<Products> = rows_of
+        .par_iter()
+        .map(|rows| {
+            // side by side
+            let own: Vec<(f64, [f64; 2])> = rows.iter().map(|&r| (data.t_s[r], left[r])).collect();
+            let mut out = Products::default();
+            for (i, &(t, u)) in own.iter().enumerate() {
+                for &(before, v) in own[i.saturating_sub(lags)..i].iter().rev() {
+                    if !near(t, before) {
+                        break;
+                    }
+                    out.sum += u[0] * v[0] + u[1] * v[1];
+                    out.count += 2.0;
+                    out.directions += freedom[rows[i]];
+                }
+            }
+            out
+        })
+        .collect();
+    let stars: f64 = each.iter().map(|own| own.sum).sum();
+    let of_stars: f64 = each.iter().map(|own| own.directions).sum();
     let comes_back = recurrence::comes_back(data, &left, stars / of_stars, lags as f64 * step);
     (of_rotation > 0.0 && of_stars >= LEAST_PRODUCTS).then(|| Slow {
         rotation: rotation / of_rotation,
@@ -231,13 +217,68 @@ pub(crate) fn slow(
         comes_back,
         sigma: of_stars.sqrt().recip(),
         lags,
-        star: own
+        star: each
             .iter()
-            .filter(|[_, n]| *n >= LEAST_PRODUCTS)
-            .map(|[sum, n]| sum / n.sqrt())
+            .filter(|own| own.count >= LEAST_PRODUCTS)
+            .map(|own| own.sum / own.count.sqrt())
             .fold(0.0, f64::max),
         count: data.stars.len(),
     })
+}
+
+/// A frame in units of its white noise.
+struct Parts {
+    /// Its rotation.
+    turn: Vector3<f64>,
+    /// What that leaves of each row, both axes.
+    left: Vec<(usize, [f64; 2])>,
+}
+
+impl Parts {
+    /// `weight`: one over the white variance of each star. `None` for a frame that has too few.
+    fn of(data: &StarData, residual: &[Vec<f64>], weight: &[f64], frame: usize) -> Option<Self> {
+        let counts = |r: &usize| {
+            !data.outlier[*r]
+                && weight[data.star[*r]] > 0.0
+                && residual.iter().all(|a| a[*r].is_finite())
+        };
+        let rows: Vec<usize> = data.frames.rows_of(frame).filter(counts).collect();
+        if rows.len() < 3 {
+            return None;
+        }
+        let columns: Vec<[Vector3<f64>; 2]> = rows
+            .iter()
+            .map(|&r| rotation_row(data, r).map(Vector3::from))
+            .collect();
+        let (mut normal, mut moment) = (Matrix3::zeros(), Vector3::zeros());
+        for (&r, columns) in rows.iter().zip(&columns) {
+            let w = weight[data.star[r]];
+            for (axis, a) in columns.iter().enumerate() {
+                normal += a * a.transpose() * w;
+                moment += a * (w * residual[axis][r]);
+            }
+        }
+        let covariance = normal.try_inverse()?;
+        let theta = covariance * moment;
+        let own = |(&r, columns): (&usize, &[Vector3<f64>; 2])| {
+            let root = weight[data.star[r]].sqrt();
+            let left = [0, 1].map(|a| root * (residual[a][r] - columns[a].dot(&theta)));
+            (r, left)
+        };
+        Some(Self {
+            turn: Vector3::from_fn(|a, _| theta[a] / covariance[(a, a)].sqrt()),
+            left: rows.iter().zip(&columns).map(own).collect(),
+        })
+    }
+}
+
+/// Lagged products of one star.
+#[derive(Clone, Copy, Debug, Default)]
+struct Products {
+    sum: f64,
+    count: f64,
+    /// Directions beside the rotation that they are of.
+    directions: f64,
 }
 
 /// One over the white variance of each star, from differences of neighbours.
