@@ -24,7 +24,7 @@ use crate::figures;
 use crate::noise_effects;
 use crate::search::empirical::Empirical;
 use crate::search::refusal::{Refusal, Refused};
-use crate::search::selection::{columns_of, costs};
+use crate::search::selection::{columns_of, costs, judged};
 use crate::search::{Found, borrowed, family, fit};
 use crate::star::evidence::StarEvidence;
 use crate::star::search::{Searched, attempt, declared_noise};
@@ -227,7 +227,7 @@ pub(crate) fn run<'a>(
             continue;
         }
         let searched = Searched {
-            found,
+            found: judged_alone(found, &mut refused),
             evidence: evidence.clone(),
             wander,
         };
@@ -240,6 +240,23 @@ pub(crate) fn run<'a>(
         });
     }
     Err(CloseError::Singular)
+}
+
+/// Judges every effect anew without what is only described: beside it, an effect that it stands for
+/// cannot be seen. What would stand then has been refused.
+fn judged_alone(mut found: Found, refused: &mut Refused) -> Found {
+    let (fits, groups) = (&found.fitted.fits, &found.fitted.groups);
+    let chosen = &found.selection.chosen;
+    let cost = costs(groups, &vec![true; groups.len()]);
+    let judged = judged(fits, groups, chosen, &cost);
+    for (g, judged) in judged.iter().enumerate() {
+        if judged.stands() && !chosen.contains(&g) {
+            let family = family(found.candidates[g].as_ref());
+            refused.entry(family).or_insert(Refusal::Described);
+        }
+    }
+    found.selection.judged = judged;
+    found
 }
 
 /// What the best effect that `may` be named would gain out of fold beside the chosen.

@@ -292,6 +292,9 @@ fn considered(out: &mut String, report: &Report) {
                 c.id,
                 c.delta_loglik.unwrap_or(0.0)
             );
+            if let Some(why) = &c.against {
+                line!(out, "    not named: {why}");
+            }
         }
     }
     if !unseen.is_empty() {

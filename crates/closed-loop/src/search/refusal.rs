@@ -13,6 +13,7 @@ pub(crate) enum Refusal {
     StandIn,
     Change,
     Remainder,
+    Described,
     NoLessError,
     Fallen,
 }
@@ -34,6 +35,7 @@ impl Refusal {
                 "it is not the same at all times, on all stars and all over the detector"
             }
             Self::Remainder => "it is next to nothing beside what no effect explains",
+            Self::Described => "it does not stand beside what the residual follows",
             Self::NoLessError => "the error out of fold is no smaller with it",
             Self::Fallen => "it does not stand beside what was added after it",
         }
