@@ -34,6 +34,9 @@ const MOST_TERMS: usize = 3;
 /// Nats that a further term must be worth.
 const WORTH: f64 = 3.0;
 
+/// Nats that the place of a part is taken for.
+const WITHOUT_LOSS: f64 = 1.0;
+
 /// A term and the columns of it, counted from its own first.
 pub(crate) type Part = (usize, Vec<usize>);
 
@@ -58,12 +61,38 @@ pub(crate) fn stand_ins(described: &Described) -> Option<(Vec<usize>, Vec<Part>)
             continue;
         };
         let worth = worth - parts.len() as f64 * looked;
-        if worth - own > by {
+        if worth - own > by && !is_a_part(described, &set, &rest, &parts) {
             by = worth - own;
             most = Some((set, parts));
         }
     }
     most
+}
+
+/// Whether the set takes the place of one part of the description without loss: then the rest of it
+/// is something else, and speaks for nothing against the set.
+fn is_a_part(described: &Described, set: &[usize], rest: &[usize], parts: &[Part]) -> bool {
+    if parts.len() < 2 {
+        return false;
+    }
+    let fits = &described.fitted.fits;
+    let own = columns_of(&described.fitted.groups, set);
+    let columns = |but: Option<usize>| -> Vec<usize> {
+        let parts = parts.iter().enumerate().filter(|(k, _)| Some(*k) != but);
+        parts
+            .flat_map(|(_, (term, part))| {
+                let first = described.terms[*term].first;
+                part.iter().map(move |c| first + c)
+            })
+            .collect()
+    };
+    let Some(whole) = likelihood(fits, rest, &columns(None)) else {
+        return false;
+    };
+    (0..parts.len()).any(|k| {
+        let instead = [columns(Some(k)), own.clone()].concat();
+        likelihood(fits, rest, &instead).is_some_and(|l| l > whole - WITHOUT_LOSS)
+    })
 }
 
 /// How many times white noise makes the gain of `set` beside `rest` too large, at least 1: where it
