@@ -10,6 +10,7 @@
 //! nuisance        what the declared model leaves unknown, as columns with priors
 //! weights         how much each star counts
 //! columns         all columns of a fit, row by row
+//! reference_noise how much the rotation that they share counts
 //! moments         their products, in one pass, for every fit at every noise
 //! evidence        data, noise and products as what the search asks of a measurement
 //! settling        the declared model at its best, and the outliers beside it
@@ -31,6 +32,7 @@ mod moments;
 pub(crate) mod nuisance;
 mod own_attitude;
 mod pointed;
+mod reference_noise;
 mod reference_wander;
 mod run;
 pub(crate) mod search;

@@ -24,6 +24,7 @@ use crate::star::data::StarData;
 use crate::star::frame_rotation::{rotation_of, rotation_row};
 use crate::star::moments::{Keep, MOST_BINS, StarMoments};
 use crate::star::nuisance::StarNuisance;
+use crate::star::reference_noise;
 use crate::star::weights;
 
 /// Star measurements as evidence.
@@ -42,6 +43,8 @@ pub(crate) struct StarEvidence<'a> {
     pub(crate) noise: Option<CommonNoise>,
     /// Weight of each row.
     pub(crate) weight: Arc<Vec<f64>>,
+    /// Where the reference has white noise: [`reference_noise::precision`].
+    pub(crate) drawn: Option<[f64; 3]>,
     /// What is in every fit, described but not named: nuisance without a prior.
     pub(crate) kept: Vec<Arc<dyn Candidate>>,
 }
@@ -55,6 +58,15 @@ impl<'a> StarEvidence<'a> {
         motion: Option<&'a Around>,
     ) -> Self {
         let temporal = situation.model.noise.temporal_arcsec.filter(|s| *s > 0.0);
+        // where windows are sent, centroids are formed anew, with another noise
+        let (weight, drawn) = match (&residuals[..], &situation.bundle.images) {
+            ([[x, y]], None) => {
+                let weight = weights::of(data);
+                let drawn = reference_noise::precision(data, [x, y], &weight);
+                (weight, drawn)
+            }
+            _ => (vec![1.0; data.t_s.len()], None),
+        };
         Self {
             data,
             nuisance: StarNuisance::declared(situation.model, data),
@@ -64,12 +76,8 @@ impl<'a> StarEvidence<'a> {
             // circular to per axis
             sigma_guess_arcsec: temporal.map_or(1.0, |s| s / std::f64::consts::SQRT_2),
             noise: None,
-            // where windows are sent, centroids are formed anew, with another noise
-            weight: Arc::new(if situation.bundle.images.is_some() {
-                vec![1.0; data.t_s.len()]
-            } else {
-                weights::of(data)
-            }),
+            weight: Arc::new(weight),
+            drawn,
             kept: Vec::new(),
         }
     }
@@ -148,10 +156,10 @@ impl Evidence for StarEvidence<'_> {
             let all: Vec<usize> = (0..moments.width()).collect();
             return moments.under(&all, noise);
         }
-        let keep = if self.data.free_attitude {
-            Keep::Free
-        } else {
-            Keep::None
+        let keep = match self.drawn {
+            _ if self.data.free_attitude => Keep::Free,
+            Some(precision) => Keep::Drawn(precision),
+            None => Keep::None,
         };
         let all = self.all(candidates);
         StarMoments::accumulate(&self.columns(&all), folds, keep).white()

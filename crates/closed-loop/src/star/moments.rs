@@ -20,7 +20,6 @@ mod sums;
 #[cfg(test)]
 mod tests;
 
-use std::ops::Range;
 use std::sync::{Arc, OnceLock};
 
 use block_regression::{BlockGrams, Folds, Gram, add_products};
@@ -28,7 +27,7 @@ use coloured_noise::{CommonNoise, Filter, Rotations};
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use rayon::prelude::*;
 
-use self::sums::Sums;
+use self::sums::{SOLVING, SolvedBins, Sums};
 use crate::bins::Bins;
 use crate::star::columns::StarColumns;
 
@@ -45,6 +44,8 @@ pub(crate) enum Keep<'a> {
     None,
     /// Every frame's own, to be thrown away: its attitude is free.
     Free,
+    /// Every frame's own, with this prior precision about each axis: the reference has white noise.
+    Drawn([f64; 3]),
     /// Means over bins.
     Bins(&'a Bins),
 }
@@ -63,6 +64,8 @@ struct Block {
     theta: DMatrix<f64>,
     /// Inverse of N of each bin; `None`: no attitude there, and no rotation.
     inverse: Vec<Option<Matrix3<f64>>>,
+    /// What the log-likelihood of the scalars lacks, nats.
+    log_scale: f64,
 }
 
 impl Block {
@@ -130,12 +133,22 @@ impl StarMoments {
                 match keep {
                     Keep::None => Sums::over(columns, frames, None).block(),
                     Keep::Free => {
-                        let own: Vec<Range<usize>> = frames.clone().map(|k| k..k + 1).collect();
-                        Sums::over(columns, frames, Some(&own)).block().freed()
+                        let bins = SolvedBins::frames(&frames);
+                        Sums::over(columns, frames, Some(&bins)).block().freed()
+                    }
+                    Keep::Drawn(precision) => {
+                        let bins = SolvedBins {
+                            least: 1,
+                            ..SolvedBins::frames(&frames)
+                        };
+                        Sums::over(columns, frames, Some(&bins)).drawn(precision)
                     }
                     Keep::Bins(bins) => {
-                        let own = &bins.rows[bins.folds.blocks[b].clone()];
-                        Sums::over(columns, frames, Some(own)).block()
+                        let bins = SolvedBins {
+                            frames: bins.rows[bins.folds.blocks[b].clone()].into(),
+                            least: SOLVING,
+                        };
+                        Sums::over(columns, frames, Some(&bins)).block()
                     }
                 }
             })
@@ -160,6 +173,7 @@ impl StarMoments {
 
     /// The products under white noise, of a pass that kept no rotation apart.
     pub(crate) fn white(self) -> BlockGrams {
+        let log_scale = self.blocks.iter().map(|b| b.log_scale).sum();
         let (gram, scalars) = self
             .blocks
             .into_iter()
@@ -171,7 +185,7 @@ impl StarMoments {
         BlockGrams {
             gram,
             scalars,
-            log_scale: 0.0,
+            log_scale,
             known: None,
         }
     }
@@ -363,6 +377,37 @@ fn shared(matrix: &Arc<DMatrix<f64>>, columns: &[usize]) -> Arc<DMatrix<f64>> {
 }
 
 impl Block {
+    /// Takes out of R what rotations of frames with these M and N explain that have a prior of this
+    /// precision.
+    fn draw(
+        mut self,
+        moments: &DMatrix<f64>,
+        normals: &[Matrix3<f64>],
+        precision: [f64; 3],
+    ) -> Self {
+        let prior = Matrix3::from_diagonal(&precision.into());
+        let mut whitened = DMatrix::zeros(moments.nrows(), moments.ncols());
+        for (frame, normal) in normals.iter().enumerate() {
+            let Some(root) = (normal + prior).cholesky().map(|c| c.l()) else {
+                continue;
+            };
+            let part = moments.fixed_rows::<3>(3 * frame);
+            if let Some(inverse) = root.try_inverse() {
+                whitened
+                    .fixed_rows_mut::<3>(3 * frame)
+                    .copy_from(&(inverse * part));
+            }
+            // half of ln det of I + N P^-1
+            self.log_scale -= (0..3)
+                .map(|k| root[(k, k)].ln() - 0.5 * precision[k].ln())
+                .sum::<f64>();
+        }
+        let rest = Arc::make_mut(&mut self.rest);
+        add_products(-1.0, &whitened, rest);
+        rest.fill_upper_triangle_with_lower_triangle();
+        self
+    }
+
     /// Takes the rotations of bins with these M and N out of R.
     fn keep_apart(&mut self, mut moments: DMatrix<f64>, normals: &[Matrix3<f64>]) {
         let mut whitened = DMatrix::zeros(moments.nrows(), moments.ncols());

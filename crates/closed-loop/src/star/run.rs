@@ -636,7 +636,8 @@ fn tell_apart(f: &Finish<'_>, effects: &mut [FoundEffect]) {
     let set = columns_of(&f.found.fitted.groups, &f.found.selection.chosen);
     let sky = f.found.fitted.fits.variance(&set).and_then(|variance| {
         let noise = f.wander.filter(|_| f.level.noise.is_some());
-        Sky::of(f.data, f.situation.model, variance, noise.map(|w| w.noise))
+        let sky = Sky::of(f.data, f.situation.model, variance, noise.map(|w| w.noise))?;
+        Some(sky.drawn(f.level.drawn))
     });
     if let (Some(sky), Some(&start)) = (sky, f.data.frames.t_s.first())
         && !confusion.is_empty()

@@ -520,7 +520,7 @@ fn coloured<'a>(
                     rotations: base.rotations,
                     ratio,
                 },
-                white: (!polished).then_some(plain),
+                white: (!polished && white.drawn.is_none()).then_some(plain),
                 worth,
             });
         };

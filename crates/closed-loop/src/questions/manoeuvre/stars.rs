@@ -37,6 +37,8 @@ pub(crate) struct Sky<'a> {
     /// Variance of a scalar, in the unit of the fit, and the noise that whitens.
     variance: f64,
     noise: Option<CommonNoise>,
+    /// White noise of the reference.
+    drawn: Option<[f64; 3]>,
 }
 
 impl<'a> Sky<'a> {
@@ -65,7 +67,13 @@ impl<'a> Sky<'a> {
             step_s: median_step(&data.frames.t_s)?,
             variance,
             noise,
+            drawn: None,
         })
+    }
+
+    /// The same where the reference has white noise ([`StarEvidence::drawn`]).
+    pub(crate) fn drawn(self, drawn: Option<[f64; 3]>) -> Self {
+        Self { drawn, ..self }
     }
 
     pub(crate) fn attitude(&self) -> UnitQuaternion<f64> {
@@ -110,6 +118,7 @@ impl<'a> Sky<'a> {
             sigma_guess_arcsec: 1.0,
             noise: None,
             weight: vec![1.0; data.t_s.len()].into(),
+            drawn: self.drawn,
             kept: Vec::new(),
         };
         let folds = Folds::cut(data.frames.frames());

@@ -10,6 +10,7 @@
 //!
 //! Source: matrix products by blocks.
 
+use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -30,7 +31,27 @@ const PANEL: usize = 48;
 /// Columns that are turned over at once.
 const TURNED: usize = 8;
 /// Two stars give four numbers for three angles; one gives none to spare.
-const SOLVING: usize = 2;
+pub(super) const SOLVING: usize = 2;
+
+/// Bins of frames whose rotations are kept apart.
+pub(super) struct SolvedBins<'a> {
+    pub(super) frames: Cow<'a, [Range<usize>]>,
+    /// Fewest stars of one that has a rotation.
+    pub(super) least: usize,
+}
+
+impl SolvedBins<'_> {
+    /// A bin each.
+    pub(super) fn frames(frames: &Range<usize>) -> Self {
+        Self {
+            frames: frames.clone().map(|k| k..k + 1).collect(),
+            least: SOLVING,
+        }
+    }
+}
+
+/// M, three columns a bin, and N.
+type Turned = (DMatrix<f64>, Vec<Matrix3<f64>>);
 
 /// Sums of one block; columns stand in the order of [`Layout::places`].
 pub(super) struct Sums {
@@ -45,7 +66,7 @@ pub(super) struct Sums {
     turn: DMatrix<f64>,
     scalars: usize,
     /// M of each bin, three columns a bin, and N.
-    bins: Option<(DMatrix<f64>, Vec<Matrix3<f64>>)>,
+    bins: Option<Turned>,
     /// Products of the rows of bins that have no attitude, and how many scalars.
     lost: Option<(DMatrix<f64>, usize)>,
 }
@@ -148,7 +169,7 @@ impl Sums {
     pub(super) fn over(
         columns: &StarColumns<'_>,
         frames: Range<usize>,
-        bins: Option<&[Range<usize>]>,
+        bins: Option<&SolvedBins<'_>>,
     ) -> Self {
         let layout = columns.layout();
         let (shared, own, turn) = (layout.shared, layout.own.len(), layout.turn.len());
@@ -161,8 +182,8 @@ impl Sums {
             scalars: 0,
             bins: bins.map(|b| {
                 (
-                    DMatrix::zeros(width, 3 * b.len()),
-                    vec![Matrix3::zeros(); b.len()],
+                    DMatrix::zeros(width, 3 * b.frames.len()),
+                    vec![Matrix3::zeros(); b.frames.len()],
                 )
             }),
             lost: None,
@@ -172,9 +193,10 @@ impl Sums {
             let rows = columns.data.frames.rows_of(frame);
             rows.filter(|&r| !columns.data.outlier[r]).count()
         };
-        let without: Vec<bool> = bins.map_or_else(Vec::new, |ranges| {
+        let without: Vec<bool> = bins.map_or_else(Vec::new, |bins| {
             let stars = |r: &Range<usize>| r.clone().map(used).sum::<usize>();
-            ranges.iter().map(|r| stars(r) < SOLVING).collect()
+            let frames = bins.frames.iter();
+            frames.map(|r| stars(r) < bins.least).collect()
         });
         let mut scratch = Scratch::default();
         let mut at = frames.start;
@@ -195,7 +217,9 @@ impl Sums {
             if turn == 0 {
                 scratch.held = 0;
             }
-            let Some(ranges) = bins else { continue };
+            let Some(SolvedBins { frames: ranges, .. }) = bins else {
+                continue;
+            };
             for (k, frame) in chunk.enumerate() {
                 while ranges[bin].end <= frame {
                     bin += 1;
@@ -354,7 +378,26 @@ impl Sums {
         out
     }
 
+    /// R, with the rotations of the bins kept apart.
     pub(super) fn block(self) -> Block {
+        let (mut block, bins) = self.apart();
+        if let Some((moments, normals)) = bins {
+            block.keep_apart(moments, &normals);
+        }
+        block
+    }
+
+    /// What rotations of the frames that have a prior of this `precision` do not explain.
+    pub(super) fn drawn(self, precision: [f64; 3]) -> Block {
+        let (block, bins) = self.apart();
+        match bins {
+            Some((moments, normals)) => block.draw(&moments, &normals, precision),
+            None => block,
+        }
+    }
+
+    /// G, and M and N of the bins.
+    fn apart(self) -> (Block, Option<Turned>) {
         let places = self.layout.places();
         let mut order = vec![0; places.len()];
         for (from, &to) in places.iter().enumerate() {
@@ -368,19 +411,18 @@ impl Sums {
             scalars -= count;
         }
         let width = order.len();
-        let mut block = Block {
+        let block = Block {
             rest: Arc::new(rest),
             lost,
             scalars: self.scalars as f64,
             rest_scalars: scalars as f64,
             theta: DMatrix::zeros(0, width),
             inverse: Vec::new(),
+            log_scale: 0.0,
         };
-        if let Some((moments, normals)) = self.bins {
-            let moments = moments.select_rows(&order).transpose();
-            block.keep_apart(moments, &normals);
-        }
-        block
+        let bins = self.bins;
+        let bins = bins.map(|(moments, n)| (moments.select_rows(&order).transpose(), n));
+        (block, bins)
     }
 }
 

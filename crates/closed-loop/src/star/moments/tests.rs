@@ -167,6 +167,17 @@ fn with_blocks(
     folds: impl Fn(usize) -> Folds,
     check: impl Fn(&StarMoments, &DMatrix<f64>, &[(usize, Vector3<f64>)], &StarData),
 ) {
+    with_pass(single, frames, folds, None, check);
+}
+
+/// As [`with_blocks`], of rotations with a prior of this precision, where there is one.
+fn with_pass(
+    single: bool,
+    frames: usize,
+    folds: impl Fn(usize) -> Folds,
+    drawn: Option<[f64; 3]>,
+    check: impl Fn(&StarMoments, &DMatrix<f64>, &[(usize, Vector3<f64>)], &StarData),
+) {
     let data = data(single, frames);
     let model = Model::parse(
         "format = \"boresight-model/1\"\n[tracker]\npixels = [1024, 1024]\nfov_deg = [20.0, 20.0]\n\
@@ -204,7 +215,8 @@ fn with_blocks(
     };
     let folds = folds(data.frames.frames());
     let bins = Bins::cut(&data.frames.t_s, &folds, MOST_BINS);
-    let moments = StarMoments::accumulate(&columns(&one), &folds, Keep::Bins(&bins));
+    let keep = drawn.map_or(Keep::Bins(&bins), Keep::Drawn);
+    let moments = StarMoments::accumulate(&columns(&one), &folds, keep);
     let (c, turns) = dense(&columns(&two));
     check(&moments, &c, &turns, &data);
 }
@@ -294,6 +306,35 @@ fn long_blocks_are_no_different() {
                 assert!((sum.log_scale - blocks.log_scale).abs() < 1e-9);
             }
         });
+    }
+}
+
+/// The same of a reference with white noise alone, frame by frame: with frames of one star, and more frames
+/// than are held at once.
+#[test]
+fn white_noise_of_a_reference_is_weighed_as_its_covariance_says() {
+    let precision = [0.3, 5.0, 80.0];
+    for (single, frames) in [(false, 40), (true, 171)] {
+        with_pass(
+            single,
+            frames,
+            Folds::cut,
+            Some(precision),
+            |moments, c, turns, _| {
+                let covariance = DMatrix::from_fn(c.nrows(), c.nrows(), |i, j| {
+                    let ((a, u), (b, v)) = (turns[i], turns[j]);
+                    let shared = (0..3).map(|k| u[k] * v[k] / precision[k]).sum::<f64>();
+                    f64::from(u8::from(i == j)) + if a == b { shared } else { 0.0 }
+                });
+                let factor = covariance.cholesky().unwrap();
+                let grams = moments.clone().white();
+                let (sum, scalars) = grams.total();
+                close(&sum, &(c.transpose() * factor.solve(c)));
+                assert!((scalars - c.nrows() as f64).abs() < 0.5);
+                let half = 0.5 * factor.ln_determinant();
+                assert!((grams.log_scale + half).abs() < 1e-9 * half);
+            },
+        );
     }
 }
 

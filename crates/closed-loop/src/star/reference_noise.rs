@@ -1,0 +1,175 @@
+//! White noise of the reference, as weights.
+//!
+//! A reference with noise of its own turns all stars of a frame alike. Taken for noise of the stars it makes
+//! what turns the camera seem far more certain than it is, and weighs the rotation about the boresight, which
+//! the stars tell badly, as little against the other two as they do. With s^2 the variance of a row of weight 1,
+//! A the rotation columns of a frame and S the reference's variances,
+//!
+//! ```text
+//! V = s^2 + A S A'      s^2 c' V^-1 c = c'c - (A'c)' (A'A + P)^-1 (A'c)      P = s^2 / S
+//! ```
+//!
+//! so that a frame's rotation is a free unknown with a prior, P = 0 without a reference. P is found from what
+//! changes from one frame to the next, which no slow effect adds to: changes of rows have 2 s^2, changes of
+//! rotations 2 S beside the stars' own ([`crate::star::frame_rotation`]).
+//!
+//! Source: Aitken 1935 (generalised least squares); Woodbury 1950; Henderson 1975.
+
+use crate::gaps::longest_step;
+use crate::star::data::StarData;
+use crate::star::frame_rotation::Turns;
+
+/// Share of the stars' own variance of a rotation below which the reference's changes nothing.
+const LEAST: f64 = 0.1;
+/// The same in sigmas of what chance makes of it.
+const BEYOND_CHANCE: f64 = 4.0;
+/// An axis on which the reference has no noise, in units of the stars' information.
+const NONE: f64 = 1e6;
+
+/// P of the module's header per axis, for rows that count by their `weight`; `None` where the reference is as
+/// good as exact, or there is none.
+pub(crate) fn precision(
+    data: &StarData,
+    residual: [&[f64]; 2],
+    weight: &[f64],
+) -> Option<[f64; 3]> {
+    if data.free_attitude || data.frames_are_unrelated() {
+        return None;
+    }
+    let changes = changes(data, residual);
+    let turns = Turns::of(data, changes.each_ref().map(Vec::as_slice), weight);
+    let known: Vec<_> = turns.frames.iter().flatten().collect();
+    let n = known.len() as f64;
+    if known.is_empty() || turns.noise.is_nan() || turns.noise <= 0.0 {
+        return None;
+    }
+    // a mean of n squares of neighbouring differences, of which each has a half of the next
+    let chance = BEYOND_CHANCE * (3.0 / n).sqrt();
+    let mut out = [0.0; 3];
+    let mut matters = false;
+    for (axis, out) in out.iter_mut().enumerate() {
+        let information = known.iter().map(|t| t.variance[axis].recip()).sum::<f64>() / n;
+        let share = turns.reference[axis] / turns.noise * information;
+        matters |= share > LEAST.max(chance);
+        *out = information * f64::min(share.recip(), NONE);
+    }
+    matters.then_some(out)
+}
+
+/// What each row's residual changes by from the frame before, NaN where its star was not seen there.
+fn changes(data: &StarData, residual: [&[f64]; 2]) -> [Vec<f64>; 2] {
+    let longest = longest_step(&data.frames.t_s);
+    let mut last: Vec<Option<usize>> = vec![None; data.stars.len()];
+    let mut out = [(); 2].map(|()| vec![f64::NAN; data.t_s.len()]);
+    for row in (0..data.t_s.len()).filter(|&r| !data.outlier[r]) {
+        if let Some(before) = last[data.star[row]].replace(row)
+            && data.t_s[row] - data.t_s[before] <= longest
+        {
+            for (out, residual) in out.iter_mut().zip(residual) {
+                out[row] = residual[row] - residual[before];
+            }
+        }
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::star::data::{Inputs, Star};
+    use centroid::CentroidError;
+    use focal_plane::{
+        ARCSEC_PER_RAD, AttitudeSeries, Camera, Pixel, StarFrames, rotation_from_vector,
+    };
+    use nalgebra::{UnitQuaternion, Vector3};
+    use rand_core::SeedableRng;
+    use rand_distr::{Distribution, StandardNormal};
+    use rand_xoshiro::Xoshiro256PlusPlus;
+
+    const FRAMES: usize = 2000;
+    const STARS: [[f64; 2]; 6] = [
+        [300.0, 90.0],
+        [-250.0, 330.0],
+        [-160.0, -320.0],
+        [190.0, -190.0],
+        [10.0, 60.0],
+        [-390.0, -40.0],
+    ];
+    /// Of a centroid, arcsec.
+    const NOISE: f64 = 4.0;
+
+    /// Information of six stars on a rotation per axis, and the precision that is found where the reference
+    /// has white noise `white` per axis, arcsec, and a slow error of 30 arcsec.
+    fn found(white: [f64; 3]) -> ([f64; 3], Option<[f64; 3]>) {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(3);
+        let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
+        let camera = Camera::from_fov_deg([1024, 1024], [20.0, 20.0]).unwrap();
+        let direction = |at: [f64; 2]| camera.direction(Pixel { x: at[0], y: at[1] });
+        let mut frames = StarFrames::new();
+        let (mut t_s, mut q) = (Vec::new(), Vec::new());
+        let scale = camera.arcsec_per_px();
+        for k in 0..FRAMES {
+            let t = 0.5 * k as f64;
+            frames.begin(t);
+            for (s, at) in (0..).zip(&STARS) {
+                let [x, y] = [0, 1].map(|a| at[a] + NOISE / scale[a] * normal());
+                frames.push(s, i64::from(s), x, y);
+            }
+            let slow = 30.0 * (0.01 * t).sin();
+            let error = white.map(|w| (w * normal() + slow) / ARCSEC_PER_RAD);
+            t_s.push(t);
+            q.push(rotation_from_vector(&Vector3::from(error)) * UnitQuaternion::identity());
+        }
+        let reference = AttitudeSeries::new(t_s, q, None).unwrap();
+        let find = |id: i64| {
+            Some(Star {
+                id,
+                mag: 5.0,
+                bv: 0.6,
+                direction: direction(STARS[usize::try_from(id).unwrap()]),
+            })
+        };
+        let data = StarData::prepare(&Inputs {
+            camera: &camera,
+            frames: &frames,
+            reference: Some(&reference),
+            catalogue: Some(&find),
+            phase: &CentroidError::None,
+            effects: &[],
+        });
+        let residual = data.measured_residual();
+        let residual = residual.each_ref().map(Vec::as_slice);
+        let weight = vec![1.0; data.t_s.len()];
+        let turns = Turns::of(&data, residual, &weight);
+        let first = turns.frames[0].as_ref().unwrap();
+        let information = std::array::from_fn(|a| first.variance[a].recip());
+        (information, precision(&data, residual, &weight))
+    }
+
+    /// Six stars know X and Y to 4/sqrt(6) = 1.6 arcsec, Z ten times worse; the reference has 3 and 0.8 arcsec
+    /// about X and Y, and 40 about Z. The mean of n squares of differences, of which neighbours share a half, is
+    /// known to sqrt(3/n) = 3.9 %, and so are both parts of S: of X, where S is most of what is seen, P to 6 %; of
+    /// Y, where the stars' part is five times S, to 24 %.
+    #[test]
+    fn what_changes_from_frame_to_frame_is_the_white_part() {
+        let white = [3.0, 0.8, 40.0];
+        let (_, found) = found(white);
+        let found = found.unwrap();
+        for (axis, sigma) in [(0, 0.06), (1, 0.24), (2, 0.06)] {
+            let truth = (NOISE / white[axis]).powi(2);
+            let off = (found[axis] / truth).ln();
+            assert!(off.abs() < 5.0 * sigma, "{axis}: {} {truth}", found[axis]);
+        }
+    }
+
+    /// A slow error of 30 arcsec is not white, and a reference of a tenth of the stars' noise is as good as exact.
+    #[test]
+    fn a_slow_error_is_none_and_a_good_reference_is_exact() {
+        assert_eq!(found([0.0; 3]).1, None);
+        assert_eq!(found([0.1; 3]).1, None);
+        // about an axis without noise the rotation is held
+        let (information, found) = found([3.0, 0.0, 0.0]);
+        let found = found.unwrap();
+        assert!(found[1] > 5.0 * information[1] && found[2] > 5.0 * information[2]);
+    }
+}
