@@ -21,7 +21,8 @@ use blind_trials::{
 /// Seeds of a trial where nobody says.
 const SEEDS: u64 = 12;
 const USAGE: &str = "usage: blind-trials [--seeds N] [--jobs J] [--only NAME]... [--each] [--keep FOLDER] [--check] WORLDS PAGE\n\n  \
-    --seeds N    bundles of each world, 12 where left out; a quarter of them where windows are sent\n  \
+    --seeds N    bundles of each world, 12 where left out; a quarter of them where windows are sent, four times\n               \
+    as many of simulated nulls\n  \
     --jobs J     threads; all that there are where left out\n  \
     --only NAME  this world alone; its page is printed, none is written\n  \
     --each       prints what every single report says, too\n  \

@@ -19,7 +19,8 @@ use crate::{BlindError, Floor, Score, Trial, score};
 /// How much is done.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Plan<'a> {
-    /// Seeds of a trial; one with windows has a quarter, at least one.
+    /// Seeds of a trial; one with windows has a quarter, at least one, and a simulated null four times as
+    /// many: what happens once in a hundred has to be counted.
     pub seeds: u64,
     /// Threads.
     pub jobs: usize,
@@ -33,6 +34,8 @@ impl Plan<'_> {
     pub fn seeds_of(&self, trial: &Trial) -> u64 {
         if trial.has_images() {
             (self.seeds / 4).max(1)
+        } else if trial.world().is_none() {
+            4 * self.seeds
         } else {
             self.seeds
         }
