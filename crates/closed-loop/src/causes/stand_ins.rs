@@ -91,7 +91,10 @@ fn is_a_part(described: &Described, set: &[usize], rest: &[usize], parts: &[Part
     };
     (0..parts.len()).any(|k| {
         let instead = [columns(Some(k)), own.clone()].concat();
-        likelihood(fits, rest, &instead).is_some_and(|l| l > whole - WITHOUT_LOSS)
+        // with more columns than the part it has to gain what they cost
+        let dearer = own.len() as f64 - parts[k].1.len() as f64;
+        let price = each(described.fitted.scalars) * dearer.max(0.0);
+        likelihood(fits, rest, &instead).is_some_and(|l| l - price > whole - WITHOUT_LOSS)
     })
 }
 
