@@ -34,7 +34,7 @@ const MOST_TERMS: usize = 3;
 /// Nats that a further term must be worth.
 const WORTH: f64 = 3.0;
 
-/// Nats that the place of a part is taken for.
+/// Nats that the place of a star is taken for.
 const WITHOUT_LOSS: f64 = 1.0;
 
 /// A term and the columns of it, counted from its own first.
@@ -69,8 +69,8 @@ pub(crate) fn stand_ins(described: &Described) -> Option<(Vec<usize>, Vec<Part>)
     most
 }
 
-/// Whether the set takes the place of one part of the description without loss: then the rest of it
-/// is something else, and speaks for nothing against the set.
+/// Whether the set takes the place of a single star or slot in the description without loss: then the
+/// rest of that is something else, and speaks for nothing against the set.
 fn is_a_part(described: &Described, set: &[usize], rest: &[usize], parts: &[Part]) -> bool {
     if parts.len() < 2 {
         return false;
@@ -89,12 +89,13 @@ fn is_a_part(described: &Described, set: &[usize], rest: &[usize], parts: &[Part
     let Some(whole) = likelihood(fits, rest, &columns(None)) else {
         return false;
     };
-    (0..parts.len()).any(|k| {
+    let single = |k: &usize| {
+        let (term, part) = &parts[*k];
+        described.terms[*term].term.is_of_many() && part.len() >= own.len()
+    };
+    (0..parts.len()).filter(single).any(|k| {
         let instead = [columns(Some(k)), own.clone()].concat();
-        // with more columns than the part it has to gain what they cost
-        let dearer = own.len() as f64 - parts[k].1.len() as f64;
-        let price = each(described.fitted.scalars) * dearer.max(0.0);
-        likelihood(fits, rest, &instead).is_some_and(|l| l - price > whole - WITHOUT_LOSS)
+        likelihood(fits, rest, &instead).is_some_and(|l| l > whole - WITHOUT_LOSS)
     })
 }
 
