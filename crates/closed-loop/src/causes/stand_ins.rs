@@ -34,9 +34,6 @@ const MOST_TERMS: usize = 3;
 /// Nats that a further term must be worth.
 const WORTH: f64 = 3.0;
 
-/// Nats that the place of a star is taken for.
-const WITHOUT_LOSS: f64 = 1.0;
-
 /// A term and the columns of it, counted from its own first.
 pub(crate) type Part = (usize, Vec<usize>);
 
@@ -61,42 +58,12 @@ pub(crate) fn stand_ins(described: &Described) -> Option<(Vec<usize>, Vec<Part>)
             continue;
         };
         let worth = worth - parts.len() as f64 * looked;
-        if worth - own > by && !is_a_part(described, &set, &rest, &parts) {
+        if worth - own > by {
             by = worth - own;
             most = Some((set, parts));
         }
     }
     most
-}
-
-/// Whether the set takes the place of a single star or slot in the description without loss: then the
-/// rest of that is something else, and speaks for nothing against the set.
-fn is_a_part(described: &Described, set: &[usize], rest: &[usize], parts: &[Part]) -> bool {
-    if parts.len() < 2 {
-        return false;
-    }
-    let fits = &described.fitted.fits;
-    let own = columns_of(&described.fitted.groups, set);
-    let columns = |but: Option<usize>| -> Vec<usize> {
-        let parts = parts.iter().enumerate().filter(|(k, _)| Some(*k) != but);
-        parts
-            .flat_map(|(_, (term, part))| {
-                let first = described.terms[*term].first;
-                part.iter().map(move |c| first + c)
-            })
-            .collect()
-    };
-    let Some(whole) = likelihood(fits, rest, &columns(None)) else {
-        return false;
-    };
-    let single = |k: &usize| {
-        let (term, part) = &parts[*k];
-        described.terms[*term].term.is_of_many() && part.len() >= own.len()
-    };
-    (0..parts.len()).filter(single).any(|k| {
-        let instead = [columns(Some(k)), own.clone()].concat();
-        likelihood(fits, rest, &instead).is_some_and(|l| l > whole - WITHOUT_LOSS)
-    })
 }
 
 /// How many times white noise makes the gain of `set` beside `rest` too large, at least 1: where it
