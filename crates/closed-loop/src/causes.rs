@@ -133,6 +133,7 @@ pub(crate) fn run<'a>(
         let level = searched.evidence.as_ref().unwrap_or(&beside);
         if slow_of_stars(level, &searched).is_some() {
             start = None;
+            reinstated(&mut refused);
             continue;
         }
         let described = Described::new(level, folds, &searched.found, (quest.terms)(), quest.ways)?;
@@ -140,7 +141,12 @@ pub(crate) fn run<'a>(
             let plain = Described::new(&beside, folds, &searched.found, (quest.terms)(), &[])?;
             let axes = wander.axes().iter().filter(|a| **a).count();
             if let Some(instead) = in_place_of_wander(&described, &plain, axes) {
-                kept.extend(whole(&plain, instead));
+                // what it beats speaks against no effect
+                if reinstated(&mut refused) {
+                    start = None;
+                } else {
+                    kept.extend(whole(&plain, instead));
+                }
                 continue;
             }
         }
@@ -240,6 +246,14 @@ pub(crate) fn run<'a>(
         });
     }
     Err(CloseError::Singular)
+}
+
+/// Whether any effect had been refused for a slow error of the reference: that is none, and they may be
+/// named again.
+fn reinstated(refused: &mut Refused) -> bool {
+    let before = refused.len();
+    refused.retain(|_, why| *why != Refusal::Wander);
+    refused.len() < before
 }
 
 /// Judges every effect anew without what is only described: beside it, an effect that it stands for
