@@ -2,7 +2,8 @@
 //!
 //! Where every frame's attitude is a free unknown, its three angles are eliminated
 //! exactly (a Schur complement, [`crate::star::moments`]); where the reference has a
-//! slow error, the rotations that the stars share are weighed by it.
+//! slow error, the rotations that the stars share are weighed by it, and by its white noise
+//! where it has that alone.
 //!
 //! Source: [M23] Fig. 4 for what a residual is.
 
