@@ -10,7 +10,7 @@
 //! ```
 //!
 //! Under white noise a fit needs G; with a free attitude in every frame, R with frames
-//! for bins; beside a reference with white noise the same with N_b + P for N_b
+//! for bins; beside a reference with white noise the same with `N_b + P` for `N_b`
 //! ([`crate::star::reference_noise`]); under a slow error of the reference, `R / sigma^2` and the products of the
 //! innovations of theta ([`coloured_noise::CommonNoise`]). Sums go in the order of the data
 //! within blocks: the numbers do not depend on the threads.
