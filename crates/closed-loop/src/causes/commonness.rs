@@ -103,12 +103,25 @@ impl Slow {
             let p = d.p_value.powf(self.inflation().recip());
             p < self.chance() || p < CERTAIN
         };
-        let surer = !unattributed.depends_on.iter().any(certain) && share > SURER * known;
+        // what comes back with the phase is no wander, nor a pattern under the stars
+        let much = if self.comes_back.is_some() {
+            1.0
+        } else {
+            SURER
+        };
+        let surer = !unattributed.depends_on.iter().any(certain) && share > much * known;
         let little = share < MOSTLY * known && !surer;
+        if self.chance() >= ALPHA || unattributed.present && little {
+            return;
+        }
         // terms say more of the phase than that every star follows it by itself
         let said = |d: &Dependence| figures::certain(d) && d.variable.contains(PHASE);
-        let said = self.comes_back.is_some() && unattributed.depends_on.iter().any(said);
-        if self.chance() >= ALPHA || unattributed.present && (little || said) {
+        let list = &mut unattributed.depends_on;
+        if unattributed.present
+            && self.comes_back.is_some()
+            && let Some(at) = list.iter().position(said)
+        {
+            list[..=at].rotate_right(1);
             return;
         }
         if !unattributed.present {
