@@ -67,6 +67,8 @@ pub(crate) struct Slow {
 pub(crate) const IN_TIME: &str = "time*star";
 /// The same by its pixel phase along an axis.
 const BY_PHASE: [&str; 2] = ["pixel_phase_x*star", "pixel_phase_y*star"];
+/// A wave on the detector ([`crate::unexplained::pattern`]).
+const PATTERN: &str = "x_px*y_px";
 /// In the names of all terms of the phase.
 const PHASE: &str = "pixel_phase";
 
@@ -103,12 +105,9 @@ impl Slow {
             let p = d.p_value.powf(self.inflation().recip());
             p < self.chance() || p < CERTAIN
         };
-        // what comes back with the phase is no wander, nor a pattern under the stars
-        let much = if self.comes_back.is_some() {
-            1.0
-        } else {
-            SURER
-        };
+        // what comes back with the phase is no pattern under the stars
+        let pattern = self.comes_back.is_some() && first.is_some_and(|d| d.variable == PATTERN);
+        let much = if pattern { 1.0 } else { SURER };
         let surer = !unattributed.depends_on.iter().any(certain) && share > much * known;
         let little = share < MOSTLY * known && !surer;
         if self.chance() >= ALPHA || unattributed.present && little {
@@ -121,7 +120,9 @@ impl Slow {
             && self.comes_back.is_some()
             && let Some(at) = list.iter().position(said)
         {
-            list[..=at].rotate_right(1);
+            if pattern {
+                list[..=at].rotate_right(1);
+            }
             return;
         }
         if !unattributed.present {

@@ -60,13 +60,12 @@ impl<'a> StarEvidence<'a> {
     ) -> Self {
         let temporal = situation.model.noise.temporal_arcsec.filter(|s| *s > 0.0);
         // where windows are sent, centroids are formed anew, with another noise
-        let (weight, drawn) = match (&residuals[..], &situation.bundle.images) {
-            ([[x, y]], None) => {
-                let weight = weights::of(data);
-                let drawn = reference_noise::precision(data, [x, y], &weight);
-                (weight, drawn)
-            }
-            _ => (vec![1.0; data.t_s.len()], None),
+        let (weight, drawn) = if situation.bundle.images.is_some() {
+            (vec![1.0; data.t_s.len()], None)
+        } else {
+            let weight = weights::of(data);
+            let drawn = reference_noise::precision(data, &weight);
+            (weight, drawn)
         };
         Self {
             data,

@@ -28,15 +28,13 @@ const NONE: f64 = 1e6;
 
 /// P of the module's header per axis, for rows that count by their `weight`; `None` where the reference is as
 /// good as exact, or there is none.
-pub(crate) fn precision(
-    data: &StarData,
-    residual: [&[f64]; 2],
-    weight: &[f64],
-) -> Option<[f64; 3]> {
+pub(crate) fn precision(data: &StarData, weight: &[f64]) -> Option<[f64; 3]> {
     if data.free_attitude || data.frames_are_unrelated() {
         return None;
     }
-    let changes = changes(data, residual);
+    // what a misalignment leaves changes along the motion
+    let residual = data.bare_residual(data.frames.positions());
+    let changes = changes(data, residual.each_ref().map(Vec::as_slice));
     let turns = Turns::of(data, changes.each_ref().map(Vec::as_slice), weight);
     let known: Vec<_> = turns.frames.iter().flatten().collect();
     let n = known.len() as f64;
@@ -143,7 +141,7 @@ mod tests {
         let turns = Turns::of(&data, residual, &weight);
         let first = turns.frames[0].as_ref().unwrap();
         let information = std::array::from_fn(|a| first.variance[a].recip());
-        (information, precision(&data, residual, &weight))
+        (information, precision(&data, &weight))
     }
 
     /// Six stars know X and Y to 4/sqrt(6) = 1.6 arcsec, Z ten times worse; the reference has 3 and 0.8 arcsec
