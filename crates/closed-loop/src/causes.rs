@@ -25,7 +25,7 @@ use crate::noise_effects;
 use crate::search::empirical::Empirical;
 use crate::search::refusal::{Refusal, Refused};
 use crate::search::selection::{columns_of, costs, judged};
-use crate::search::{Found, borrowed, family, fit};
+use crate::search::{Found, borrowed, family, first_column, fit};
 use crate::star::evidence::StarEvidence;
 use crate::star::search::{Searched, attempt, declared_noise};
 use commonness::Slow;
@@ -364,10 +364,7 @@ fn doubtful(described: &Described, found: &Found, inflation: f64, may: &[bool]) 
 
 /// The effect and its change, for every fit from now on.
 fn keep(found: &mut Found, g: usize, change: Change) -> Vec<Arc<dyn Candidate>> {
-    let first: usize = found.candidates[..g]
-        .iter()
-        .map(|c| c.coefficients().len())
-        .sum();
+    let first = first_column(&found.candidates, g);
     let columns: Vec<usize> = found.fitted.groups[g]
         .columns
         .iter()

@@ -26,7 +26,7 @@ use crate::questions::hypothesis::{Questions, Told};
 use crate::search::empirical::EMPIRICAL;
 use crate::search::refusal::Refused;
 use crate::search::selection::{FAMILY_ALPHA, columns_of, each};
-use crate::search::{Found, family};
+use crate::search::{Found, family, first_column};
 use crate::star::data::StarData;
 
 /// Shares within this factor are the same.
@@ -112,10 +112,7 @@ pub(crate) fn amplitudes_of(
     set: &[usize],
     estimate: &block_regression::Estimate,
 ) -> (Vec<f64>, DMatrix<f64>) {
-    let first: usize = found.candidates[..g]
-        .iter()
-        .map(|c| c.coefficients().len())
-        .sum();
+    let first = first_column(&found.candidates, g);
     let p = found.candidates[g].coefficients().len();
     let at: Vec<Option<usize>> = (0..p)
         .map(|j| set.iter().position(|&c| c == first + j))
@@ -221,10 +218,7 @@ fn consider(
     let judged = &found.selection.judged[g];
     entry.delta_loglik = Some(judged.delta_loglik);
     entry.p_value = Some(judged.p_value);
-    let first: usize = found.candidates[..g]
-        .iter()
-        .map(|c| c.coefficients().len())
-        .sum();
+    let first = first_column(&found.candidates, g);
     let mut set = columns_of(&found.fitted.groups, &found.selection.chosen);
     let own = set.len();
     set.extend(&found.fitted.groups[g].columns);
@@ -257,10 +251,7 @@ fn refused(found: &Found, id: &str, surroundings: &Surroundings<'_>) -> Option<R
     let own = set.len();
     set.extend(&group.columns);
     let estimate = found.fitted.fits.estimate(&set)?;
-    let first: usize = found.candidates[..g]
-        .iter()
-        .map(|c| c.coefficients().len())
-        .sum();
+    let first = first_column(&found.candidates, g);
     group.columns.iter().enumerate().find_map(|(k, column)| {
         let (value, [low, high]) = (estimate.value[own + k], group.bounds[k]);
         if (low..=high).contains(&value) {

@@ -206,10 +206,7 @@ impl Found {
             columns: 0,
         };
         for &g in chosen {
-            let first: usize = self.candidates[..g]
-                .iter()
-                .map(|c| c.coefficients().len())
-                .sum();
+            let first = first_column(&self.candidates, g);
             let columns = &self.fitted.groups[g].columns;
             only.places
                 .extend(columns.iter().map(|c| only.columns + c - first));
@@ -293,6 +290,11 @@ fn chosen_from(
     let again = fitted.variance < loud;
     let selection = if again { select(&fitted) } else { selection };
     Ok((fitted, selection))
+}
+
+/// The place of the first column of candidate `g` among those of all.
+pub(crate) fn first_column(candidates: &[Box<dyn Candidate>], g: usize) -> usize {
+    candidates[..g].iter().map(|c| c.coefficients().len()).sum()
 }
 
 /// The candidates as the pipeline borrows them.

@@ -8,6 +8,7 @@
 //! frame_rotation  the rotation that the stars of a frame agree on
 //! light           where the light of each star fell, better than its reference says
 //! nuisance        what the declared model leaves unknown, as columns with priors
+//! changes         what residuals change by from frame to frame
 //! weights         how much each star counts
 //! columns         all columns of a fit, row by row
 //! reference_noise how much the rotation that they share counts
@@ -21,11 +22,14 @@
 //!
 //! Not physics: the contents of a folder.
 
+mod changes;
 pub(crate) mod columns;
 pub(crate) mod data;
 mod directions;
 pub(crate) mod evidence;
 pub(crate) mod frame_rotation;
+#[cfg(test)]
+mod harness;
 mod light;
 mod misalignment;
 mod moments;

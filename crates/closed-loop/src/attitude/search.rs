@@ -35,7 +35,9 @@ use crate::figures;
 use crate::search::empirical::EMPIRICAL;
 use crate::search::refusal::{Refusal, Refused};
 use crate::search::selection::{Judgement, Selection, columns_of, costs, price};
-use crate::search::{Fitted, Found, amplitudes, borrowed, family, fit, fit_design, polish};
+use crate::search::{
+    Fitted, Found, amplitudes, borrowed, family, first_column, fit, fit_design, polish,
+};
 
 /// The effect that a change of stars looks like.
 const STEP: &str = "step_misalignment";
@@ -466,10 +468,7 @@ impl<'a, 'd> Trial<'a, 'd> {
     fn columns(&self, chosen: &[usize]) -> DMatrix<f64> {
         let mut pick = vec![0, 1, 2];
         for &g in chosen {
-            let before: usize = self.candidates[..g]
-                .iter()
-                .map(|c| c.coefficients().len())
-                .sum();
+            let before = first_column(self.candidates, g);
             pick.extend((0..self.candidates[g].coefficients().len()).map(|j| 3 + before + j));
         }
         self.binned.select_columns(&pick)

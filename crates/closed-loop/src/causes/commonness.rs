@@ -17,7 +17,7 @@
 //!
 //! Source: an analysis of variance within and between (Fisher 1925) of lagged products.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 use rayon::prelude::*;
 use spectra::robust::median_step;
 use statrs::function::erf::erfc;
@@ -26,7 +26,7 @@ use telemetry::report::{Dependence, Unattributed};
 use crate::causes::recurrence;
 use crate::figures;
 use crate::star::data::StarData;
-use crate::star::frame_rotation::rotation_row;
+use crate::star::frame_rotation::{Turn, Turns, counts, rotation_row};
 
 /// Chance below which stars that wander are told.
 const ALPHA: f64 = 0.002;
@@ -43,6 +43,8 @@ const SHARE: f64 = 1.0 / 8.0;
 const MOST_LAGS: usize = 100;
 /// Products of which a sum is nearly Gaussian.
 const LEAST_PRODUCTS: f64 = 300.0;
+/// Of a frame of three stars.
+const LEAST_FREEDOM: f64 = 3.0;
 /// Sums of products have wider tails than a Gaussian.
 const WIDER: f64 = 1.3;
 
@@ -167,10 +169,14 @@ pub(crate) fn slow(
         reason = "a positive number of frames, limited"
     )]
     let lags = (0.5 * tau_s / step).clamp(1.0, MOST_LAGS as f64) as usize;
+    let [x, y] = residual else { return None };
     let weight = weights(data, residual);
-    let parts: Vec<Option<Parts>> = (0..data.frames.frames())
-        .into_par_iter()
-        .map(|k| Parts::of(data, residual, &weight, k))
+    let root: Vec<f64> = data.star.iter().map(|&s| weight[s].sqrt()).collect();
+    let turns = Turns::of(data, [x, y], &root).frames;
+    let parts: Vec<Option<Parts>> = turns
+        .par_iter()
+        .enumerate()
+        .map(|(k, turn)| Parts::of(data, [x, y], &root, (k, turn.as_ref()?)))
         .collect();
     let mut left = vec![[f64::NAN; 2]; data.t_s.len()];
     let mut rows_of: Vec<Vec<usize>> = vec![Vec::new(); data.stars.len()];
@@ -224,7 +230,8 @@ pub(crate) fn slow(
         .collect();
     let stars: f64 = each.iter().map(|own| own.sum).sum();
     let of_stars: f64 = each.iter().map(|own| own.directions).sum();
-    let comes_back = recurrence::comes_back(data, &left, stars / of_stars, lags as f64 * step);
+    let comes_back =
+        recurrence::comes_back(data, &rows_of, &left, stars / of_stars, lags as f64 * step);
     (of_rotation > 0.0 && of_stars >= LEAST_PRODUCTS).then(|| Slow {
         rotation: rotation / of_rotation,
         stars: stars / of_stars,
@@ -249,39 +256,23 @@ struct Parts {
 }
 
 impl Parts {
-    /// `weight`: one over the white variance of each star. `None` for a frame that has too few.
-    fn of(data: &StarData, residual: &[Vec<f64>], weight: &[f64], frame: usize) -> Option<Self> {
-        let counts = |r: &usize| {
-            !data.outlier[*r]
-                && weight[data.star[*r]] > 0.0
-                && residual.iter().all(|a| a[*r].is_finite())
-        };
-        let rows: Vec<usize> = data.frames.rows_of(frame).filter(counts).collect();
-        if rows.len() < 3 {
-            return None;
-        }
-        let columns: Vec<[Vector3<f64>; 2]> = rows
-            .iter()
-            .map(|&r| rotation_row(data, r).map(Vector3::from))
-            .collect();
-        let (mut normal, mut moment) = (Matrix3::zeros(), Vector3::zeros());
-        for (&r, columns) in rows.iter().zip(&columns) {
-            let w = weight[data.star[r]];
-            for (axis, a) in columns.iter().enumerate() {
-                normal += a * a.transpose() * w;
-                moment += a * (w * residual[axis][r]);
-            }
-        }
-        let covariance = normal.try_inverse()?;
-        let theta = covariance * moment;
-        let own = |(&r, columns): (&usize, &[Vector3<f64>; 2])| {
-            let root = weight[data.star[r]].sqrt();
-            let left = [0, 1].map(|a| root * (residual[a][r] - columns[a].dot(&theta)));
+    /// `root`: of each row, one over its white noise. `None` for a frame that has too few.
+    fn of(
+        data: &StarData,
+        residual: [&[f64]; 2],
+        root: &[f64],
+        (frame, turn): (usize, &Turn),
+    ) -> Option<Self> {
+        let left = |r: usize| {
+            let columns = rotation_row(data, r).map(Vector3::from);
+            let left = [0, 1].map(|a| root[r] * (residual[a][r] - columns[a].dot(&turn.theta)));
             (r, left)
         };
-        Some(Self {
-            turn: Vector3::from_fn(|a, _| theta[a] / covariance[(a, a)].sqrt()),
-            left: rows.iter().zip(&columns).map(own).collect(),
+        let rows = data.frames.rows_of(frame);
+        let counted = rows.filter(|&r| counts(data, residual, r) && root[r] > 0.0);
+        (turn.freedom >= LEAST_FREEDOM).then(|| Self {
+            turn: turn.theta.component_div(&turn.variance.map(f64::sqrt)),
+            left: counted.map(left).collect(),
         })
     }
 }

@@ -19,8 +19,6 @@ use crate::star::data::StarData;
 
 /// Bins of a pixel phase.
 const BINS: usize = 16;
-/// Visits that are more than this apart are two, of the time within which noise is slow.
-const APART: f64 = 1.0;
 /// Star axes from which a scatter is known.
 const LEAST: usize = 8;
 /// Sigmas of what comes back: that something slow is there is certain, and one of two names is right.
@@ -28,24 +26,20 @@ const LIKELY: f64 = 2.0;
 /// Least share of the slow part that comes back.
 const SHARE: f64 = 0.25;
 
-/// The axis along which what is `left` (per row and axis, in units of the white noise, NaN where it is not
-/// known) mostly comes back, where it does: `slow` is its slow part on times of `tau_s`.
+/// The axis along which what is `left` (per row and axis, in units of the white noise; known in `rows_of`
+/// each star) mostly comes back, where it does: `slow` is its slow part on times of `tau_s`, by which two
+/// visits lie apart.
 pub(crate) fn comes_back(
     data: &StarData,
+    rows_of: &[Vec<usize>],
     left: &[[f64; 2]],
     slow: f64,
     tau_s: f64,
 ) -> Option<usize> {
-    let mut rows_of: Vec<Vec<usize>> = vec![Vec::new(); data.stars.len()];
-    for (row, left) in left.iter().enumerate() {
-        if left.iter().all(|v| v.is_finite()) {
-            rows_of[data.star[row]].push(row);
-        }
-    }
     let each = [0, 1].map(|axis| -> Vec<f64> {
         let stars = rows_of.iter();
         stars
-            .filter_map(|rows| of_star(data, rows, axis, left, APART * tau_s))
+            .filter_map(|rows| of_star(data, rows, axis, left, tau_s))
             .collect()
     });
     let all: Vec<f64> = each.iter().flatten().copied().collect();

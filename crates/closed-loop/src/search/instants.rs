@@ -36,7 +36,7 @@ use telemetry::report::FoundEffect;
 use crate::error::CloseError;
 use crate::evidence::Evidence;
 use crate::search::selection::{Group, columns_of};
-use crate::search::{Found, fit};
+use crate::search::{Found, first_column, fit};
 
 /// Parameters that are instants.
 const INSTANT: &str = "at_s";
@@ -123,10 +123,7 @@ fn widen(
         if groups[k].columns.len() != columns.len() {
             return;
         }
-        let before: usize = found.candidates[..g]
-            .iter()
-            .map(|c| c.coefficients().len())
-            .sum();
+        let before = first_column(&found.candidates, g);
         for &column in columns {
             let name = &found.candidates[g].coefficients()[column - before].name;
             let wider = joint.sigma(at) / alone.sigma(at);

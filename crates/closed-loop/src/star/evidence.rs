@@ -20,6 +20,7 @@ use crate::bins::Bins;
 use crate::evidence::{Amplitudes, Evidence, Residuals};
 use crate::motion::{Around, source};
 use crate::situation::Situation;
+use crate::star::changes;
 use crate::star::columns::{CHUNK_FRAMES, Filled, StarColumns};
 use crate::star::data::StarData;
 use crate::star::frame_rotation::{rotation_of, rotation_row};
@@ -63,8 +64,9 @@ impl<'a> StarEvidence<'a> {
         let (weight, drawn) = if situation.bundle.images.is_some() {
             (vec![1.0; data.t_s.len()], None)
         } else {
-            let weight = weights::of(data);
-            let drawn = reference_noise::precision(data, &weight);
+            let changes = changes::of(data);
+            let weight = weights::of(data, &changes);
+            let drawn = reference_noise::precision(data, &changes, &weight);
             (weight, drawn)
         };
         Self {

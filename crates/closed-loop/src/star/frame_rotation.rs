@@ -77,7 +77,7 @@ pub(crate) struct Turn {
     pub(crate) variance: Vector3<f64>,
     /// Weighted squares that it leaves, and their degrees of freedom.
     squares: f64,
-    freedom: f64,
+    pub(crate) freedom: f64,
 }
 
 /// What the stars of all frames say.
@@ -91,7 +91,7 @@ pub(crate) struct Turns {
 }
 
 impl Turns {
-    /// Of `residual` by rows of `weight`; rows that are outliers or not finite do not count.
+    /// Of `residual` by rows of `weight`; rows that are outliers, not finite or of weight 0 do not count.
     pub(crate) fn of(data: &StarData, residual: [&[f64]; 2], weight: &[f64]) -> Self {
         let frames: Vec<Option<Turn>> = (0..data.frames.frames())
             .into_par_iter()
@@ -125,7 +125,7 @@ impl Turn {
         let rows = data.frames.rows_of(frame);
         let (mut normal, mut moment) = (Matrix3::zeros(), Vector3::zeros());
         let (mut whole, mut count) = (0.0, 0_u32);
-        for r in rows.filter(|&r| counts(data, residual, r)) {
+        for r in rows.filter(|&r| counts(data, residual, r) && weight[r] > 0.0) {
             let w = weight[r] * weight[r];
             for (axis, a) in rotation_row(data, r).map(Vector3::from).iter().enumerate() {
                 normal += a * a.transpose() * w;

@@ -35,6 +35,7 @@ use rayon::prelude::*;
 use spectra::robust::median_step;
 
 use crate::gaps::GAP_STEPS;
+use crate::star::changes;
 use crate::star::data::StarData;
 use crate::star::frame_rotation::{Turns, counts, rotation_row};
 use crate::star::weights;
@@ -74,7 +75,7 @@ impl Light {
     pub(crate) fn of(data: &StarData, residual: [&[f64]; 2]) -> Self {
         let rows = data.t_s.len();
         let mut light = Self::as_modelled(rows);
-        let weight = weights::of(data);
+        let weight = weights::of(data, &changes::of(data));
         let turns = Turns::of(data, residual, &weight);
         let known = KNOWN_PX * data.camera.arcsec_per_px()[0];
         if !data.free_attitude && turns.reference[..2].iter().all(|s| *s < known * known) {
@@ -282,8 +283,7 @@ impl Fit {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::star::data::{Inputs, Star};
-    use centroid::CentroidError;
+    use crate::star::harness::seen;
     use focal_plane::{AttitudeSeries, Camera, StarFrames};
     use rand_core::SeedableRng;
     use rand_distr::{Distribution, StandardNormal};
@@ -338,22 +338,7 @@ mod tests {
             q.push(turn(error) * true_q);
         }
         let reference = AttitudeSeries::new(t_s, q, None).unwrap();
-        let find = |id: i64| {
-            Some(Star {
-                id,
-                mag: 5.0,
-                bv: 0.6,
-                direction: direction(STARS[usize::try_from(id).unwrap()]),
-            })
-        };
-        let data = StarData::prepare(&Inputs {
-            camera: &camera,
-            frames: &frames,
-            reference: (!free).then_some(&reference),
-            catalogue: Some(&find),
-            phase: &CentroidError::None,
-            effects: &[],
-        });
+        let data = seen(&camera, &frames, (!free).then_some(&reference), &STARS);
         let residual = data.measured_residual();
         let light = Light::of(&data, residual.each_ref().map(Vec::as_slice));
         let truth = std::array::from_fn(|a| {

@@ -15,7 +15,6 @@
 //!
 //! Source: Aitken 1935 (generalised least squares); Woodbury 1950; Henderson 1975.
 
-use crate::gaps::longest_step;
 use crate::star::data::StarData;
 use crate::star::frame_rotation::Turns;
 
@@ -26,15 +25,16 @@ const BEYOND_CHANCE: f64 = 4.0;
 /// An axis on which the reference has no noise, in units of the stars' information.
 const NONE: f64 = 1e6;
 
-/// P of the module's header per axis, for rows that count by their `weight`; `None` where the reference is as
-/// good as exact, or there is none.
-pub(crate) fn precision(data: &StarData, weight: &[f64]) -> Option<[f64; 3]> {
+/// P of the module's header per axis, for rows that change by `changes` ([`crate::star::changes`]) and count by
+/// their `weight`; `None` where the reference is as good as exact, or there is none.
+pub(crate) fn precision(
+    data: &StarData,
+    changes: &[Vec<f64>; 2],
+    weight: &[f64],
+) -> Option<[f64; 3]> {
     if data.free_attitude || data.frames_are_unrelated() {
         return None;
     }
-    // what a misalignment leaves changes along the motion
-    let residual = data.bare_residual(data.frames.positions());
-    let changes = changes(data, residual.each_ref().map(Vec::as_slice));
     let turns = Turns::of(data, changes.each_ref().map(Vec::as_slice), weight);
     let known: Vec<_> = turns.frames.iter().flatten().collect();
     let n = known.len() as f64;
@@ -54,31 +54,12 @@ pub(crate) fn precision(data: &StarData, weight: &[f64]) -> Option<[f64; 3]> {
     matters.then_some(out)
 }
 
-/// What each row's residual changes by from the frame before, NaN where its star was not seen there.
-fn changes(data: &StarData, residual: [&[f64]; 2]) -> [Vec<f64>; 2] {
-    let longest = longest_step(&data.frames.t_s);
-    let mut last: Vec<Option<usize>> = vec![None; data.stars.len()];
-    let mut out = [(); 2].map(|()| vec![f64::NAN; data.t_s.len()]);
-    for row in (0..data.t_s.len()).filter(|&r| !data.outlier[r]) {
-        if let Some(before) = last[data.star[row]].replace(row)
-            && data.t_s[row] - data.t_s[before] <= longest
-        {
-            for (out, residual) in out.iter_mut().zip(residual) {
-                out[row] = residual[row] - residual[before];
-            }
-        }
-    }
-    out
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::star::data::{Inputs, Star};
-    use centroid::CentroidError;
-    use focal_plane::{
-        ARCSEC_PER_RAD, AttitudeSeries, Camera, Pixel, StarFrames, rotation_from_vector,
-    };
+    use crate::star::changes;
+    use crate::star::harness::seen;
+    use focal_plane::{ARCSEC_PER_RAD, AttitudeSeries, Camera, StarFrames, rotation_from_vector};
     use nalgebra::{UnitQuaternion, Vector3};
     use rand_core::SeedableRng;
     use rand_distr::{Distribution, StandardNormal};
@@ -102,7 +83,6 @@ mod tests {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(3);
         let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
         let camera = Camera::from_fov_deg([1024, 1024], [20.0, 20.0]).unwrap();
-        let direction = |at: [f64; 2]| camera.direction(Pixel { x: at[0], y: at[1] });
         let mut frames = StarFrames::new();
         let (mut t_s, mut q) = (Vec::new(), Vec::new());
         let scale = camera.arcsec_per_px();
@@ -119,29 +99,14 @@ mod tests {
             q.push(rotation_from_vector(&Vector3::from(error)) * UnitQuaternion::identity());
         }
         let reference = AttitudeSeries::new(t_s, q, None).unwrap();
-        let find = |id: i64| {
-            Some(Star {
-                id,
-                mag: 5.0,
-                bv: 0.6,
-                direction: direction(STARS[usize::try_from(id).unwrap()]),
-            })
-        };
-        let data = StarData::prepare(&Inputs {
-            camera: &camera,
-            frames: &frames,
-            reference: Some(&reference),
-            catalogue: Some(&find),
-            phase: &CentroidError::None,
-            effects: &[],
-        });
+        let data = seen(&camera, &frames, Some(&reference), &STARS);
         let residual = data.measured_residual();
         let residual = residual.each_ref().map(Vec::as_slice);
         let weight = vec![1.0; data.t_s.len()];
         let turns = Turns::of(&data, residual, &weight);
         let first = turns.frames[0].as_ref().unwrap();
         let information = std::array::from_fn(|a| first.variance[a].recip());
-        (information, precision(&data, &weight))
+        (information, precision(&data, &changes::of(&data), &weight))
     }
 
     /// Six stars know X and Y to 4/sqrt(6) = 1.6 arcsec, Z ten times worse; the reference has 3 and 0.8 arcsec

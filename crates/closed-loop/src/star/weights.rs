@@ -19,7 +19,6 @@
 
 use spectra::robust;
 
-use crate::gaps::longest_step;
 use crate::star::data::StarData;
 
 /// Changes that the common noise counts for beside a star's own.
@@ -29,23 +28,28 @@ const QUIETEST: f64 = 0.1;
 /// Median of |x| for unit variance.
 const MEDIAN_OF_NORMAL: f64 = 0.6745;
 
-/// Weight of every row; all alike where the noise cannot be told from frame to frame.
-pub(crate) fn of(data: &StarData) -> Vec<f64> {
+/// Weight of every row by its `changes` ([`crate::star::changes`]); all alike where the noise cannot be told
+/// from frame to frame.
+pub(crate) fn of(data: &StarData, changes: &[Vec<f64>; 2]) -> Vec<f64> {
     let rows = data.t_s.len();
     // pictures of other places have other errors in common
     if data.frames_are_unrelated() {
         return vec![1.0; rows];
     }
-    let changes = changes(data);
+    let mut sizes = vec![Vec::new(); data.stars.len()];
+    for (row, &star) in data.star.iter().enumerate() {
+        let each = changes.iter().map(|axis| axis[row].abs());
+        sizes[star].extend(each.filter(|c| c.is_finite()));
+    }
     let scale = |values: &mut Vec<f64>| {
         let median = robust::median(values)?;
         Some(median / (MEDIAN_OF_NORMAL * std::f64::consts::SQRT_2))
     };
-    let all = scale(&mut changes.concat());
+    let all = scale(&mut sizes.concat());
     let Some(common) = all.filter(|s| *s > 0.0) else {
         return vec![1.0; rows];
     };
-    let sigma: Vec<f64> = changes
+    let sigma: Vec<f64> = sizes
         .into_iter()
         .map(|mut own| {
             let n = own.len() as f64;
@@ -60,28 +64,10 @@ pub(crate) fn of(data: &StarData) -> Vec<f64> {
     (0..rows).map(|r| geometric / sigma[data.star[r]]).collect()
 }
 
-/// Sizes of the changes of each star's residual from one frame to the next, arcsec.
-fn changes(data: &StarData) -> Vec<Vec<f64>> {
-    // what a misalignment leaves changes along the motion
-    let residual = data.bare_residual(data.frames.positions());
-    let gap = longest_step(&data.frames.t_s);
-    let mut last: Vec<Option<usize>> = vec![None; data.stars.len()];
-    let mut out = vec![Vec::new(); data.stars.len()];
-    for row in (0..data.t_s.len()).filter(|&r| !data.outlier[r]) {
-        let star = data.star[row];
-        if let Some(before) = last[star].replace(row)
-            && data.t_s[row] - data.t_s[before] <= gap
-        {
-            let change = |axis: &Vec<f64>| (axis[row] - axis[before]).abs();
-            out[star].extend(residual.iter().map(change).filter(|c| c.is_finite()));
-        }
-    }
-    out
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::star::changes;
     use crate::star::data::Inputs;
     use centroid::CentroidError;
     use focal_plane::{Camera, StarFrames};
@@ -135,7 +121,7 @@ mod tests {
                 data.phase_error[axis][row] = 0.0;
             }
         }
-        let weight = of(&data);
+        let weight = of(&data, &changes::of(&data));
         let of_star = |s: usize| weight[data.star.iter().position(|&k| k == s).unwrap()];
         for (a, b) in [(0, 1), (1, 2)] {
             let ratio = of_star(a) / of_star(b);

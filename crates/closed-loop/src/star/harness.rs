@@ -1,0 +1,35 @@
+//! Data of a few stars, for tests.
+//!
+//! Not physics: helpers of tests.
+
+use centroid::CentroidError;
+use focal_plane::{AttitudeSeries, Camera, Pixel, StarFrames};
+
+use crate::star::data::{Inputs, Star, StarData};
+
+/// What `frames` saw of stars that an untilted `camera` has at `places`, px; the id of a star is its place
+/// among them.
+pub(crate) fn seen(
+    camera: &Camera,
+    frames: &StarFrames,
+    reference: Option<&AttitudeSeries>,
+    places: &[[f64; 2]],
+) -> StarData {
+    let find = |id: i64| {
+        let [x, y] = *places.get(usize::try_from(id).ok()?)?;
+        Some(Star {
+            id,
+            mag: 5.0,
+            bv: 0.6,
+            direction: camera.direction(Pixel { x, y }),
+        })
+    };
+    StarData::prepare(&Inputs {
+        camera,
+        frames,
+        reference,
+        catalogue: Some(&find),
+        phase: &CentroidError::None,
+        effects: &[],
+    })
+}
