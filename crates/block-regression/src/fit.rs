@@ -10,9 +10,16 @@
 //!
 //! G is the sum over the training blocks. A held-out block b is judged with the
 //! nuisance *and* the amplitudes of the others: its squared error is the
-//! quadratic form of `[-beta, 1]` in `T^T G_b T`. The variance of beta is
-//! cluster-robust over blocks, which stays right when the leftovers are coloured
-//! on times shorter than a block and whatever the true noise level is:
+//! quadratic form of `[-beta, 1]` in `T^T G_b T`. Its likelihood takes account of how well they are
+//! known,
+//!
+//! ```text
+//! ln p(b | others) = Z(all) - Z(others)      Z = -(E/v + ln det(G_nn + L) + ln det(S + S_all/N)) / 2
+//! ```
+//!
+//! with E the least error under the priors and N the number of scalars: the prior of the amplitudes is
+//! worth one of them. The variance of beta is cluster-robust over blocks, which stays right when the
+//! leftovers are coloured on times shorter than a block and whatever the true noise level is:
 //!
 //! ```text
 //! V = S^-1 (g sum_b s_b s_b^T + v (S - sum_b S_b)) S^-1,   s_b = the score of block b at beta
@@ -48,28 +55,35 @@
 //! Frames that share nothing in time have independent noise but for what the data
 //! says otherwise: there d is given, with 1 for `m_0`.
 //!
-//! Source: Liang & Zeger 1986 (cluster-robust variance); Smyth 2004 (moderated variance);
+//! Source: Geisser & Eddy 1979 (predictive likelihood); Kass & Wasserman 1995 (a prior worth one
+//! observation); Liang & Zeger 1986 (cluster-robust variance); Smyth 2004 (moderated variance);
 //! Box 1954 and Greenhouse & Geisser 1959 (F of unequal variances).
 
-use std::ops::Range;
 use std::sync::OnceLock;
 
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use crate::folds::Folds;
 use crate::gram::{BlockGrams, FoldSums, Gram};
 
+mod elimination;
 mod estimate;
 mod moderation;
+mod out_of_fold;
 #[cfg(test)]
 mod tests;
 
+use elimination::{Eliminated, less, quadratic, symmetric, transformed};
 pub use estimate::Estimate;
 use moderation::Usual;
+pub use out_of_fold::OutOfFold;
+use out_of_fold::gaussian;
 
 /// Share of a column's squared length that has to be left: near zero, it is unobservable.
 const OBSERVABLE_SHARE: f64 = 1e-7;
+/// Share of the nuisance's priors that is left where it is as good as free.
+const FREE: f64 = 1e-4;
 /// What all columns say counts for no more than this many times the blocks that there are.
 const MOST_BLOCKS: f64 = 2.0;
 
@@ -111,186 +125,6 @@ impl Layout {
     }
 }
 
-/// The nuisance eliminated on one training set.
-#[derive(Clone, Debug)]
-struct Eliminated {
-    /// W: nuisance amplitudes of each candidate column and of the residual, last.
-    nuisance: DMatrix<f64>,
-    /// Training Gram of the candidates and the residual (last), nuisance removed.
-    train: DMatrix<f64>,
-    /// What the prior adds to the diagonal of the nuisance's normal matrix.
-    prior: Vec<f64>,
-    /// ln det of the nuisance's normal matrix.
-    log_det: f64,
-    /// Training scalars.
-    scalars: f64,
-    /// Training scalars less the nuisance freedom.
-    freedom: f64,
-}
-
-impl Eliminated {
-    fn new(
-        (gram, scalars): &(DMatrix<f64>, f64),
-        layout: &Layout,
-        variance: f64,
-        pick: &[usize],
-    ) -> Option<Self> {
-        let n = layout.nuisance_precision.len();
-        let mut normal = gram.view((0, 0), (n, n)).into_owned();
-        // A column that nothing constrains (a gauge freedom, a star never seen in
-        // training) gets a precision far below what one scalar of data brings.
-        let floor = 1e-10 * normal.diagonal().max().max(f64::MIN_POSITIVE);
-        let priors = layout.nuisance_precision.iter();
-        let prior: Vec<f64> = priors.map(|p| p * variance + floor).collect();
-        for (k, prior) in prior.iter().enumerate() {
-            normal[(k, k)] += prior;
-        }
-        let cross = picked(gram, 0..n, pick);
-        let (nuisance, log_det) = if n == 0 {
-            (cross.clone(), 0.0)
-        } else {
-            let factor = Cholesky::new(normal)?;
-            (factor.solve(&cross), factor.ln_determinant())
-        };
-        let mut reduced = both(gram, pick);
-        reduced.gemm(-1.0, &cross.transpose(), &nuisance, 1.0);
-        // Columns under a tight prior cost less than one degree of freedom each;
-        // counting them whole is the cautious side.
-        let freedom = (scalars - n as f64).max(1.0);
-        Some(Self {
-            nuisance,
-            train: reduced,
-            prior,
-            log_det,
-            scalars: *scalars,
-            freedom,
-        })
-    }
-
-    /// Amplitudes of the candidate columns `set`, with prior precisions.
-    fn amplitudes(&self, set: &[usize]) -> Option<(DVector<f64>, Cholesky<f64, Dyn>)> {
-        let last = self.train.ncols() - 1;
-        let normal = DMatrix::from_fn(set.len(), set.len(), |i, j| self.train[(set[i], set[j])]);
-        let score = DVector::from_fn(set.len(), |i, _| self.train[(set[i], last)]);
-        if (0..set.len()).any(|i| normal[(i, i)].is_nan() || normal[(i, i)] <= 0.0) {
-            return None;
-        }
-        let factor = Cholesky::new(normal.clone())?;
-        // Collinear within rounding: the set cannot be told apart in this data.
-        let pivots = factor.l_dirty();
-        for i in 0..set.len() {
-            if pivots[(i, i)] * pivots[(i, i)] < 1e-9 * normal[(i, i)] {
-                return None;
-            }
-        }
-        let beta = factor.solve(&score);
-        Some((beta, factor))
-    }
-
-    /// Amplitudes of `set`, and the noise variance beside them.
-    fn trained(&self, set: &[usize]) -> Option<(DVector<f64>, f64)> {
-        let (beta, _) = self.amplitudes(set)?;
-        let last = self.train.ncols() - 1;
-        let explained: f64 = (0..set.len())
-            .map(|i| beta[i] * self.train[(set[i], last)])
-            .sum();
-        let freedom = (self.freedom - set.len() as f64).max(1.0);
-        let variance = (self.train[(last, last)] - explained) / freedom;
-        Some((beta, variance.max(f64::MIN_POSITIVE)))
-    }
-
-    /// Nuisance amplitudes of the residual less `beta` times `set`.
-    fn left(&self, set: &[usize], beta: &DVector<f64>) -> DVector<f64> {
-        less(&self.nuisance, set, beta)
-    }
-}
-
-/// The last column less `beta` times the columns `set`.
-fn less(columns: &DMatrix<f64>, set: &[usize], beta: &DVector<f64>) -> DVector<f64> {
-    let mut out = columns.column(columns.ncols() - 1).into_owned();
-    for (&c, b) in set.iter().zip(beta.iter()) {
-        out.axpy(-b, &columns.column(c), 1.0);
-    }
-    out
-}
-
-/// `T^T G T` for `T = [-W; I]` over the picked columns.
-fn transformed(gram: &DMatrix<f64>, n: usize, pick: &[usize], w: &DMatrix<f64>) -> DMatrix<f64> {
-    let cross = picked(gram, 0..n, pick);
-    // cross^T W and its transpose, and W^T G W, in one product: W^T (G W - 2 cross)
-    let mut inner = -2.0 * cross;
-    inner.gemm(1.0, &gram.view((0, 0), (n, n)), w, 1.0);
-    let mut out = both(gram, pick);
-    out.gemm(1.0, &w.transpose(), &inner, 1.0);
-    // the product above is symmetric but for its cross term
-    symmetric(out)
-}
-
-/// Mean of a matrix and its transpose.
-fn symmetric(mut m: DMatrix<f64>) -> DMatrix<f64> {
-    for j in 0..m.ncols() {
-        for i in 0..j {
-            let mean = 0.5 * (m[(i, j)] + m[(j, i)]);
-            m[(i, j)] = mean;
-            m[(j, i)] = mean;
-        }
-    }
-    m
-}
-
-/// Columns `pick` of some rows.
-fn picked(gram: &DMatrix<f64>, rows: Range<usize>, pick: &[usize]) -> DMatrix<f64> {
-    let mut out = DMatrix::zeros(rows.len(), pick.len());
-    for (&column, mut out) in pick.iter().zip(out.column_iter_mut()) {
-        out.copy_from(&gram.column(column).rows(rows.start, rows.len()));
-    }
-    out
-}
-
-/// Rows and columns `pick`: candidates in one run, then a residual.
-fn both(gram: &DMatrix<f64>, pick: &[usize]) -> DMatrix<f64> {
-    let run = pick.len() - 1;
-    let first = pick[0];
-    let mut out = DMatrix::zeros(pick.len(), pick.len());
-    for (&column, mut out) in pick.iter().zip(out.column_iter_mut()) {
-        let from = gram.column(column);
-        out.rows_mut(0, run).copy_from(&from.rows(first, run));
-        out[run] = from[pick[run]];
-    }
-    out
-}
-
-/// What a set of candidate columns does outside the folds it was fitted on.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct OutOfFold {
-    /// Squared error of each fold, or block, predicted from the other folds.
-    pub sse: Vec<f64>,
-    /// Log-likelihood of each, nats, noise variance from the other folds.
-    pub loglik: Vec<f64>,
-    /// Scalars of each.
-    pub scalars: Vec<f64>,
-}
-
-impl OutOfFold {
-    fn add(&mut self, error: f64, scalars: f64, variance: f64) {
-        let constant = (std::f64::consts::TAU * variance).ln();
-        self.sse.push(error);
-        self.loglik
-            .push(-0.5 * (scalars * constant + error / variance));
-        self.scalars.push(scalars);
-    }
-
-    /// Sum of the log-likelihoods, nats.
-    pub fn total_loglik(&self) -> f64 {
-        self.loglik.iter().sum()
-    }
-
-    /// Sum of the squared errors.
-    pub fn total_sse(&self) -> f64 {
-        self.sse.iter().sum()
-    }
-}
-
 /// All fits that a choice among candidates needs, on one set of Grams.
 ///
 /// A `set` holds numbers of candidate columns, each once, from 0 on.
@@ -301,6 +135,10 @@ pub struct Fits {
     /// Gram of each fold in the columns of its fit, and its scalars.
     held: Vec<(DMatrix<f64>, f64)>,
     all: Eliminated,
+    /// All data with the residual of each fold, where each has its own.
+    whole: Vec<Eliminated>,
+    /// All data where the nuisance is as good as free.
+    free: Option<Eliminated>,
     grams: BlockGrams,
     fold_of_block: Vec<usize>,
     /// `G W - 2 G_nc` of each block with W of all data: what makes T^T G T of any few columns.
@@ -354,6 +192,15 @@ impl Fits {
         let (by_fold, held) = by_fold.into_iter().unzip();
         let pick = layout.picked(None);
         let all = Eliminated::new(&sums.all, layout, variance, &pick)?;
+        let own_residuals = if layout.residuals == 1 {
+            0
+        } else {
+            folds.count
+        };
+        let whole = (0..own_residuals)
+            .map(|f| Eliminated::new(&sums.all, layout, variance, &layout.picked(Some(f))))
+            .collect::<Option<Vec<_>>>()?;
+        let free = Eliminated::new(&sums.all, layout, FREE * variance, &pick)?;
         let inner = grams
             .gram
             .par_iter()
@@ -364,6 +211,8 @@ impl Fits {
             folds: by_fold,
             held,
             all,
+            whole,
+            free: Some(free),
             grams: grams.clone(),
             fold_of_block: folds.fold_of_block.clone(),
             inner,
@@ -407,6 +256,8 @@ impl Fits {
             folds: Vec::new(),
             held: Vec::new(),
             all,
+            whole: Vec::new(),
+            free: None,
             grams: grams.clone(),
             fold_of_block: Vec::new(),
             inner: Vec::new(),
@@ -426,13 +277,31 @@ impl Fits {
         ))
     }
 
-    /// Out-of-fold error of the candidate columns `set`, fold by fold; `None` if they cannot
-    /// be told apart in some fold.
+    /// What the candidate columns `set` predict, fold by fold; `None` if they cannot be told apart.
+    ///
+    /// An error is that of the amplitudes which the other folds give
+    /// ([`amplitudes_without`](Self::amplitudes_without)). The log-likelihood takes account of how well these are known:
+    /// it is that of the fold's data given those of all others, amplitudes and nuisance integrated out,
+    /// with a prior on the amplitudes that is worth one scalar of the data. What acts in one fold alone is
+    /// not predicted by the others, but not spoiled by noise either. The declared priors of the nuisance
+    /// count as one fold more: where the nuisance could imitate an effect, only they tell it.
     pub fn out_of_fold(&self, set: &[usize]) -> Option<OutOfFold> {
+        let (ridge, unit) = (self.ridge(set)?, self.unit(set));
         let mut out = OutOfFold::default();
-        for (fold, (gram, scalars)) in self.folds.iter().zip(&self.held) {
-            let (beta, variance) = fold.trained(set)?;
-            out.add(quadratic(gram, set, &beta), *scalars, variance);
+        for (f, fold) in self.folds.iter().enumerate() {
+            let with = self.whole.get(f).unwrap_or(&self.all);
+            let (with, without) = (with.with_prior(set, &unit)?, fold.with_prior(set, &unit)?);
+            let (gram, scalars) = &self.held[f];
+            let loglik = with.beyond(&without, *scalars, without.variance(fold, set));
+            let beta = fold.shrunk(set, &ridge)?;
+            out.add(quadratic(gram, set, &beta), *scalars, loglik);
+        }
+        if let Some(free) = &self.free {
+            let (with, without) = (
+                self.all.with_prior(set, &unit)?,
+                free.with_prior(set, &unit)?,
+            );
+            out.prior = with.beyond(&without, 0.0, with.variance(&self.all, set));
         }
         Some(out)
     }
@@ -440,10 +309,12 @@ impl Fits {
     /// As [`out_of_fold`](Self::out_of_fold), block by block.
     pub fn out_of_fold_by_block(&self, set: &[usize]) -> Option<OutOfFold> {
         let n = self.layout.nuisance_precision.len();
+        let (ridge, unit) = (self.ridge(set)?, self.unit(set));
         let trained: Vec<(DVector<f64>, f64)> = (0..self.folds.len())
             .map(|f| {
                 let fold = &self.folds[f];
-                let (beta, variance) = fold.trained(set)?;
+                let beta = fold.shrunk(set, &ridge)?;
+                let variance = fold.with_prior(set, &unit)?.variance(fold, set);
                 let residual = self.layout.residual(Some(f));
                 let mut z = DVector::zeros(n + self.layout.candidates + self.layout.residuals);
                 z[residual] = 1.0;
@@ -458,7 +329,8 @@ impl Fits {
         for (b, &f) in self.fold_of_block.iter().enumerate() {
             let (z, variance) = &trained[f];
             let error = self.grams.gram[b].quadratic(z).max(0.0);
-            out.add(error, self.grams.scalars[b], *variance);
+            let scalars = self.grams.scalars[b];
+            out.add(error, scalars, gaussian(scalars, error, *variance));
         }
         Some(out)
     }
@@ -472,9 +344,35 @@ impl Fits {
         Some(-0.5 * (sse + self.all.log_det + constant))
     }
 
-    /// Amplitudes of `set` in the training data of `fold`: all others.
+    /// Amplitudes of `set` in the training data of `fold`, all others, under a prior as wide as all data
+    /// make each amplitude or leave it uncertain: what acts in one fold alone is noise in the others, many
+    /// times as large.
     pub fn amplitudes_without(&self, fold: usize, set: &[usize]) -> Option<DVector<f64>> {
-        self.folds[fold].amplitudes(set).map(|(beta, _)| beta)
+        self.folds[fold].shrunk(set, &self.ridge(set)?)
+    }
+
+    /// Precision of a prior on each amplitude, in the unit of the Gram: 1 sigma is its size, or its error
+    /// where that is larger.
+    fn ridge(&self, set: &[usize]) -> Option<Vec<f64>> {
+        let (value, factor) = self.all.amplitudes(set)?;
+        let variance = self.variance(set)?;
+        let own = factor.inverse();
+        let square = |(i, v): (usize, &f64)| (v * v).max(variance * own[(i, i)]);
+        Some(
+            value
+                .iter()
+                .enumerate()
+                .map(|v| variance / square(v))
+                .collect(),
+        )
+    }
+
+    /// Precision that is worth one scalar of the data, in the unit of the Gram.
+    fn unit(&self, set: &[usize]) -> DMatrix<f64> {
+        let scalars = self.all.scalars.max(1.0);
+        DMatrix::from_fn(set.len(), set.len(), |i, j| {
+            self.all.train[(set[i], set[j])] / scalars
+        })
     }
 
     /// Nuisance amplitudes that go with `beta` on `set`, in the training data of `fold`
@@ -621,17 +519,4 @@ impl Fits {
             .sum();
         Some(self.all.train[(last, last)] - explained)
     }
-}
-
-/// Squared error of a block: `[-beta, 1] G [-beta, 1]^T`.
-fn quadratic(gram: &DMatrix<f64>, set: &[usize], beta: &DVector<f64>) -> f64 {
-    let last = gram.ncols() - 1;
-    let mut error = gram[(last, last)];
-    for (i, &a) in set.iter().enumerate() {
-        error -= 2.0 * beta[i] * gram[(a, last)];
-        for (j, &b) in set.iter().enumerate() {
-            error += beta[i] * beta[j] * gram[(a, b)];
-        }
-    }
-    error.max(0.0)
 }

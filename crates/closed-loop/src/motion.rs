@@ -14,6 +14,8 @@
 //! against the step `q_{k+1} - q_k`: for white noise of variance s^2 they have
 //! variances (1 + 34/36) s^2 and 2 s^2, so nearly alike; for a resolved motion the
 //! error is of fourth order in the step. Samples on both sides of a hole predict nothing.
+//! A turn about the boresight counts by what it moves in the data, `arm` times itself:
+//! stars of a narrow field tell their roll badly, and hardly move with it.
 //!
 //! Source: Lagrange interpolation; the errors-in-variables trap of regression.
 
@@ -21,7 +23,7 @@ mod around;
 
 pub(crate) use around::Around;
 
-use focal_plane::{AttitudeSeries, AttitudeSource, rotation_vector};
+use focal_plane::{AttitudeSeries, AttitudeSource, Camera, rotation_vector};
 use nalgebra::{UnitQuaternion, Vector3};
 
 use crate::gaps::longest_step;
@@ -30,7 +32,7 @@ use crate::gaps::longest_step;
 const RESOLVED: f64 = 0.3;
 
 /// Whether a series of attitudes tells how the tracker moved between them.
-fn resolved(t_s: &[f64], q: &[UnitQuaternion<f64>]) -> bool {
+fn resolved(t_s: &[f64], q: &[UnitQuaternion<f64>], arm: f64) -> bool {
     let longest = longest_step(t_s);
     let (mut error, mut step, mut count) = (0.0, 0.0, 0_u32);
     for (t, w) in t_s.windows(5).zip(q.windows(5)) {
@@ -39,8 +41,9 @@ fn resolved(t_s: &[f64], q: &[UnitQuaternion<f64>]) -> bool {
         }
         let [a, b, d, e]: [Vector3<f64>; 4] = [0, 1, 3, 4].map(|k| rotation_vector(&w[k], &w[2]));
         let predicted = (4.0 * (b + d) - a - e) / 6.0;
-        error += predicted.norm_squared();
-        step += d.norm_squared();
+        let moves = Vector3::new(1.0, 1.0, arm);
+        error += predicted.component_mul(&moves).norm_squared();
+        step += d.component_mul(&moves).norm_squared();
         count += 1;
     }
     count > 0 && error <= RESOLVED * RESOLVED * step
@@ -48,10 +51,15 @@ fn resolved(t_s: &[f64], q: &[UnitQuaternion<f64>]) -> bool {
 
 /// A series as a motion around each frame, as far as its samples resolve one; rates that were
 /// measured do not come from differences.
-pub(crate) fn around(series: &AttitudeSeries, t_s: &[f64]) -> Around {
+pub(crate) fn around(series: &AttitudeSeries, t_s: &[f64], arm: f64) -> Around {
     let known = series.given_rates_rad_s().is_some();
-    let resolved = known || resolved(series.t_s(), series.quaternions());
+    let resolved = known || resolved(series.t_s(), series.quaternions(), arm);
     Around::new(series, t_s, resolved)
+}
+
+/// What a star half-way up the field's edge moves by as it rolls.
+pub(crate) fn roll_arm(camera: &Camera) -> f64 {
+    camera.half_size_px()[0] / camera.focal_length_px()[0]
 }
 
 /// The motion as effects see it.
@@ -85,8 +93,24 @@ mod tests {
 
     #[test]
     fn a_smooth_path_is_resolved_and_noise_is_not() {
-        assert!(resolved(&time(), &series(1e-6)));
-        assert!(!resolved(&time(), &series(1e-3)));
+        assert!(resolved(&time(), &series(1e-6), 1.0));
+        assert!(!resolved(&time(), &series(1e-3), 1.0));
+    }
+
+    /// Roll with the noise of twenty steps, in a field of a few degrees: a twentieth of a step is what it
+    /// moves stars by.
+    #[test]
+    fn roll_counts_by_what_it_moves() {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(5);
+        let rolled: Vec<_> = series(1e-7)
+            .into_iter()
+            .map(|q| {
+                let noise: f64 = StandardNormal.sample(&mut rng);
+                rotation_from_vector(&Vector3::new(0.0, 0.0, 2e-4 * noise)) * q
+            })
+            .collect();
+        assert!(!resolved(&time(), &rolled, 1.0));
+        assert!(resolved(&time(), &rolled, 0.005));
     }
 
     /// A path of 3e-5 rad a step, and holes across which it turns by up to 1e-2.
@@ -99,8 +123,8 @@ mod tests {
             rows.map(|k| (time()[k], q[k])).unzip()
         };
         let (t_s, q): (Vec<f64>, Vec<_>) = of(1e-6);
-        assert!(resolved(&t_s, &q));
+        assert!(resolved(&t_s, &q, 1.0));
         let (t_s, q): (Vec<f64>, Vec<_>) = of(1e-3);
-        assert!(!resolved(&t_s, &q));
+        assert!(!resolved(&t_s, &q, 1.0));
     }
 }

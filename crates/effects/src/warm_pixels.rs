@@ -20,7 +20,7 @@ use crate::hot_pixel::{HALF_WIDTH_PX, middle_of, pixel_of};
 
 /// Pixels that are proposed.
 const MOST_PIXELS: usize = 48;
-/// Rows under which a pixel is worth looking at.
+/// Rows within half-width of a pixel with which it is worth looking at.
 const LEAST_ROWS: u32 = 10;
 /// Pixels within whose half-width a star may be: its own and those around.
 const NEAR: [[i64; 2]; 9] = [
@@ -81,8 +81,12 @@ impl WarmPixels {
         for i in (0..rows.len()).filter(|&i| weight[i] > 0.0) {
             *visits.entry(pixel_of(camera, rows.landed(i))).or_default() += 1;
         }
-        let mut pixels: Vec<([i64; 2], u32)> = visits.into_iter().collect();
-        pixels.retain(|(_, rows)| *rows >= LEAST_ROWS);
+        let near = |[x, y]: [i64; 2]| -> u32 {
+            let of = |[i, j]: &[i64; 2]| visits.get(&[x + i, y + j]).copied();
+            NEAR.iter().filter_map(of).sum()
+        };
+        let mut pixels: Vec<([i64; 2], u32)> = visits.iter().map(|(p, n)| (*p, *n)).collect();
+        pixels.retain(|(pixel, _)| near(*pixel) >= LEAST_ROWS);
         pixels.sort_unstable();
         let index: HashMap<[i64; 2], usize> =
             pixels.iter().enumerate().map(|(k, p)| (p.0, k)).collect();

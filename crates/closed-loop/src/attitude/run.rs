@@ -68,7 +68,7 @@ pub(crate) fn run(
         data.subtract(effect.as_ref());
     }
     let folds = Folds::cut(data.t_s.len());
-    let motion = &motion::around(reference, &data.t_s);
+    let motion = &motion::around(reference, &data.t_s, 1.0);
     if !motion.resolved() {
         data.rate = std::array::from_fn(|_| vec![0.0; data.t_s.len()]);
     }

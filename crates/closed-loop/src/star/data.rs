@@ -671,9 +671,10 @@ fn set_aside_lost(inputs: &Inputs<'_>, attitude: &mut [Option<UnitQuaternion<f64
         let q = attitude.iter().copied().flatten().collect();
         AttitudeSeries::new(t_s.clone(), q, None).ok()
     };
+    let arm = motion::roll_arm(inputs.camera);
     let around = match inputs.reference {
-        Some(reference) => Some(motion::around(reference, &t_s)),
-        None => own().map(|own| motion::around(&own, &t_s)),
+        Some(reference) => Some(motion::around(reference, &t_s, arm)),
+        None => own().map(|own| motion::around(&own, &t_s, arm)),
     };
     if let Some(around) = around {
         for (i, &k) in solved.iter().enumerate() {

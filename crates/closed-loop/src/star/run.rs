@@ -154,7 +154,9 @@ fn explain(
         None => data.own_motion(),
     };
     let known = situation.reference.as_ref().or(own.as_ref());
-    let around = known.map(|series| motion::around(series, &data.frames.t_s).turned(&data.turn()));
+    let arm = motion::roll_arm(&data.camera);
+    let around =
+        known.map(|series| motion::around(series, &data.frames.t_s, arm).turned(&data.turn()));
     let motion = around.as_ref();
     data.follow(source(motion));
     let data = &*data;
