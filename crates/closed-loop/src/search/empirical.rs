@@ -8,7 +8,7 @@
 //! ```
 //!
 //! a shift along each axis, a roll and a scale; on an attitude it drives each
-//! axis. Motion drives the field it points along (and its square both axes), a pixel
+//! axis. Motion (a, b) drives each axis by each of its own, and by its squares a^2, b^2 and ab; a pixel
 //! phase its own axis by its first six harmonics, the place within the window its own
 //! axis. Motion also drives by its direction alone, whatever its speed: backlash does. Two variables together are what neither does alone,
 //!
@@ -197,8 +197,8 @@ impl Empirical {
             // A polynomial in time is only good outside its fold if it is straight.
             Variable::Time if stars => 4,
             Variable::Time => 3,
-            Variable::Rate => 10,
-            Variable::Acceleration => 4,
+            Variable::Rate => 16,
+            Variable::Acceleration => 6,
             _ if stars => 4 * orders(&variable),
             _ => 3 * orders(&variable),
         };
@@ -269,8 +269,14 @@ impl Empirical {
             leading.map(|l| (0..*l).collect()).collect()
         };
         if matches!(self.variable, Variable::Rate) && self.by.is_none() {
-            // along the motion, bent; its square; its direction alone
-            parts.extend([vec![0, 6], vec![4, 5], vec![8], vec![8, 9]]);
+            // along the motion, bent; its square, its squares; its direction alone
+            parts.extend([
+                vec![0, 12],
+                vec![6, 7],
+                (6..10).collect(),
+                (6..12).collect(),
+            ]);
+            parts.extend([vec![14], vec![14, 15]]);
         }
         parts.push((0..n).collect());
         parts
@@ -392,15 +398,19 @@ impl Candidate for Empirical {
                     let square = a * a + b * b;
                     put(0, a, b);
                     put(1, -b, a);
-                    put(2, y * a, y * b);
-                    put(3, x * a, x * b);
-                    put(4, square, 0.0);
-                    put(5, 0.0, square);
-                    put(6, square.sqrt() * a, square.sqrt() * b);
-                    put(7, -square.sqrt() * b, square.sqrt() * a);
+                    put(2, a, -b);
+                    put(3, b, a);
+                    put(4, y * a, y * b);
+                    put(5, x * a, x * b);
+                    for (k, square) in [square, a * a - b * b, a * b].into_iter().enumerate() {
+                        put(6 + 2 * k, square, 0.0);
+                        put(7 + 2 * k, 0.0, square);
+                    }
+                    put(12, square.sqrt() * a, square.sqrt() * b);
+                    put(13, -square.sqrt() * b, square.sqrt() * a);
                     let speed = (square + AT_REST * AT_REST).sqrt();
-                    put(8, a / speed, b / speed);
-                    put(9, -b / speed, a / speed);
+                    put(14, a / speed, b / speed);
+                    put(15, -b / speed, a / speed);
                 }
                 Variable::Star(ids) => {
                     if let Some(k) = ids.iter().position(|&id| id == rows.star_id[i]) {
