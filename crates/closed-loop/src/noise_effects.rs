@@ -298,10 +298,11 @@ impl NoiseEffects {
                 delta_loglik: Some(judged.gain),
                 p_value: Some(judged.p_value),
                 observable: true,
-                // a rate adds in square; of spikes, the fewest that make a share
+                // a slope has to differ from the declared one, a rate adds in square; of spikes, the fewest
+                // that make a share
                 detectable: match id {
                     OUTLIERS => judged.fewest,
-                    MAGNITUDE => Some(SEEN * sigma),
+                    MAGNITUDE => Some(SLOPE_AS_DECLARED + SEEN * sigma),
                     RATE if value > 0.0 => Some((2.0 * SEEN * value * sigma).sqrt()),
                     _ => None,
                 },

@@ -13,8 +13,8 @@
 //! and beside it also a part g of its own for every star. An effect is not constant if g is
 //! beyond chance (all tests of one bundle are paid for) and the part that changes holds at
 //! least a tenth of the effect's own square: a third of its size. What a second effect of the
-//! catalogue does beside it changes it, too: where one would gain as much as the change, it
-//! is not the catalogue that lacks something.
+//! catalogue does beside it changes it, too: where the change does not gain more by far than
+//! one would, it is not the catalogue that lacks something.
 //!
 //! Source: Hausman 1978 (an estimate that differs between parts of the data has the wrong
 //! model behind it), as a test of an added variable.
@@ -27,6 +27,7 @@ use effects::{AttitudeRows, Candidate, Coefficient, Effect, EffectError, StarRow
 use focal_plane::{Camera, PointsMut, VectorsMut};
 
 use crate::causes::description::Described;
+use crate::causes::stand_ins::BY_FAR;
 use crate::search::empirical::Variable;
 use crate::search::selection::columns_of;
 use crate::star::columns::star_columns_of;
@@ -176,8 +177,8 @@ pub(crate) struct Change {
     pub(crate) p_value: f64,
 }
 
-/// The chosen effect that changes most certainly, if one does. No change counts that gains no more
-/// than `instead` does out of fold, what the best effect of the catalogue beside the chosen would.
+/// The chosen effect that changes most certainly, if one does. No change counts that does not gain more by
+/// far than `instead` out of fold, what the best effect of the catalogue beside the chosen would.
 pub(crate) fn changing(described: &Described, instead: f64) -> Option<Change> {
     let groups = &described.fitted.groups;
     let fits = &described.fitted.fits;
@@ -209,7 +210,7 @@ pub(crate) fn changing(described: &Described, instead: f64) -> Option<Change> {
                 && share > LEAST_SHARE
                 && fits
                     .out_of_fold(&with)
-                    .is_some_and(|o| o.total_loglik() - before > instead)
+                    .is_some_and(|o| o.total_loglik() - before > instead + BY_FAR)
                 && worst.as_ref().is_none_or(|w| p_value < w.p_value)
             {
                 worst = Some(Change {

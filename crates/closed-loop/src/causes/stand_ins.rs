@@ -28,7 +28,7 @@ use crate::causes::description::Described;
 use crate::search::selection::{FAMILY_ALPHA, columns_of, each};
 
 /// Nats by which a description must be worth more.
-const BY_FAR: f64 = 4.0;
+pub(crate) const BY_FAR: f64 = 4.0;
 /// Terms of a description.
 const MOST_TERMS: usize = 3;
 /// Nats that a further term must be worth.

@@ -368,7 +368,13 @@ impl<'a> Told<'a> {
                 .iter()
                 .zip(&large)
                 .position(|(a, b)| a.unit != "rad" && (a.value - b.value).abs() > 0.0);
-            if let Some(k) = moved {
+            // sine and cosine share one amplitude, which knows no sign
+            let opposite = (coefficient.lower < 0.0).then(|| told.realised(-typical));
+            let signed = |k: usize| match &opposite {
+                Some(Some(below)) => (below[k].value - large[k].value).abs() > 0.0,
+                _ => true,
+            };
+            if let Some(k) = moved.filter(|k| signed(*k)) {
                 told.name.clone_from(&large[k].name);
                 told.unit = large[k].unit.to_owned();
                 told.parameter = Some(k);
