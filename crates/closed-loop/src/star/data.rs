@@ -79,7 +79,7 @@ pub(crate) struct StarData {
     /// Usual flux of the star, a row, as a logarithm to base 10; NaN where unknown. That of
     /// the row shares its noise with the centroid.
     pub(crate) log_flux: Vec<f64>,
-    /// Middle of the window, a row, px; NaN where unknown.
+    /// Middle of the window, a row, px; NaN where unknown, empty without windows.
     pub(crate) window_px: [Vec<f64>; 2],
     /// Misalignment between reference and camera that the attitudes hold already, arcsec
     /// ([`crate::star::misalignment`]).
@@ -256,6 +256,7 @@ impl StarData {
         let at: HashMap<(u64, i32), usize> = (0..table.len())
             .map(|k| ((table.t_s[k].to_bits(), table.slot[k]), k))
             .collect();
+        self.window_px = [0, 1].map(|_| vec![f64::NAN; self.t_s.len()]);
         for row in 0..self.t_s.len() {
             let key = (self.t_s[row].to_bits(), self.frames.slot[row]);
             if let Some(&k) = at.get(&key) {
@@ -342,7 +343,7 @@ impl StarData {
             mag: star.iter().map(|&s| stars[s].mag).collect(),
             bv: star.iter().map(|&s| stars[s].bv).collect(),
             log_flux: vec![f64::NAN; n],
-            window_px: [vec![f64::NAN; n], vec![f64::NAN; n]],
+            window_px: [Vec::new(), Vec::new()],
             outside_reference: from.rows() - n,
             frames,
             stars,
@@ -566,7 +567,7 @@ impl StarData {
             mag: &self.mag[rows.clone()],
             bv: &self.bv[rows.clone()],
             log_flux: &self.log_flux[rows.clone()],
-            window_px: self.window_px.each_ref().map(|w| &w[rows.clone()]),
+            window_px: (self.window_px.each_ref()).map(|w| w.get(rows.clone()).unwrap_or_default()),
             slot: &self.frames.slot[rows.clone()],
             star_id: &self.frames.star_id[rows],
             attitude: motion,
