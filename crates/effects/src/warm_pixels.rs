@@ -195,13 +195,12 @@ impl Sums {
 mod tests {
     use super::*;
 
-    /// Twelve stars drift over some 240 pixels each, one of which is warm and visited no longer than others;
-    /// its pull, 0.02 of up to 1.5 px, is six sigma of noise of 0.02 px (a mean of 0.012 px over two axes of
-    /// 60 rows). In the first places it is, although the star has an offset of its own that is as large.
-    #[test]
-    fn a_warm_pixel_is_looked_at_first_however_short_its_visit() {
+    const WARM: Pixel = Pixel { x: 30.5, y: 21.5 };
+
+    /// Twelve stars that drift over some 240 pixels, by `pace` px a frame, under noise of 0.02 px, with a warm
+    /// pixel of this `strength`; and the same where it pushes.
+    fn looked(pace: f64, strength: f64) -> [WarmPixels; 2] {
         let camera = Camera::from_fov_deg([1024, 1024], [20.0, 20.0]).unwrap();
-        let warm = Pixel { x: 30.5, y: 21.5 };
         let mut state = 9_u64;
         let mut noise = || {
             let sum: f64 = (0..12)
@@ -215,17 +214,17 @@ mod tests {
             0.02 * (sum - 6.0)
         };
         let (mut x, mut y, mut left, mut star) = (vec![], vec![], [vec![], vec![]], vec![]);
-        for k in 0..2400 {
+        for k in (0..).take_while(|k| f64::from(*k) * pace < 120.0) {
             for s in 0..12_i64 {
-                let t = f64::from(k) * 0.05;
+                let t = f64::from(k) * pace;
                 let at = [
                     10.2 + t + 0.3 * (s as f64),
                     20.7 + 0.05 * t - 40.0 * (s as f64),
                 ];
-                let c = [warm.x - at[0], warm.y - at[1]];
+                let c = [WARM.x - at[0], WARM.y - at[1]];
                 let near = c.iter().all(|c| c.abs() <= 1.5);
                 for axis in 0..2 {
-                    let pull = if near { 0.02 * c[axis] } else { 0.0 };
+                    let pull = if near { strength * c[axis] } else { 0.0 };
                     left[axis].push(pull + noise());
                 }
                 x.push(at[0]);
@@ -254,13 +253,28 @@ mod tests {
             attitude: None,
         };
         let look = |left: [&[f64]; 2]| WarmPixels::look(&camera, &rows, left, &vec![1.0; n]);
-        let found = look([&left[0], &left[1]]);
+        let away = [0, 1].map(|a| left[a].iter().map(|v| -v).collect::<Vec<f64>>());
+        [look([&left[0], &left[1]]), look([&away[0], &away[1]])]
+    }
+
+    /// One pixel is warm and visited no longer than others; its pull, 0.02 of up to 1.5 px, is six sigma (a
+    /// mean of 0.012 px over two axes of 60 rows). In the first places it is, although the star has an offset of
+    /// its own that is as large.
+    #[test]
+    fn a_warm_pixel_is_looked_at_first_however_short_its_visit() {
+        let [found, pushed] = looked(0.05, 0.02);
         assert!(found.looked_at > 1000, "{}", found.looked_at);
         assert_eq!(found.middles.len(), MOST_PIXELS);
-        assert_eq!(found.middles[0], warm, "{:?}", &found.middles[..4]);
+        assert_eq!(found.middles[0], WARM, "{:?}", &found.middles[..4]);
         // a pixel that pushes is none
-        let away = left.map(|l| l.iter().map(|v| -v).collect::<Vec<f64>>());
-        let found = look([&away[0], &away[1]]);
-        assert!(!found.middles[..8].contains(&warm));
+        assert!(!pushed.middles[..8].contains(&WARM));
+    }
+
+    /// Four rows fall in each pixel, twelve within its half-width: enough for a pull of 0.06 of up to 1.5 px,
+    /// nine sigma.
+    #[test]
+    fn rows_around_a_pixel_count_not_those_in_it() {
+        let [found, _] = looked(0.25, 0.06);
+        assert_eq!(found.middles[0], WARM, "{:?}", &found.middles[..4]);
     }
 }

@@ -191,10 +191,11 @@ fn explain(
     });
 
     progress("searching for causes");
-    let pointed = Pointed::of(data, &settled.before, &measured.weight);
-    let facts = pointed.stars();
-    let rows = data.rows(0..data.t_s.len(), source(motion));
-    let warm = pointed.pixels(&rows);
+    let (facts, warm) = {
+        let pointed = Pointed::of(data, &settled.before, &measured.weight);
+        let rows = data.rows(0..data.t_s.len(), source(motion));
+        (pointed.stars(), pointed.pixels(&rows))
+    };
     let scene = scene(situation, data, &facts, &warm);
     let image = match &sides {
         Some(sides) => {
