@@ -11,7 +11,8 @@ pub struct OutOfFold {
     pub loglik: Vec<f64>,
     /// Scalars of each.
     pub scalars: Vec<f64>,
-    /// Log-likelihood of what the declared priors of the nuisance say, predicted from all data, nats.
+    /// Log-likelihood of what the declared priors of the nuisance say, predicted from all data, nats: up to a
+    /// constant of these priors.
     pub prior: f64,
 }
 
@@ -27,9 +28,14 @@ impl OutOfFold {
         self.scalars.push(scalars);
     }
 
-    /// Sum of the log-likelihoods, nats.
+    /// Log-likelihood of the data and of the declared priors, nats: what sets are held against each other by.
     pub fn total_loglik(&self) -> f64 {
-        self.loglik.iter().sum::<f64>() + self.prior
+        self.data_loglik() + self.prior
+    }
+
+    /// Log-likelihood of the data, nats.
+    pub fn data_loglik(&self) -> f64 {
+        self.loglik.iter().sum()
     }
 
     /// Sum of the squared errors.

@@ -554,7 +554,7 @@ fn finish(
         Some(known) => Some(known),
         None => {
             let fitted = fit(f.measured, f.folds, &[])?;
-            fitted.fits.out_of_fold(&[]).map(|o| o.total_loglik())
+            fitted.fits.out_of_fold(&[]).map(|o| o.data_loglik())
         }
     };
     let set = columns_of(&f.found.fitted.groups, &added);
@@ -563,7 +563,7 @@ fn finish(
         .fitted
         .fits
         .out_of_fold(&set)
-        .map(|o| o.total_loglik() + f.found.fitted.log_scale);
+        .map(|o| o.data_loglik() + f.found.fitted.log_scale);
     let outliers = f.data.outlier.iter().filter(|o| **o).count();
     let report = Report {
         format: telemetry::report::REPORT_FORMAT.to_owned(),

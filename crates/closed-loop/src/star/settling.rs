@@ -46,7 +46,7 @@ pub(crate) fn settle(
             let evidence = StarEvidence::new(data, situation, vec![data.measured_residual()], None);
             let fitted = fit(&evidence, folds, &[])?;
             let amplitudes = amplitudes(&fitted, folds, &[], 0).ok_or(CloseError::Singular)?;
-            let loglik = fitted.fits.out_of_fold(&[]).map(|o| o.total_loglik());
+            let loglik = fitted.fits.out_of_fold(&[]).map(|o| o.data_loglik());
             let variance = fitted.fits.variance(&[]).unwrap_or(0.0);
             (
                 evidence.residuals(folds, &[], &amplitudes),
