@@ -280,8 +280,8 @@ impl Fits {
     /// What the candidate columns `set` predict, fold by fold; `None` if they cannot be told apart.
     ///
     /// An error is that of the amplitudes which the other folds give
-    /// ([`amplitudes_without`](Self::amplitudes_without)). The log-likelihood takes account of how well these are known:
-    /// it is that of the fold's data given those of all others, amplitudes and nuisance integrated out,
+    /// ([`amplitudes_without`](Self::amplitudes_without)). The log-likelihood takes account of how well these
+    /// are known: it is that of the fold's data given those of all others, amplitudes and nuisance integrated out,
     /// with a prior on the amplitudes that is worth one scalar of the data. What acts in one fold alone is
     /// not predicted by the others, but not spoiled by noise either. The declared priors of the nuisance
     /// count as one fold more: where the nuisance could imitate an effect, only they tell it.
@@ -355,7 +355,7 @@ impl Fits {
     /// where that is larger.
     fn ridge(&self, set: &[usize]) -> Option<Vec<f64>> {
         let (value, factor) = self.all.amplitudes(set)?;
-        let variance = self.variance(set)?;
+        let variance = self.all.error(set, &value) / self.all.freedom_beside(set);
         let own = factor.inverse();
         let square = |(i, v): (usize, &f64)| (v * v).max(variance * own[(i, i)]);
         Some(
@@ -507,16 +507,12 @@ impl Fits {
 
     /// Noise variance of a scalar on all data with `set` in the model.
     pub fn variance(&self, set: &[usize]) -> Option<f64> {
-        Some(self.error(set)? / (self.all.freedom - set.len() as f64).max(1.0))
+        Some(self.error(set)? / self.all.freedom_beside(set))
     }
 
     /// Squared error of all data at the best amplitudes of `set`.
     pub fn error(&self, set: &[usize]) -> Option<f64> {
         let (beta, _) = self.all.amplitudes(set)?;
-        let last = self.all.train.ncols() - 1;
-        let explained: f64 = (0..set.len())
-            .map(|i| beta[i] * self.all.train[(set[i], last)])
-            .sum();
-        Some(self.all.train[(last, last)] - explained)
+        Some(self.all.error(set, &beta))
     }
 }

@@ -116,6 +116,20 @@ impl Eliminated {
         })
     }
 
+    /// Squared error at amplitudes `beta` that are best without priors.
+    pub(super) fn error(&self, set: &[usize], beta: &DVector<f64>) -> f64 {
+        let last = self.train.ncols() - 1;
+        let explained: f64 = (0..set.len())
+            .map(|i| beta[i] * self.train[(set[i], last)])
+            .sum();
+        self.train[(last, last)] - explained
+    }
+
+    /// Scalars less the freedom of the nuisance and of `set`.
+    pub(super) fn freedom_beside(&self, set: &[usize]) -> f64 {
+        (self.freedom - set.len() as f64).max(1.0)
+    }
+
     /// Nuisance amplitudes of the residual less `beta` times `set`.
     pub(super) fn left(&self, set: &[usize], beta: &DVector<f64>) -> DVector<f64> {
         less(&self.nuisance, set, beta)
@@ -139,8 +153,7 @@ impl Judged {
 
     /// Noise variance beside `set` in the data that `of` is about.
     pub(super) fn variance(&self, of: &Eliminated, set: &[usize]) -> f64 {
-        let freedom = (of.freedom - set.len() as f64).max(1.0);
-        (self.error / freedom).max(f64::MIN_POSITIVE)
+        (self.error / of.freedom_beside(set)).max(f64::MIN_POSITIVE)
     }
 }
 

@@ -80,14 +80,15 @@ impl Dense {
         )
     }
 
-    /// Amplitudes from some rows, with more on the diagonal of the candidates; the inverse of the normal
-    /// matrix, and the squared error with what the priors add.
-    fn solved(&self, rows: &[usize], ridge: [f64; 2]) -> (DVector<f64>, DMatrix<f64>, f64) {
+    /// Amplitudes from some rows under priors of this precision; the inverse of the normal matrix, and the
+    /// squared error with what the priors add.
+    fn solved(
+        &self,
+        rows: &[usize],
+        precision: &DMatrix<f64>,
+    ) -> (DVector<f64>, DMatrix<f64>, f64) {
         let (a, r) = self.of(rows);
-        let mut normal = a.transpose() * &a + &self.precision;
-        normal[(2, 2)] += ridge[0];
-        normal[(3, 3)] += ridge[1];
-        let inverse = normal.try_inverse().unwrap();
+        let inverse = (a.transpose() * &a + precision).try_inverse().unwrap();
         let score = a.transpose() * &r;
         let x = &inverse * &score;
         let error = r.norm_squared() - x.dot(&score);
@@ -120,9 +121,12 @@ fn what_is_predicted_out_of_fold_equals_a_direct_fit() {
     let fold = folds.fold_of_frame();
     let rows: Vec<usize> = (0..400).collect();
 
-    let (x, inverse, error) = dense.solved(&rows, [0.0; 2]);
+    let (x, inverse, error) = dense.solved(&rows, &dense.precision);
     let variance = error / (400.0 - 4.0);
-    let ridge = [2, 3].map(|i| variance / (x[i] * x[i]).max(variance * inverse[(i, i)]));
+    let mut wide = dense.precision.clone();
+    for i in [2, 3] {
+        wide[(i, i)] = variance / (x[i] * x[i]).max(variance * inverse[(i, i)]);
+    }
     // the candidates' information beside the nuisance, of one row of all
     let unit = inverse
         .view((2, 2), (2, 2))
@@ -130,29 +134,22 @@ fn what_is_predicted_out_of_fold_equals_a_direct_fit() {
         .try_inverse()
         .unwrap()
         / 400.0;
-    let mut whole = dense.precision.clone();
-    whole.view_mut((2, 2), (2, 2)).copy_from(&unit);
-    let priors = whole.clone();
+    let mut priors = dense.precision.clone();
+    priors.view_mut((2, 2), (2, 2)).copy_from(&unit);
 
     let (mut sse, mut loglik) = (0.0, 0.0);
     for f in 0..5 {
         let (held, train): (Vec<usize>, Vec<usize>) = rows.iter().partition(|&&k| fold[k] == f);
-        let (x, _, _) = dense.solved(&train, ridge);
+        let (x, _, _) = dense.solved(&train, &wide);
         let (a, r) = dense.of(&held);
         sse += (r - a * x).norm_squared();
-        let (a, r) = dense.of(&train);
-        let score = a.transpose() * &r;
-        let x = (a.transpose() * &a + &priors).lu().solve(&score).unwrap();
-        let variance = (r.norm_squared() - x.dot(&score)) / (train.len() as f64 - 4.0);
+        let variance = dense.solved(&train, &priors).2 / (train.len() as f64 - 4.0);
         loglik +=
             dense.density(&rows, &priors, variance) - dense.density(&train, &priors, variance);
     }
     let mut free = priors.clone();
     free.view_mut((0, 0), (2, 2)).scale_mut(FREE);
-    let (a, r) = dense.of(&rows);
-    let score = a.transpose() * &r;
-    let x = (a.transpose() * &a + &priors).lu().solve(&score).unwrap();
-    let variance = (r.norm_squared() - x.dot(&score)) / (400.0 - 4.0);
+    let variance = dense.solved(&rows, &priors).2 / (400.0 - 4.0);
     // the wider prior's own density at its middle is no part of what the declared one says
     let middle = -0.5 * (FREE * FREE).ln();
     loglik +=

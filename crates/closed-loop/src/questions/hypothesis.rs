@@ -23,8 +23,8 @@ use telemetry::report::{
 };
 
 use crate::error::CloseError;
-use crate::search::Found;
 use crate::search::selection::{FAMILY_ALPHA, columns_of};
+use crate::search::{Found, first_column};
 
 /// Sigmas that a size takes to be seen.
 const SEEN: f64 = 5.0;
@@ -205,10 +205,7 @@ impl Grounds<'_> {
         let most = (taken.sqrt() + (widening * variance * chi2).sqrt()).powi(2);
         answer.variance_share = Some(taken / e0);
         answer.variance_share_at_most = Some((most / e0).min(1.0));
-        let first: usize = found.candidates[..g]
-            .iter()
-            .map(|c| c.coefficients().len())
-            .sum();
+        let first = first_column(&found.candidates, g);
         answer.sizes = found.fitted.groups[g]
             .columns
             .iter()
