@@ -37,7 +37,7 @@ use crate::situation::Situation;
 use crate::star::data::StarData;
 use crate::star::evidence::StarEvidence;
 pub(crate) use follows::{NoiseFollows, noise_follows};
-use judge::{Judged, SLOPE_AS_DECLARED, judge};
+use judge::{Judged, judge};
 use rows::{Row, Source};
 
 /// Identities in the catalogue.
@@ -207,7 +207,8 @@ pub(crate) fn claim(
     };
     let outliers = declared_outliers(situation)?;
     let make = |belief: &dyn Fn(&Row) -> [f64; 2]| source.rows(belief);
-    let Some(verdicts) = judge(&make, folds, level.resolved, outliers) else {
+    let known = [level.resolved, situation.bundle.images.is_some()];
+    let Some(verdicts) = judge(&make, folds, known, outliers) else {
         return Ok(NoiseEffects::default());
     };
     let mut verdicts = verdicts;
@@ -218,10 +219,9 @@ pub(crate) fn claim(
             ..source
         };
         let make = |belief: &dyn Fn(&Row) -> [f64; 2]| source.rows(belief);
-        if let Some(fast) = judge(&make, folds, level.resolved, outliers) {
-            let magnitude = &fast.magnitude;
-            verdicts.magnitude.stands &= verdicts.magnitude.agrees(magnitude, SLOPE_AS_DECLARED);
-            verdicts.rate.stands &= verdicts.rate.agrees(&fast.rate, 0.0);
+        if let Some(fast) = judge(&make, folds, known, outliers) {
+            verdicts.magnitude.stands &= verdicts.magnitude.agrees(&fast.magnitude);
+            verdicts.rate.stands &= verdicts.rate.agrees(&fast.rate);
         }
     }
     let rate = &verdicts.rate;
@@ -302,7 +302,7 @@ impl NoiseEffects {
                 // that make a share
                 detectable: match id {
                     OUTLIERS => judged.fewest,
-                    MAGNITUDE => Some(SLOPE_AS_DECLARED + SEEN * sigma),
+                    MAGNITUDE => Some(judged.least + SEEN * sigma),
                     RATE if value > 0.0 => Some((2.0 * SEEN * value * sigma).sqrt()),
                     _ => None,
                 },

@@ -17,6 +17,7 @@
 
 use block_regression::Folds;
 use nalgebra::{Cholesky, DMatrix, DVector};
+use rayon::prelude::*;
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor, StudentsT};
 use telemetry::report::{Dependence, Unattributed};
 
@@ -80,7 +81,7 @@ pub(crate) fn noise_follows(
         }
     }
     let tables: Vec<Table> = [residual, &quick(data, residual)]
-        .into_iter()
+        .into_par_iter()
         .filter_map(|residual| {
             Table::new(&Source {
                 data,
@@ -94,38 +95,37 @@ pub(crate) fn noise_follows(
         return Ok(NoiseFollows::default());
     };
     let rows = data.rows(0..data.t_s.len(), None);
-    let mut found: Vec<Dependence> = Vec::new();
-    let mut tried = 0;
-    let mut told = |variable: String, judged: Option<Judged>| {
-        tried += usize::from(judged.is_some());
-        found.extend(judged.map(|[p_value, share]| Dependence {
-            variable,
-            variance_explained: share,
-            p_value,
-        }));
-    };
-    let both = |of: &dyn Fn(&Table) -> Option<Judged>| -> Option<Judged> {
-        let (all, fast) = (of(all)?, of(fast)?);
-        Some([all[0].max(fast[0]), all[1]])
-    };
-    for (variable, [low, high]) in variables {
-        let column = |row: &Row| -> Vec<f64> {
+    let each = |(variable, [low, high]): &(Variable, [f64; 2])| -> Vec<Judged> {
+        let column = |row: &Row| -> [f64; 2] {
             if let Variable::Phase(axis) = variable {
                 let at = data.landed()[*axis][row.at];
                 let (s, c) = data.camera.phase_rad(at).sin_cos();
-                return vec![s, c];
+                return [s, c];
             }
             let z = (2.0 * variable.value(&rows, row.at) - low - high) / (high - low);
             let z = if z.is_finite() { z } else { 0.0 };
-            vec![z, 1.5 * z * z - 0.5]
+            [z, 1.5 * z * z - 0.5]
         };
-        told(variable.name(), both(&|t| t.within(&column, 1)));
-        told(variable.name(), both(&|t| t.within(&column, 2)));
-        if matches!(variable, Variable::Position(_) | Variable::Colour) {
-            told(variable.name(), both(&|t| t.between(&column)));
-        }
-    }
-    told("star".to_owned(), both(&Table::odd_star));
+        let columns = [all, fast].map(|t| Columns::of(t, column));
+        let within = |k: usize| both(all.within(&columns[0], k), fast.within(&columns[1], k));
+        let constant = matches!(variable, Variable::Position(_) | Variable::Colour);
+        let between = || both(all.between(&columns[0]), fast.between(&columns[1]));
+        let judged = [within(1), within(2), constant.then(between).flatten()];
+        judged.into_iter().flatten().collect()
+    };
+    let judged: Vec<Vec<Judged>> = variables.par_iter().map(each).collect();
+    let names = variables.iter().map(|(variable, _)| variable.name());
+    let mut found: Vec<Dependence> = names
+        .zip(judged)
+        .flat_map(|(name, judged)| judged.into_iter().map(move |j| (name.clone(), j)))
+        .chain(both(all.odd_star(), fast.odd_star()).map(|j| ("star".to_owned(), j)))
+        .map(|(variable, [p_value, share])| Dependence {
+            variable,
+            variance_explained: share,
+            p_value,
+        })
+        .collect();
+    let tried = found.len();
     for d in &mut found {
         d.p_value = (d.p_value * tried as f64).min(1.0);
     }
@@ -143,6 +143,12 @@ pub(crate) fn noise_follows(
 /// A chance, and the rms share of the variance that changes.
 type Judged = [f64; 2];
 
+/// What all residuals tell, as far as what changes from frame to frame tells the same.
+fn both(all: Option<Judged>, fast: Option<Judged>) -> Option<Judged> {
+    let (all, fast) = (all?, fast?);
+    Some([all[0].max(fast[0]), all[1]])
+}
+
 /// Squares over their usual size.
 struct Table {
     rows: Vec<Row>,
@@ -151,6 +157,27 @@ struct Table {
     /// Level of each star over the declared one, its rows, and magnitude - 5.
     stars: Vec<(f64, usize, f64)>,
     blocks: usize,
+}
+
+/// A variable in the rows of a table.
+struct Columns {
+    rows: Vec<[f64; 2]>,
+    /// Over the rows of each star.
+    mean: Vec<[f64; 2]>,
+}
+
+impl Columns {
+    fn of(table: &Table, column: impl Fn(&Row) -> [f64; 2]) -> Self {
+        let rows: Vec<[f64; 2]> = table.rows.iter().map(column).collect();
+        let mut mean = vec![[0.0; 2]; table.stars.len()];
+        for (row, f) in table.rows.iter().zip(&rows) {
+            let count = table.stars[row.star].1 as f64;
+            for k in 0..2 {
+                mean[row.star][k] += f[k] / count;
+            }
+        }
+        Self { rows, mean }
+    }
 }
 
 impl Table {
@@ -210,24 +237,24 @@ impl Table {
     }
 
     /// A variable that changes while a star is seen, by the first `count` of its columns.
-    fn within(&self, column: &dyn Fn(&Row) -> Vec<f64>, count: usize) -> Option<Judged> {
-        let columns: Vec<Vec<f64>> = self.rows.iter().map(column).collect();
-        let mut mean = vec![vec![0.0; count]; self.stars.len()];
-        for (row, f) in self.rows.iter().zip(&columns) {
-            let stars = self.stars[row.star].1 as f64;
-            (0..count).for_each(|k| mean[row.star][k] += f[k] / stars);
-        }
+    fn within(&self, columns: &Columns, count: usize) -> Option<Judged> {
         let mut normal = DMatrix::zeros(count, count);
         let mut score = DVector::zeros(count);
         let mut of_block = vec![DVector::zeros(count); self.blocks];
         let mut square = 0.0;
-        for ((row, f), z) in self.rows.iter().zip(&columns).zip(&self.relative) {
-            let f = DVector::from_fn(count, |k, _| f[k] - mean[row.star][k]);
-            of_block[row.block] += &f * *z;
-            score += &f * *z;
-            normal += &f * f.transpose();
+        for ((row, f), z) in self.rows.iter().zip(&columns.rows).zip(&self.relative) {
+            let mean = columns.mean[row.star];
+            for i in 0..count {
+                let own = f[i] - mean[i];
+                of_block[row.block][i] += own * z;
+                for j in 0..=i {
+                    normal[(i, j)] += own * (f[j] - mean[j]);
+                }
+            }
             square += z * z;
         }
+        normal.fill_upper_triangle_with_lower_triangle();
+        of_block.iter().for_each(|u| score += u);
         let n = self.rows.len() as f64;
         if (0..count).any(|k| normal[(k, k)] < n * LEAST_CHANGE * LEAST_CHANGE) {
             return None;
@@ -264,14 +291,10 @@ impl Table {
     }
 
     /// A variable of stars beside a line in magnitude, held against the scatter of their levels.
-    fn between(&self, column: &dyn Fn(&Row) -> Vec<f64>) -> Option<Judged> {
-        let mut mean = vec![0.0; self.stars.len()];
-        for row in &self.rows {
-            mean[row.star] += column(row)[0] / self.stars[row.star].1 as f64;
-        }
+    fn between(&self, columns: &Columns) -> Option<Judged> {
         let stars = self.compared();
         let y: Vec<f64> = stars.iter().map(|s| s.0).collect();
-        let f: Vec<f64> = stars.iter().map(|s| mean[s.2]).collect();
+        let f: Vec<f64> = stars.iter().map(|s| columns.mean[s.2][0]).collect();
         let mag: Vec<f64> = stars.iter().map(|s| s.1).collect();
         let (p, left) = beside_line(&y, &f, &mag)?;
         Some([p, left])

@@ -6,7 +6,7 @@
 //! ```text
 //! p = 3 max( chi2 of 2 (L - L_without) / c,  F of beta^2 / var(beta) )
 //!     c: how much wider than chi2_2 the squares scatter
-//!     L_without: at no rate, no spikes, and for the slope at 0.1: nearer is as declared
+//!     L_without: at no rate, no spikes, and for the slope next to none: nearer is as declared
 //!     var: over blocks of time; for the slope also over stars, which may differ for no reason at all
 //! gain = sum over the folds of ln L - ln L_without on the fold, both fitted on the others
 //! ```
@@ -31,9 +31,11 @@ const TRIED: f64 = 3.0;
 /// Fewest stars and spread of magnitudes that show a slope.
 const MIN_STARS: usize = 4;
 const MIN_SPREAD_MAG: f64 = 0.02;
-/// A slope this near to the declared one is as declared: photon and read noise together
+/// A slope this near to the declared one is as declared: over three magnitudes the noise changes by 1.4 %.
+const SLOPE_AS_DECLARED: f64 = 0.01;
+/// The same where the centroids are of the windows that are sent: photon and read noise together
 /// follow a power of the flux only roughly, and their slope changes by this within half a magnitude.
-pub(super) const SLOPE_AS_DECLARED: f64 = 0.1;
+const SLOPE_OF_LIGHT: f64 = 0.1;
 /// Least relative spread of the squared rate.
 const MIN_SPREAD_RATE: f64 = 0.2;
 /// Largest slope, and noise of a rate in arcsec/(deg/s), that nature makes.
@@ -70,20 +72,22 @@ pub(super) struct Judged {
     pub(super) fewest: Option<f64>,
     /// Values with sigmas: slope; rate; share and size.
     pub(super) values: [[f64; 2]; 2],
+    /// What passes for nothing.
+    pub(super) least: f64,
 }
 
 impl Judged {
     /// Whether noise that changes from frame to frame tells the same: what is slow is no noise.
     /// The estimate on all of the residual is the better one if there is nothing else, so
     /// that the difference has the difference of the variances (Hausman 1978).
-    pub(super) fn agrees(&self, quick: &Self, least: f64) -> bool {
+    pub(super) fn agrees(&self, quick: &Self) -> bool {
         let ([value, sigma], [other, its]) = (self.values[0], quick.values[0]);
         if !quick.observable {
             return true;
         }
         let spread = (its * its - sigma * sigma).max(0.0).sqrt();
         (value - other).abs() <= AGREEING * spread.max(LEAST_SPREAD * its)
-            && other.abs() > least + SEEN_QUICK * its
+            && other.abs() > self.least + SEEN_QUICK * its
     }
 }
 
@@ -94,6 +98,7 @@ const UNSEEN: Judged = Judged {
     stands: false,
     fewest: None,
     values: [[0.0; 2]; 2],
+    least: 0.0,
 };
 
 /// The three effects.
@@ -110,14 +115,17 @@ struct Bench<'a> {
     model: Model,
     folds: &'a Folds,
     stars: usize,
+    /// A slope that passes for nothing.
+    least_slope: f64,
 }
 
 /// Judges. `make` gives the rows under a belief of variance and soundness; `moving`
-/// says whether rates are known; `declared` are declared outliers (share, size).
+/// says whether rates are known, `windows` whether the centroids are of windows that are sent; `declared`
+/// are declared outliers (share, size).
 pub(super) fn judge(
     make: &Make<'_>,
     folds: &Folds,
-    moving: bool,
+    [moving, windows]: [bool; 2],
     declared: Option<[f64; 2]>,
 ) -> Option<Verdicts> {
     let mut rows = make(&|row: &Row| [row.declared, 1.0]);
@@ -138,6 +146,11 @@ pub(super) fn judge(
         model,
         folds,
         stars,
+        least_slope: if windows {
+            SLOPE_OF_LIGHT
+        } else {
+            SLOPE_AS_DECLARED
+        },
     };
     let full = climb(&bench.model, &bench.rows, free)?;
     let outliers = bench.spikes(&full);
@@ -254,7 +267,7 @@ impl Bench<'_> {
         let widened = self.model.widening(&full.at, &self.rows);
         // what has to be shown is more than what passes for nothing
         let least = if k == MAGNITUDE {
-            value.clamp(-SLOPE_AS_DECLARED, SLOPE_AS_DECLARED)
+            value.clamp(-self.least_slope, self.least_slope)
         } else {
             0.0
         };
@@ -301,6 +314,7 @@ impl Bench<'_> {
             stands: credible && gain > 0.0 && p_value < FAMILY_ALPHA,
             fewest: None,
             values: [values, [0.0; 2]],
+            least: least.abs(),
         }
     }
 
@@ -368,6 +382,7 @@ impl Bench<'_> {
                 [share, sigma(SHARE) * share * (1.0 - share)],
                 [size, 0.5 * sigma(SIZE) * size],
             ],
+            least: 0.0,
         }
     }
 
@@ -408,17 +423,18 @@ mod tests {
         let judged = |value: f64, sigma: f64| Judged {
             observable: true,
             values: [[value, sigma], [0.0; 2]],
+            least: 0.1,
             ..UNSEEN
         };
         let all = judged(0.5, 0.05);
         // 0.08^2 - 0.05^2 = 0.062^2
-        assert!(all.agrees(&judged(0.4, 0.08), 0.1));
+        assert!(all.agrees(&judged(0.4, 0.08)));
         assert!(
-            !all.agrees(&judged(0.2, 0.08), 0.1),
+            !all.agrees(&judged(0.2, 0.08)),
             "they differ by 4.8 sigma"
         );
         // they agree, and there is nothing in either
-        assert!(!judged(0.2, 0.05).agrees(&judged(0.2, 0.08), 0.1));
-        assert!(all.agrees(&UNSEEN, 0.1), "nothing to hold it against");
+        assert!(!judged(0.2, 0.05).agrees(&judged(0.2, 0.08)));
+        assert!(all.agrees(&UNSEEN), "nothing to hold it against");
     }
 }

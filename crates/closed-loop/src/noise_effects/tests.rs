@@ -67,7 +67,7 @@ fn verdicts(seed: u64, frames: usize, truth: Truth) -> Verdicts {
             }
         }
     }
-    judge(&|_| rows.clone(), &folds, true, None).expect("enough rows")
+    judge(&|_| rows.clone(), &folds, [true, false], None).expect("enough rows")
 }
 
 /// Claims of slope, rate, spikes.
