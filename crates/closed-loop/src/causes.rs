@@ -57,7 +57,7 @@ const SLOW_SHARE: f64 = 0.2;
 /// What is looked for.
 pub(crate) struct Quest<'a> {
     /// Effects that may be named.
-    pub(crate) candidates: &'a dyn Fn() -> Vec<Box<dyn Candidate>>,
+    pub(crate) candidates: &'a dyn Fn() -> Vec<Arc<dyn Candidate>>,
     /// Terms that describe.
     pub(crate) terms: &'a dyn Fn() -> Vec<Empirical>,
     /// What effects may change with.
@@ -174,7 +174,7 @@ pub(crate) fn run<'a>(
                     family(searched.found.candidates[g].as_ref()),
                     Refusal::Change,
                 );
-                kept.extend(keep(&mut searched.found, g, change));
+                kept.extend(keep(&searched.found, g, change));
                 continue;
             }
             // what is named has to stand beside what is left
@@ -221,10 +221,9 @@ pub(crate) fn run<'a>(
         // how an effect changes may be among what is described
         let beside = best_beside(&found, &may);
         if let Some(change) = changing(&described, beside).filter(|_| !last) {
-            let mut found = found;
             let g = found.selection.chosen[change.chosen];
             refused.insert(family(found.candidates[g].as_ref()), Refusal::Change);
-            kept.extend(keep(&mut found, g, change));
+            kept.extend(keep(&found, g, change));
             continue;
         }
         let small = remainders(&described, &found);
@@ -363,14 +362,14 @@ fn doubtful(described: &Described, found: &Found, inflation: f64, may: &[bool]) 
 }
 
 /// The effect and its change, for every fit from now on.
-fn keep(found: &mut Found, g: usize, change: Change) -> Vec<Arc<dyn Candidate>> {
+fn keep(found: &Found, g: usize, change: Change) -> Vec<Arc<dyn Candidate>> {
     let first = first_column(&found.candidates, g);
     let columns: Vec<usize> = found.fitted.groups[g]
         .columns
         .iter()
         .map(|c| c - first)
         .collect();
-    let effect: Arc<dyn Candidate> = Arc::from(found.candidates.swap_remove(g));
+    let effect = Arc::clone(&found.candidates[g]);
     let mut values = vec![0.0; effect.coefficients().len()];
     for (&column, value) in columns.iter().zip(&change.values) {
         values[column] = *value;

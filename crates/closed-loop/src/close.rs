@@ -11,6 +11,8 @@
 //! Source: formats.md of the design notes (`close` writes) for what *before*,
 //! *after*, the folds and the figures mean.
 
+use std::sync::Arc;
+
 use effects::Candidate;
 use telemetry::report::Report;
 use telemetry::{AttitudeResiduals, Bundle, DarkMap, Model, StarResiduals};
@@ -84,9 +86,10 @@ pub fn close_asking(
 }
 
 /// Candidates of every effect of the catalogue that the scene allows.
-pub(crate) fn catalogue_candidates(scene: &effects::Scene<'_>) -> Vec<Box<dyn Candidate>> {
+pub(crate) fn catalogue_candidates(scene: &effects::Scene<'_>) -> Vec<Arc<dyn Candidate>> {
     effects::catalogue()
         .iter()
         .flat_map(|kind| kind.candidates(scene))
+        .map(Arc::from)
         .collect()
 }

@@ -21,6 +21,7 @@
 //! Not physics: the comparison.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use block_regression::{Folds, OutOfFold};
 use effects::Candidate;
@@ -160,7 +161,7 @@ impl Scored {
 pub(crate) fn compare(
     measured: &StarEvidence<'_>,
     sides: &[Side<'_>; 2],
-    [phase, others]: [&[Box<dyn Candidate>]; 2],
+    [phase, others]: [&[Arc<dyn Candidate>]; 2],
     folds: &Folds,
     data: &StarData,
 ) -> Result<ImageLevel, CloseError> {
@@ -351,7 +352,7 @@ fn with_one(fitted: &Fitted, folds: &Folds) -> impl Iterator<Item = (usize, Scor
 fn score(
     name: &str,
     evidence: &StarEvidence<'_>,
-    phase: &[Box<dyn Candidate>],
+    phase: &[Arc<dyn Candidate>],
     folds: &Folds,
     data: &StarData,
     rivals: &mut Vec<Rival>,
@@ -388,7 +389,7 @@ fn score(
 /// what a pixel that switches does.
 fn beside_others(
     evidence: &StarEvidence<'_>,
-    others: &[Box<dyn Candidate>],
+    others: &[Arc<dyn Candidate>],
     folds: &Folds,
 ) -> Result<Score, CloseError> {
     let fitted = fit(evidence, folds, &borrowed(others))?;

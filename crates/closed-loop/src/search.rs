@@ -9,6 +9,8 @@
 //! Source: variable projection (Golub & Pereyra 1973): linear amplitudes are
 //! solved for at every trial value of the non-linear ones.
 
+use std::sync::Arc;
+
 use block_regression::{BlockGrams, Design, Fits, Folds, Layout};
 use effects::{Candidate, Coefficient};
 use nalgebra::DVector;
@@ -183,7 +185,7 @@ pub(crate) fn family(candidate: &dyn Candidate) -> String {
 #[derive(Debug)]
 pub(crate) struct Found {
     /// All candidates, those chosen in their polished form.
-    pub(crate) candidates: Vec<Box<dyn Candidate>>,
+    pub(crate) candidates: Vec<Arc<dyn Candidate>>,
     /// Fits of exactly these candidates.
     pub(crate) fitted: Fitted,
     /// What was chosen among them.
@@ -244,7 +246,7 @@ impl Only<'_> {
 pub(crate) fn search(
     evidence: &dyn Evidence,
     folds: &Folds,
-    mut candidates: Vec<Box<dyn Candidate>>,
+    mut candidates: Vec<Arc<dyn Candidate>>,
     may: &[bool],
     mut start: Option<Fitted>,
 ) -> Result<Found, CloseError> {
@@ -280,7 +282,7 @@ pub(crate) fn search(
 fn chosen_from(
     fitted: Fitted,
     folds: &Folds,
-    candidates: &[Box<dyn Candidate>],
+    candidates: &[Arc<dyn Candidate>],
     may: &[bool],
 ) -> Result<(Fitted, Selection), CloseError> {
     let select = |f: &Fitted| select(&f.fits, &f.groups, may, f.scalars);
@@ -293,12 +295,12 @@ fn chosen_from(
 }
 
 /// The place of the first column of candidate `g` among those of all.
-pub(crate) fn first_column(candidates: &[Box<dyn Candidate>], g: usize) -> usize {
+pub(crate) fn first_column(candidates: &[Arc<dyn Candidate>], g: usize) -> usize {
     candidates[..g].iter().map(|c| c.coefficients().len()).sum()
 }
 
 /// The candidates as the pipeline borrows them.
-pub(crate) fn borrowed(candidates: &[Box<dyn Candidate>]) -> Vec<&dyn Candidate> {
+pub(crate) fn borrowed(candidates: &[Arc<dyn Candidate>]) -> Vec<&dyn Candidate> {
     candidates.iter().map(AsRef::as_ref).collect()
 }
 
@@ -306,7 +308,7 @@ pub(crate) fn borrowed(candidates: &[Box<dyn Candidate>]) -> Vec<&dyn Candidate>
 pub(crate) fn polish(
     evidence: &dyn Evidence,
     folds: &Folds,
-    candidates: &mut [Box<dyn Candidate>],
+    candidates: &mut [Arc<dyn Candidate>],
     fitted: &Fitted,
     chosen: &[usize],
 ) -> Result<bool, CloseError> {
@@ -326,16 +328,26 @@ pub(crate) fn polish(
             .copied()
             .collect();
         first += columns.len();
-        if columns.len() == candidates[g].coefficients().len()
+        let whole = columns.len() == candidates[g].coefficients().len();
+        if whole
             && let Some(better) = candidates[g].refined(&values)
             && evidence.distance(candidates[g].as_ref(), better.as_ref(), &values) > same
         {
-            candidates[g] = better;
+            candidates[g] = better.into();
             changed = true;
         }
-        for k in 0..candidates[g].nonlinear().len() {
+        let before = Arc::clone(&candidates[g]);
+        let scanned = before.nonlinear().len();
+        for k in 0..scanned {
             scan(evidence, folds, candidates, chosen, g, k)?;
-            changed = true;
+        }
+        if scanned > 0 {
+            let now = candidates[g].as_ref();
+            if whole && evidence.distance(before.as_ref(), now, &values) <= same {
+                candidates[g] = before;
+            } else {
+                changed = true;
+            }
         }
     }
     Ok(changed)
@@ -345,7 +357,7 @@ pub(crate) fn polish(
 fn scan(
     evidence: &dyn Evidence,
     folds: &Folds,
-    candidates: &mut [Box<dyn Candidate>],
+    candidates: &mut [Arc<dyn Candidate>],
     chosen: &[usize],
     g: usize,
     k: usize,
@@ -354,11 +366,11 @@ fn scan(
     for _ in 0..SCAN_ROUNDS {
         let now: Vec<f64> = candidates[g].nonlinear().iter().map(|n| n.value).collect();
         let half = (SCAN / 2) as f64;
-        let mut trial: Vec<Box<dyn Candidate>> = Vec::new();
+        let mut trial: Vec<Arc<dyn Candidate>> = Vec::new();
         for i in 0..SCAN {
             let mut value = now.clone();
             value[k] += step * (i as f64 - half) / half;
-            trial.extend(candidates[g].with_nonlinear(&value));
+            trial.extend(candidates[g].with_nonlinear(&value).map(Arc::from));
         }
         let variants = trial.len();
         // The others stay in the fit beside each variant.

@@ -16,6 +16,7 @@
 //! Eqs. 4-19 (equal weights); normalised here to a density.
 
 use std::f64::consts::TAU;
+use std::ops::Range;
 
 use crate::{Psd, SpectraError, gaps};
 
@@ -80,6 +81,8 @@ pub struct LombScargleScratch {
 
 /// Share of its usual 1/2 below which `CC` or `SS` counts as nothing.
 const NOTHING: f64 = 1e-10;
+/// Share below which its digits are lost among those of the other: of 1e-16, 1e-12 is left above it.
+const DIGITS: f64 = 1e-4;
 
 impl LombScargle {
     /// A plan for samples at `t_s`, in any pattern.
@@ -102,13 +105,20 @@ impl LombScargle {
         // phases are counted from the middle: the smallest arguments
         let middle = 0.5 * (t_s[0] + t_s[t_s.len() - 1]);
         let t_s: Vec<f64> = t_s.iter().map(|t| t - middle).collect();
-        let mut phasors = Phasors::new(t_s.len());
-        let bins = (0..settings.bins)
-            .map(|k| {
-                phasors.turn_to(&t_s, &settings, k);
-                phasors.bin(settings.floating_mean)
-            })
-            .collect();
+        let mut phasors = Phasors::default();
+        let mut bins = Vec::with_capacity(settings.bins);
+        for run in runs(settings.bins) {
+            let mut sums = [[0.0; 4]; RUN];
+            for t_s in t_s.chunks(SAMPLES) {
+                phasors.set(t_s, &settings, run.start);
+                for sums in &mut sums[..run.len()] {
+                    let part = phasors.sums(None, |c, s, _| [c, s, c * c, c * s]);
+                    add(sums, part);
+                }
+            }
+            let of = |(k, sums)| Bin::of(sums, &t_s, settings.at(k), settings.floating_mean);
+            bins.extend(run.zip(sums).map(of));
+        }
         Ok(Self {
             settings,
             t_s,
@@ -126,7 +136,7 @@ impl LombScargle {
     #[must_use]
     pub fn make_scratch(&self) -> LombScargleScratch {
         LombScargleScratch {
-            phasors: Phasors::new(self.t_s.len()),
+            phasors: Phasors::default(),
             series: vec![0.0; self.t_s.len()],
         }
     }
@@ -156,14 +166,23 @@ impl LombScargle {
         SpectraError::finite(x, 0)?;
         crate::Detrend::Constant.apply_into(x, &mut scratch.series);
         let count = x.len() as f64;
-        for (k, (p, bin)) in psd.iter_mut().zip(&self.bins).enumerate() {
-            scratch.phasors.turn_to(&self.t_s, &self.settings, k);
-            let [yc, ys] = scratch.phasors.projections(&scratch.series);
-            // the mean of the series is gone: yc and ys are the same with a mean of their own
-            let along = yc * bin.cos_tau + ys * bin.sin_tau;
-            let across = ys * bin.cos_tau - yc * bin.sin_tau;
-            let power = along * along * bin.inverse_cc + across * across * bin.inverse_ss;
-            *p = power * count / self.settings.fs_hz;
+        let LombScargleScratch { phasors, series } = scratch;
+        for run in runs(self.bins()) {
+            let mut sums = [[0.0; 2]; RUN];
+            for (t_s, x) in self.t_s.chunks(SAMPLES).zip(series.chunks(SAMPLES)) {
+                phasors.set(t_s, &self.settings, run.start);
+                for sums in &mut sums[..run.len()] {
+                    add(sums, phasors.sums(Some(x), |c, s, x| [x * c, x * s]));
+                }
+            }
+            let bins = self.bins[run.clone()].iter().zip(&mut psd[run]);
+            for ((bin, p), [yc, ys]) in bins.zip(sums) {
+                // the mean of the series is gone: yc and ys are the same with a mean of their own
+                let along = (yc * bin.cos_tau + ys * bin.sin_tau) / count;
+                let across = (ys * bin.cos_tau - yc * bin.sin_tau) / count;
+                let power = along * along * bin.inverse_cc + across * across * bin.inverse_ss;
+                *p = power * count / self.settings.fs_hz;
+            }
         }
         Ok(())
     }
@@ -209,118 +228,123 @@ pub fn mean_rate_hz(t_s: &[f64]) -> Result<f64, SpectraError> {
     Ok((t_s.len() - 1) as f64 / (t_s[t_s.len() - 1] - t_s[0]))
 }
 
-/// Cosine and sine of every sample at the present frequency, turned from bin to bin by one complex
-/// product: no sine is computed but every 128 bins, which keeps the rounding below 3e-14.
+/// Bins that are gone through at once.
+const RUN: usize = 128;
+/// Samples that are: their phasors stay in the nearest cache.
+const SAMPLES: usize = 512;
+/// Numbers that fill vector registers.
+const LANES: usize = 8;
+
+fn runs(bins: usize) -> impl Iterator<Item = Range<usize>> {
+    (0..bins)
+        .step_by(RUN)
+        .map(move |k| k..(k + RUN).min(bins))
+}
+
+fn add<const N: usize>(sums: &mut [f64; N], part: [f64; N]) {
+    for (sum, part) in sums.iter_mut().zip(part) {
+        *sum += part;
+    }
+}
+
+/// Cosine and sine of some samples at one frequency, turned from bin to bin by one complex product: no
+/// sine is computed but once in [`RUN`] bins, which keeps the rounding below 3e-14.
 #[derive(Clone, Debug)]
 struct Phasors {
-    cos: Vec<f64>,
-    sin: Vec<f64>,
-    step_cos: Vec<f64>,
-    step_sin: Vec<f64>,
+    now: [[f64; SAMPLES]; 2],
+    step: [[f64; SAMPLES]; 2],
+    samples: usize,
+}
+
+impl Default for Phasors {
+    fn default() -> Self {
+        Self {
+            now: [[0.0; SAMPLES]; 2],
+            step: [[0.0; SAMPLES]; 2],
+            samples: 0,
+        }
+    }
 }
 
 impl Phasors {
-    fn new(samples: usize) -> Self {
-        let zeros = vec![0.0; samples];
-        Self {
-            cos: zeros.clone(),
-            sin: zeros.clone(),
-            step_cos: zeros.clone(),
-            step_sin: zeros,
+    /// At bin `k`, of the samples at `t_s`. What comes after them counts for nothing.
+    fn set(&mut self, t_s: &[f64], settings: &LombScargleSettings, k: usize) {
+        self.samples = t_s.len();
+        let at = TAU * settings.at(k);
+        let step = TAU * settings.step_hz;
+        for (i, t) in t_s.iter().enumerate() {
+            (self.now[1][i], self.now[0][i]) = (at * t).sin_cos();
+            (self.step[1][i], self.step[0][i]) = (step * t).sin_cos();
         }
-    }
-
-    /// From bin `k - 1` to bin `k`; bins come in order from 0.
-    fn turn_to(&mut self, t_s: &[f64], settings: &LombScargleSettings, k: usize) {
-        if k.is_multiple_of(128) {
-            for (i, t) in t_s.iter().enumerate() {
-                (self.sin[i], self.cos[i]) = (TAU * settings.at(k) * t).sin_cos();
-                (self.step_sin[i], self.step_cos[i]) = (TAU * settings.step_hz * t).sin_cos();
-            }
-            return;
-        }
-        let turned = self.cos.iter_mut().zip(&mut self.sin);
-        for ((c, s), (dc, ds)) in turned.zip(self.step_cos.iter().zip(&self.step_sin)) {
-            (*c, *s) = (*c * dc - *s * ds, *s * dc + *c * ds);
-        }
-    }
-
-    /// `<x cos>` and `<x sin>`, in eight partial sums that fill a vector register.
-    fn projections(&self, x: &[f64]) -> [f64; 2] {
-        const LANES: usize = 8;
-        let (mut with_cos, mut with_sin) = ([0.0; LANES], [0.0; LANES]);
-        let whole = x.len() - x.len() % LANES;
-        for i in (0..whole).step_by(LANES) {
-            let (x, c, s) = (
-                &x[i..i + LANES],
-                &self.cos[i..i + LANES],
-                &self.sin[i..i + LANES],
-            );
-            for l in 0..LANES {
-                with_cos[l] += x[l] * c[l];
-                with_sin[l] += x[l] * s[l];
+        for i in t_s.len()..t_s.len().next_multiple_of(LANES) {
+            for part in self.now.iter_mut().chain(&mut self.step) {
+                part[i] = 0.0;
             }
         }
-        for i in whole..x.len() {
-            with_cos[0] += x[i] * self.cos[i];
-            with_sin[0] += x[i] * self.sin[i];
-        }
-        let count = x.len() as f64;
-        [
-            with_cos.iter().sum::<f64>() / count,
-            with_sin.iter().sum::<f64>() / count,
-        ]
     }
 
-    /// Sums over the samples of a few numbers made of cosine and sine, each in eight parts that fill a
-    /// vector register.
-    fn sums<const N: usize>(&self, of: impl Fn(f64, f64) -> [f64; N]) -> [f64; N] {
-        const LANES: usize = 8;
+    /// Sums over the samples of a few numbers made of cosine, sine and `x` (0 without), each in eight
+    /// parts that fill a vector register; turns to the next bin.
+    fn sums<const N: usize>(
+        &mut self,
+        x: Option<&[f64]>,
+        of: impl Fn(f64, f64, f64) -> [f64; N],
+    ) -> [f64; N] {
         let mut parts = [[0.0; LANES]; N];
-        let (cos, sin) = (self.cos.chunks_exact(LANES), self.sin.chunks_exact(LANES));
-        let rest = cos.remainder().iter().zip(sin.remainder());
-        for (c, s) in cos.zip(sin) {
+        let [cos, sin] = &mut self.now;
+        let [step_cos, step_sin] = &self.step;
+        for i in (0..self.samples).step_by(LANES) {
+            let mut own = [0.0; LANES];
+            if let Some(x) = x.and_then(|x| x.get(i..)) {
+                let own_len = x.len().min(LANES);
+                own[..own_len].copy_from_slice(&x[..own_len]);
+            }
+            let (c, s) = (&mut cos[i..i + LANES], &mut sin[i..i + LANES]);
+            let (dc, ds) = (&step_cos[i..i + LANES], &step_sin[i..i + LANES]);
             for l in 0..LANES {
-                let values = of(c[l], s[l]);
+                let values = of(c[l], s[l], own[l]);
                 for n in 0..N {
                     parts[n][l] += values[n];
                 }
             }
-        }
-        for (c, s) in rest {
-            let values = of(*c, *s);
-            for n in 0..N {
-                parts[n][0] += values[n];
+            for l in 0..LANES {
+                (c[l], s[l]) = (c[l] * dc[l] - s[l] * ds[l], s[l] * dc[l] + c[l] * ds[l]);
             }
         }
         parts.map(|part| part.iter().sum())
     }
+}
 
-    /// The averages of the present frequency.
-    fn bin(&self, floating_mean: bool) -> Bin {
-        let count = self.cos.len() as f64;
-        let means = self.sums(|c, s| [c, s, c * c, s * s, c * s]);
-        let [c, s, cc, ss, cs] = means.map(|sum| sum / count);
+impl Bin {
+    /// Of the sums of cos, sin, cos^2 and cos sin over the samples at `t_s` and the frequency `f`, Hz.
+    fn of([c, s, cc, cs]: [f64; 4], t_s: &[f64], f: f64, floating_mean: bool) -> Self {
+        let count = t_s.len() as f64;
+        let [c, s, cc, cs] = [c, s, cc, cs].map(|sum| sum / count);
         let [mean_cos, mean_sin] = if floating_mean { [c, s] } else { [0.0; 2] };
+        let ss = 1.0 - cc - mean_sin * mean_sin;
         let cc = cc - mean_cos * mean_cos;
-        let ss = ss - mean_sin * mean_sin;
         let cs = cs - mean_cos * mean_sin;
         let (sin_tau, cos_tau) = (0.5 * (2.0 * cs).atan2(cc - ss)).sin_cos();
-        // summed at this phase, where the smaller of the two keeps its digits
-        let squares = self.sums(|c, s| {
-            let (c, s) = (c - mean_cos, s - mean_sin);
-            let (along, across) = (c * cos_tau + s * sin_tau, s * cos_tau - c * sin_tau);
-            [along * along, across * across]
-        });
-        let inverse = |sum: f64| {
-            let v = sum / count;
-            if v > NOTHING { 1.0 / v } else { 0.0 }
-        };
-        Bin {
+        let cross = 2.0 * cs * cos_tau * sin_tau;
+        let (c2, s2) = (cos_tau * cos_tau, sin_tau * sin_tau);
+        let mut squares = [cc * c2 + cross + ss * s2, cc * s2 - cross + ss * c2];
+        if squares.iter().any(|v| *v < DIGITS) {
+            // summed at this phase, where the smaller of the two keeps its digits
+            squares = [0.0; 2];
+            for t in t_s {
+                let (s, c) = (TAU * f * t).sin_cos();
+                let (c, s) = (c - mean_cos, s - mean_sin);
+                let (along, across) = (c * cos_tau + s * sin_tau, s * cos_tau - c * sin_tau);
+                squares[0] += along * along / count;
+                squares[1] += across * across / count;
+            }
+        }
+        let [inverse_cc, inverse_ss] = squares.map(|v| if v > NOTHING { 1.0 / v } else { 0.0 });
+        Self {
             cos_tau,
             sin_tau,
-            inverse_cc: inverse(squares[0]),
-            inverse_ss: inverse(squares[1]),
+            inverse_cc,
+            inverse_ss,
         }
     }
 }

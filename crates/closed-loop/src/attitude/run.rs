@@ -2,6 +2,8 @@
 //!
 //! Not physics: the order of the steps.
 
+use std::sync::Arc;
+
 use block_regression::Folds;
 use coloured_noise::Coloured;
 use effects::{Candidate, Scene};
@@ -246,11 +248,11 @@ fn scene<'a>(situation: &'a Situation<'_>, data: &AttitudeData) -> Scene<'a> {
 
 /// Time and every housekeeping channel but velocities, which belong to
 /// aberration alone.
-fn leftover_terms(situation: &Situation<'_>, data: &AttitudeData) -> Vec<Box<dyn Candidate>> {
-    let mut terms: Vec<Box<dyn Candidate>> = Vec::new();
+fn leftover_terms(situation: &Situation<'_>, data: &AttitudeData) -> Vec<Arc<dyn Candidate>> {
+    let mut terms: Vec<Arc<dyn Candidate>> = Vec::new();
     let mut add = |variable: Variable, range: [f64; 2]| {
         if let Some(term) = Empirical::new(variable, range, false) {
-            terms.push(Box::new(term));
+            terms.push(Arc::new(term));
         }
     };
     add(Variable::Time, range(data.t_s.iter().copied()));

@@ -20,6 +20,8 @@
 //!
 //! Source: Wilks 1938 (likelihood ratio); Cochrane & Orcutt 1949 (the alternation).
 
+use std::sync::Arc;
+
 use block_regression::Folds;
 use coloured_noise::Coloured;
 use effects::Candidate;
@@ -85,7 +87,7 @@ pub(crate) fn search<'d>(
     data: &AttitudeData,
     folds: &Folds,
     rows: &Folds,
-    mut candidates: Vec<Box<dyn Candidate>>,
+    mut candidates: Vec<Arc<dyn Candidate>>,
     changes: Option<SpatialErrors>,
     start: [Coloured; 3],
 ) -> Result<(Found, [Coloured; 3], Refused), CloseError> {
@@ -209,7 +211,7 @@ pub(crate) fn rivals(
 }
 
 /// What the p-value of each candidate is multiplied by: descriptions are not tried.
-fn cost(fitted: &Fitted, candidates: &[Box<dyn Candidate>]) -> Vec<f64> {
+fn cost(fitted: &Fitted, candidates: &[Arc<dyn Candidate>]) -> Vec<f64> {
     let may: Vec<bool> = candidates.iter().map(|c| c.id() != EMPIRICAL).collect();
     costs(&fitted.groups, &may)
 }
@@ -222,7 +224,7 @@ struct Trial<'a, 'd> {
     fitted: &'a Fitted,
     /// The same under white noise.
     plain: Fitted,
-    candidates: &'a [Box<dyn Candidate>],
+    candidates: &'a [Arc<dyn Candidate>],
     /// Columns of all candidates, averaged over the bins.
     binned: DMatrix<f64>,
     /// Jumps that are no step.
@@ -241,7 +243,7 @@ impl<'a, 'd> Trial<'a, 'd> {
         with_noise: &'a WithNoise<'d>,
         data: &'a AttitudeData,
         folds: &'a Folds,
-        candidates: &'a [Box<dyn Candidate>],
+        candidates: &'a [Arc<dyn Candidate>],
         fitted: &'a Fitted,
         binned: DMatrix<f64>,
         noise: [Coloured; 3],

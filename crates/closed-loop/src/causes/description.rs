@@ -247,7 +247,7 @@ pub(crate) fn offer(
     else {
         return Ok(());
     };
-    found.candidates.push(Box::new(term.clone()));
+    found.candidates.push(Arc::new(term.clone()));
     found.fitted = fit(evidence, folds, &borrowed(&found.candidates))?;
     let (fitted, chosen) = (&found.fitted, &found.selection.chosen);
     let mut all = judged(

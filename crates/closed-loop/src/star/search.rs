@@ -28,6 +28,8 @@
 //!
 //! Source: Wilks 1938 (likelihood ratio); George & Foster 2000 (empirical Bayes selection).
 
+use std::sync::Arc;
+
 use block_regression::{Estimate, Fits, Folds, Layout};
 use coloured_noise::{CommonNoise, Rotations};
 use effects::Candidate;
@@ -80,7 +82,7 @@ pub(crate) struct Searched<'a> {
 pub(crate) fn attempt<'a>(
     white: &StarEvidence<'a>,
     folds: &Folds,
-    candidates: &dyn Fn() -> Vec<Box<dyn Candidate>>,
+    candidates: &dyn Fn() -> Vec<Arc<dyn Candidate>>,
     may: &[bool],
     start: Option<CommonNoise>,
 ) -> Result<(Searched<'a>, Vec<usize>), CloseError> {
@@ -94,7 +96,9 @@ pub(crate) fn attempt<'a>(
         white: begun,
         worth,
     } = coloured(white, folds, candidates(), may, start)?;
-    let found = search(white, folds, candidates(), may, begun)?;
+    // from the forms that were polished beside the slow error: nearly those that suit white noise
+    let candidates = searched.found.candidates.clone();
+    let found = search(white, folds, candidates, may, begun)?;
     let instead = Instead::of(white, folds, &found, may, &wander.noise)?;
     // Less than that imitates no effect, and would only hide one.
     if wander.axes().contains(&true) {
@@ -405,7 +409,7 @@ impl Trial<'_> {
 struct Coloured<'a> {
     searched: Searched<'a>,
     wander: Wander,
-    /// The same candidates under white noise, where none was changed.
+    /// The same candidates under white noise, but where rotations have a prior.
     white: Option<Fitted>,
     worth: f64,
 }
@@ -413,12 +417,11 @@ struct Coloured<'a> {
 fn coloured<'a>(
     white: &StarEvidence<'a>,
     folds: &Folds,
-    mut candidates: Vec<Box<dyn Candidate>>,
+    mut candidates: Vec<Arc<dyn Candidate>>,
     may: &[bool],
     start: CommonNoise,
 ) -> Result<Coloured<'a>, CloseError> {
     let mut banned = vec![false; candidates.len()];
-    let mut polished = false;
     let mut chosen: Vec<usize> = Vec::new();
     let mut noise = start;
     let mut moments = white.moments(folds, &borrowed(&candidates));
@@ -520,7 +523,7 @@ fn coloured<'a>(
                     rotations: base.rotations,
                     ratio,
                 },
-                white: (!polished && white.drawn.is_none()).then_some(plain),
+                white: white.drawn.is_none().then_some(plain),
                 worth,
             });
         };
@@ -530,7 +533,6 @@ fn coloured<'a>(
         let fitted = fitted.beside(folds, &borrowed(&candidates), &chosen)?;
         let evidence = white.with_noise(&noise);
         if polish(&evidence, folds, &mut candidates, &fitted, &chosen)? {
-            polished = true;
             moments = white.moments(folds, &borrowed(&candidates));
         }
     }

@@ -9,6 +9,8 @@
 //!
 //! Source: Wilks 1938 (likelihood ratio).
 
+use std::sync::Arc;
+
 use coloured_noise::Coloured;
 use effects::{Candidate, Scene};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -32,8 +34,8 @@ pub(crate) struct SharedJump {
 
 impl SharedJump {
     /// The effect that makes it.
-    pub(crate) fn candidate(self, scene: &Scene<'_>) -> Box<dyn Candidate> {
-        effects::step_at(self.at_s, scene.surroundings.span_s, self.tried)
+    pub(crate) fn candidate(self, scene: &Scene<'_>) -> Arc<dyn Candidate> {
+        effects::step_at(self.at_s, scene.surroundings.span_s, self.tried).into()
     }
 }
 

@@ -162,8 +162,8 @@ pub(crate) struct SharedLine {
 
 impl SharedLine {
     /// The effect that makes it.
-    pub(crate) fn candidate(self, scene: &Scene<'_>) -> Box<dyn Candidate> {
-        effects::line_at(self.frequency_hz, scene.surroundings.span_s, self.tried)
+    pub(crate) fn candidate(self, scene: &Scene<'_>) -> Arc<dyn Candidate> {
+        effects::line_at(self.frequency_hz, scene.surroundings.span_s, self.tried).into()
     }
 }
 
