@@ -236,9 +236,7 @@ const SAMPLES: usize = 512;
 const LANES: usize = 8;
 
 fn runs(bins: usize) -> impl Iterator<Item = Range<usize>> {
-    (0..bins)
-        .step_by(RUN)
-        .map(move |k| k..(k + RUN).min(bins))
+    (0..bins).step_by(RUN).map(move |k| k..(k + RUN).min(bins))
 }
 
 fn add<const N: usize>(sums: &mut [f64; N], part: [f64; N]) {

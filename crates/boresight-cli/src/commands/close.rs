@@ -73,7 +73,7 @@ pub(crate) fn interrupted() {
 /// Draws of each model behind its spectrum: enough for a mean and its 3 sigma.
 const DRAWS: u64 = 40;
 /// A long run has many periods in every band, and needs fewer draws of it.
-const FLOWN_FRAMES: u64 = 400_000;
+const FLOWN_FRAMES: u64 = 72_000;
 const FEWEST_DRAWS: u64 = 8;
 
 fn draws(frames: usize) -> u64 {
@@ -134,8 +134,9 @@ mod tests {
     #[test]
     fn a_long_run_is_flown_less_often() {
         assert_eq!(draws(0), DRAWS);
-        assert_eq!(draws(3600), DRAWS);
-        assert_eq!(draws(20_000), 20);
+        assert_eq!(draws(1800), DRAWS);
+        assert_eq!(draws(3600), 20);
+        assert_eq!(draws(7200), 10);
         assert_eq!(draws(144_000), FEWEST_DRAWS);
     }
 }

@@ -429,10 +429,7 @@ mod tests {
         let all = judged(0.5, 0.05);
         // 0.08^2 - 0.05^2 = 0.062^2
         assert!(all.agrees(&judged(0.4, 0.08)));
-        assert!(
-            !all.agrees(&judged(0.2, 0.08)),
-            "they differ by 4.8 sigma"
-        );
+        assert!(!all.agrees(&judged(0.2, 0.08)), "they differ by 4.8 sigma");
         // they agree, and there is nothing in either
         assert!(!judged(0.2, 0.05).agrees(&judged(0.2, 0.08)));
         assert!(all.agrees(&UNSEEN), "nothing to hold it against");

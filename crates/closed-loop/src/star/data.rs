@@ -28,6 +28,7 @@ use focal_plane::{
     Vectors,
 };
 use nalgebra::{UnitQuaternion, Vector3};
+use rayon::prelude::*;
 use star_tracker::{Disturbance, Pbm, Rows, Scratch};
 use telemetry::WindowTable;
 
@@ -533,14 +534,13 @@ impl StarData {
     /// Where this takes each row from its projection, px.
     fn shifted(&self, shift_arcsec: &[Vec<f64>]) -> [Vec<f64>; 2] {
         let scale = self.camera.arcsec_per_px();
-        let mut out = self.projected.clone();
-        for row in 0..self.t_s.len() {
-            let turned = self.turned_arcsec(row);
-            for axis in 0..2 {
-                out[axis][row] += (shift_arcsec[axis][row] - turned[axis]) / scale[axis];
-            }
-        }
-        out
+        std::array::from_fn(|axis| {
+            let rows = self.projected[axis].par_iter().enumerate();
+            let at = |(row, p): (usize, &f64)| {
+                p + (shift_arcsec[axis][row] - self.turned_arcsec(row)[axis]) / scale[axis]
+            };
+            rows.map(at).collect()
+        })
     }
 
     /// Where the light falls, as far as is known, px.

@@ -91,11 +91,12 @@ impl Light {
         });
         let around = around(data, &turns, reference);
         let scale = data.camera.arcsec_per_px();
-        for (k, around) in around.iter().enumerate() {
-            let Some(turn) = &turns.frames[k] else {
-                continue;
-            };
-            for row in data.frames.rows_of(k) {
+        let weight = &weight;
+        let of_frame = |k: usize| {
+            let around = &around[k];
+            let turn = turns.frames[k].as_ref();
+            let of_row = move |row: usize| -> Option<[[f64; 2]; 2]> {
+                let turn = turn?;
                 let own = rotation_row(data, row).map(Vector3::from);
                 let (mut normal, mut moment) = (turn.normal, turn.moment);
                 if !data.free_attitude && counts(data, residual, row) {
@@ -110,15 +111,23 @@ impl Light {
                     normal[(axis, axis)] += reference[axis] + q.recip();
                     moment[axis] += p / q;
                 }
-                let Some(variance) = normal.try_inverse() else {
-                    continue;
-                };
+                let variance = normal.try_inverse()?;
                 let theta = variance * moment;
-                for axis in 0..2 {
+                Some([0, 1].map(|axis| {
                     let a = own[axis] / scale[axis];
-                    light.beside_px[axis][row] = a.dot(&theta);
-                    light.variance_px2[axis][row] = a.dot(&(variance * a)).max(0.0);
-                }
+                    [a.dot(&theta), a.dot(&(variance * a)).max(0.0)]
+                }))
+            };
+            data.frames.rows_of(k).map(of_row)
+        };
+        let each: Vec<_> = (0..around.len())
+            .into_par_iter()
+            .flat_map_iter(of_frame)
+            .collect();
+        for (row, known) in each.into_iter().enumerate() {
+            for (axis, [beside, variance]) in known.into_iter().flatten().enumerate() {
+                light.beside_px[axis][row] = beside;
+                light.variance_px2[axis][row] = variance;
             }
         }
         light

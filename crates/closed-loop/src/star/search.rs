@@ -533,6 +533,8 @@ fn coloured<'a>(
         let fitted = fitted.beside(folds, &borrowed(&candidates), &chosen)?;
         let evidence = white.with_noise(&noise);
         if polish(&evidence, folds, &mut candidates, &fitted, &chosen)? {
+            // there is no room for the old products beside the new
+            drop((plain, filtered, fitted, moments));
             moments = white.moments(folds, &borrowed(&candidates));
         }
     }

@@ -78,6 +78,7 @@ struct Scratch {
     /// N of each frame.
     normal: Vec<Matrix3<f64>>,
     axes: [Compact; 2],
+    sums: [OwnSums; 2],
     /// M about each axis, a column a frame, of the last frames; and their T.
     moments: [DMatrix<f64>; 3],
     turn: DMatrix<f64>,
@@ -96,12 +97,37 @@ impl Default for Scratch {
             jacobian: Vec::new(),
             normal: Vec::new(),
             axes: Default::default(),
+            sums: Default::default(),
             moments: [empty(), empty(), empty()],
             turn: empty(),
             held: 0,
             frame: Default::default(),
             turns: Compact::default(),
             product: Vec::new(),
+        }
+    }
+}
+
+/// Products of the columns of an axis that are not all zero, as long as these are the same ones.
+#[derive(Default)]
+struct OwnSums {
+    active: Vec<usize>,
+    /// D^T X, a column each, and X^T X, below the diagonal.
+    cross: Vec<f64>,
+    own: Vec<f64>,
+}
+
+impl OwnSums {
+    /// From now on of the columns `active`, beside `shared` polynomials.
+    fn begin(&mut self, active: &[usize], shared: usize) {
+        self.active.clear();
+        self.active.extend_from_slice(active);
+        for (sums, size) in [
+            (&mut self.cross, shared * active.len()),
+            (&mut self.own, active.len() * active.len()),
+        ] {
+            sums.clear();
+            sums.resize(size, 0.0);
         }
     }
 }
@@ -235,6 +261,9 @@ impl Sums {
                 }
             }
         }
+        for axis in 0..2 {
+            sums.put(axis, &mut scratch.sums[axis]);
+        }
         sums
     }
 
@@ -243,7 +272,7 @@ impl Sums {
         let Scratch {
             filled,
             axes,
-            product,
+            sums: held,
             ..
         } = scratch;
         let shared = &filled.shared;
@@ -256,32 +285,48 @@ impl Sums {
                 .view_mut((start, start), (n - start, panel.len()))
                 .gemm(1.0, &left, &flipped.columns(start, panel.len()), 1.0);
         }
-        for (axis, (own, compact)) in filled.own.iter().zip(axes).enumerate() {
+        for axis in 0..2 {
+            let (own, compact) = (&filled.own[axis], &mut axes[axis]);
             compact.fill(own.as_slice(), own.nrows(), own.nrows());
+            if compact.active != held[axis].active {
+                self.put(axis, &mut held[axis]);
+                held[axis].begin(&compact.active, n);
+            }
             let (turned, width) = (compact.turned(), compact.active.len());
             if width == 0 {
                 continue;
             }
-            let mut cross = matrix(product, n, width);
-            cross.gemm(1.0, shared, &compact.columns(0..width), 0.0);
-            for (from, &to) in cross.column_iter().zip(&compact.active) {
-                let mut into = self.cross.view_mut((axis * n, to), (n, 1));
-                into += from;
-            }
+            let OwnSums { cross, own, .. } = &mut held[axis];
+            DMatrixViewMut::from_slice(cross, n, width).gemm(
+                1.0,
+                shared,
+                &compact.columns(0..width),
+                1.0,
+            );
+            let mut own = DMatrixViewMut::from_slice(own, width, width);
             for start in (0..width).step_by(PANEL) {
                 let panel = start..(start + PANEL).min(width);
-                let below = &compact.active[start..];
-                let mut product = matrix(product, below.len(), panel.len());
-                let left = turned.rows(start, below.len());
-                product.gemm(1.0, &left, &compact.columns(panel.clone()), 0.0);
-                for (from, &to) in product.column_iter().zip(&compact.active[panel]) {
-                    let mut into = self.own.column_mut(to);
-                    for (from, &row) in from.iter().zip(below) {
-                        into[row] += from;
-                    }
-                }
+                let left = turned.rows(start, width - start);
+                own.view_mut((start, start), (width - start, panel.len()))
+                    .gemm(1.0, &left, &compact.columns(panel), 1.0);
             }
         }
+    }
+
+    /// Adds what is held of an axis, which is then nothing.
+    fn put(&mut self, axis: usize, held: &mut OwnSums) {
+        let (n, width) = (self.layout.shared, held.active.len());
+        let cross = DMatrixView::from_slice(&held.cross, n, width);
+        let own = DMatrixView::from_slice(&held.own, width, width);
+        for (j, &to) in held.active.iter().enumerate() {
+            let mut into = self.cross.view_mut((axis * n, to), (n, 1));
+            into += cross.column(j);
+            let mut into = self.own.column_mut(to);
+            for (from, &row) in own.column(j).iter().zip(&held.active).skip(j) {
+                into[row] += from;
+            }
+        }
+        held.active.clear();
     }
 
     /// Adds the products of all columns with T.
