@@ -207,7 +207,11 @@ pub(crate) fn claim(
     };
     let outliers = declared_outliers(situation)?;
     let make = |belief: &dyn Fn(&Row) -> [f64; 2]| source.rows(belief);
-    let known = [level.resolved, situation.bundle.images.is_some()];
+    let follows_light = situation.model.effects.iter().any(|e| e.id == MAGNITUDE);
+    let known = [
+        level.resolved,
+        follows_light || situation.bundle.images.is_some(),
+    ];
     let Some(verdicts) = judge(&make, folds, known, outliers) else {
         return Ok(NoiseEffects::default());
     };

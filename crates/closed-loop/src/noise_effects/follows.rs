@@ -260,9 +260,9 @@ impl Table {
             square += z * z;
         }
         of_block.retain(|(score, _)| score.norm_squared() > 0.0);
-        let (score, normal) = of_block.iter().fold(zeros(), |(u, m), (score, normal)| {
-            (u + score, m + normal)
-        });
+        let (score, normal) = of_block
+            .iter()
+            .fold(zeros(), |(u, m), (score, normal)| (u + score, m + normal));
         let n = self.rows.len() as f64;
         if (0..count).any(|k| normal[(k, k)] < n * LEAST_CHANGE * LEAST_CHANGE) {
             return None;

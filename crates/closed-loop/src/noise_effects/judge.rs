@@ -31,10 +31,12 @@ const TRIED: f64 = 3.0;
 /// Fewest stars and spread of magnitudes that show a slope.
 const MIN_STARS: usize = 4;
 const MIN_SPREAD_MAG: f64 = 0.02;
-/// A slope this near to the declared one is as declared: over three magnitudes the noise changes by 1.4 %.
-const SLOPE_AS_DECLARED: f64 = 0.01;
-/// The same where the centroids are of the windows that are sent: photon and read noise together
-/// follow a power of the flux only roughly, and their slope changes by this within half a magnitude.
+/// Where noise is declared to be the same for all stars, less than this slope is none: over three magnitudes
+/// the noise changes by 1.4 %.
+const SLOPE_OF_NONE: f64 = 0.01;
+/// A slope this near to a declared one is as declared, as is any of centroids of windows that are sent: photon
+/// and read noise together follow a power of the flux only roughly, and their slope changes by this within
+/// half a magnitude.
 const SLOPE_OF_LIGHT: f64 = 0.1;
 /// Least relative spread of the squared rate.
 const MIN_SPREAD_RATE: f64 = 0.2;
@@ -120,12 +122,12 @@ struct Bench<'a> {
 }
 
 /// Judges. `make` gives the rows under a belief of variance and soundness; `moving`
-/// says whether rates are known, `windows` whether the centroids are of windows that are sent; `declared`
+/// says whether rates are known, `light` whether the declared noise is roughly that of light; `declared`
 /// are declared outliers (share, size).
 pub(super) fn judge(
     make: &Make<'_>,
     folds: &Folds,
-    [moving, windows]: [bool; 2],
+    [moving, light]: [bool; 2],
     declared: Option<[f64; 2]>,
 ) -> Option<Verdicts> {
     let mut rows = make(&|row: &Row| [row.declared, 1.0]);
@@ -146,11 +148,7 @@ pub(super) fn judge(
         model,
         folds,
         stars,
-        least_slope: if windows {
-            SLOPE_OF_LIGHT
-        } else {
-            SLOPE_AS_DECLARED
-        },
+        least_slope: if light { SLOPE_OF_LIGHT } else { SLOPE_OF_NONE },
     };
     let full = climb(&bench.model, &bench.rows, free)?;
     let outliers = bench.spikes(&full);
