@@ -20,6 +20,9 @@
 //! that it needs, one axis of three, say: so the set pays for no more either, and is judged at
 //! its best part.
 //!
+//! A line that the motion describes nearly as well is the motion's: of all frequencies it would have come
+//! upon that at which the tracker moves.
+//!
 //! Source: Schwarz 1978 for the price of a parameter.
 
 use block_regression::{Estimate, Fits};
@@ -29,6 +32,8 @@ use crate::search::selection::{FAMILY_ALPHA, columns_of, each};
 
 /// Nats by which a description must be worth more.
 pub(crate) const BY_FAR: f64 = 4.0;
+/// The effect that a periodic motion may be taken for.
+const LINE: &str = "periodic_misalignment";
 /// Terms of a description.
 const MOST_TERMS: usize = 3;
 /// Nats that a further term must be worth.
@@ -43,7 +48,7 @@ pub(crate) fn stand_ins(described: &Described) -> Option<(Vec<usize>, Vec<Part>)
     let groups = &described.fitted.groups;
     let looked = (parts_of_all(described) as f64).ln();
     let mut most = None;
-    let mut by = BY_FAR;
+    let mut by = 0.0;
     for set in sets(described) {
         let chosen = described.chosen.iter().copied();
         let rest: Vec<usize> = chosen.filter(|g| !set.contains(g)).collect();
@@ -57,9 +62,16 @@ pub(crate) fn stand_ins(described: &Described) -> Option<(Vec<usize>, Vec<Part>)
         let Some(own) = at_best(described, &set, &rest, times) else {
             continue;
         };
-        let worth = worth - parts.len() as f64 * looked;
-        if worth - own > by {
-            by = worth - own;
+        let lines = set.iter().all(|&k| described.names[k] == LINE);
+        let motion = |(k, _): &Part| described.terms[*k].term.is_of_motion();
+        let least = if lines && parts.iter().all(motion) {
+            -BY_FAR
+        } else {
+            BY_FAR
+        };
+        let beyond = worth - parts.len() as f64 * looked - own - least;
+        if beyond > by {
+            by = beyond;
             most = Some((set, parts));
         }
     }

@@ -244,6 +244,12 @@ impl Empirical {
         of_star && self.by.is_none()
     }
 
+    /// Whether it is the motion alone.
+    pub(crate) fn is_of_motion(&self) -> bool {
+        let of_motion = matches!(self.variable, Variable::Rate | Variable::Acceleration);
+        of_motion && self.by.is_none()
+    }
+
     /// Whether it is a shift of each star.
     pub(crate) fn is_of_stars(&self) -> bool {
         matches!(self.variable, Variable::Star(_)) && self.by.is_none()
