@@ -280,13 +280,10 @@ impl Bench<'_> {
         ));
         let mut sigma2 = variance(&blocks).max(variance(&cells));
         if k == MAGNITUDE {
-            p = p.max(wald(
-                beyond,
-                variance(&stars),
-                stars.as_ref().map_or(0, |c| c.1),
-                2,
-            ));
-            sigma2 = sigma2.max(variance(&stars));
+            let count = stars.as_ref().map_or(0, |c| c.1);
+            let variance = variance(&stars) * of_few(count, 2);
+            p = p.max(wald(beyond, variance, count, 2));
+            sigma2 = sigma2.max(variance);
         }
         let gain = self.gain(&self.rows, full, &without);
         let values = if k == MAGNITUDE {
@@ -401,6 +398,14 @@ impl Bench<'_> {
 /// Tail of the likelihood ratio.
 fn likely(ratio: f64, freedom: f64) -> f64 {
     ChiSquared::new(freedom).map_or(1.0, |law| law.sf(ratio.max(0.0)))
+}
+
+/// What a variance from `clusters` sums lacks, of which `spent` are spent: the fit goes through them
+/// (MacKinnon & White 1985, HC3 at the mean leverage; of which (n - 1)/n is counted already).
+fn of_few(clusters: usize, spent: usize) -> f64 {
+    let n = clusters as f64;
+    let left = clusters.saturating_sub(spent).max(1) as f64;
+    n * (n - 1.0).max(1.0) / (left * left)
 }
 
 /// Tail of an estimate with a variance from `clusters` sums, of which `spent` are spent.
