@@ -401,7 +401,7 @@ fn likely(ratio: f64, freedom: f64) -> f64 {
 }
 
 /// What a variance from `clusters` sums lacks, of which `spent` are spent: the fit goes through them
-/// (MacKinnon & White 1985, HC3 at the mean leverage; of which (n - 1)/n is counted already).
+/// (`MacKinnon` and White 1985, HC3 at the mean leverage; of which (n - 1)/n is counted already).
 fn of_few(clusters: usize, spent: usize) -> f64 {
     let n = clusters as f64;
     let left = clusters.saturating_sub(spent).max(1) as f64;
