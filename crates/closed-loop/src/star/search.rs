@@ -94,12 +94,17 @@ pub(crate) fn attempt<'a>(
         searched,
         wander,
         white: begun,
+        moments,
         worth,
     } = coloured(white, folds, candidates(), may, start)?;
     // from the forms that were polished beside the slow error: nearly those that suit white noise
     let candidates = searched.found.candidates.clone();
     let found = search(white, folds, candidates, may, begun)?;
-    let instead = Instead::of(white, folds, &found, may, &wander.noise)?;
+    let polished = &searched.found.candidates;
+    let same = |(a, b): (&Arc<dyn Candidate>, &Arc<dyn Candidate>)| Arc::ptr_eq(a, b);
+    let known = polished.iter().zip(&found.candidates).all(same);
+    let known = known.then_some(moments);
+    let instead = Instead::of(white, folds, &found, may, &wander.noise, known)?;
     // Less than that imitates no effect, and would only hide one.
     if wander.axes().contains(&true) {
         let better = instead.is_some_and(|i| i.refused.is_empty() && i.worth > worth);
@@ -144,20 +149,22 @@ struct Instead {
 }
 
 impl Instead {
-    /// `None`: nothing that a slow error could imitate.
+    /// `None`: nothing that a slow error could imitate. `known`: the products of the candidates, where they
+    /// are there already.
     fn of(
         white: &StarEvidence<'_>,
         folds: &Folds,
         found: &Found,
         may: &[bool],
         noise: &CommonNoise,
+        known: Option<StarMoments>,
     ) -> Result<Option<Self>, CloseError> {
         let chosen = &found.selection.chosen;
         let turns = |g: &usize| found.candidates[*g].acts_on_attitude();
         if !chosen.iter().any(turns) {
             return Ok(None);
         }
-        let moments = white.moments(folds, &borrowed(&found.candidates));
+        let moments = known.unwrap_or_else(|| white.moments(folds, &borrowed(&found.candidates)));
         let trial = Trial {
             moments: &moments,
             folds,
@@ -411,6 +418,8 @@ struct Coloured<'a> {
     wander: Wander,
     /// The same candidates under white noise, but where rotations have a prior.
     white: Option<Fitted>,
+    /// The products of the candidates.
+    moments: StarMoments,
     worth: f64,
 }
 
@@ -524,6 +533,7 @@ fn coloured<'a>(
                     ratio,
                 },
                 white: white.drawn.is_none().then_some(plain),
+                moments,
                 worth,
             });
         };
