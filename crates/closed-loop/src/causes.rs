@@ -377,3 +377,20 @@ fn keep(found: &Found, g: usize, change: Change) -> Vec<Arc<dyn Candidate>> {
     let own = Changing::new(Inner::Own(Arc::clone(&effect)), &values, vec![change.way]);
     vec![Arc::new(Kept::new(effect, columns)), Arc::new(own)]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Only what a slow error of the reference had taken the place of comes back, and once.
+    #[test]
+    fn what_was_refused_for_a_wander_may_be_named_again() {
+        let mut refused = Refused::new();
+        refused.insert("step_misalignment".to_owned(), Refusal::Wander);
+        refused.insert("catalogue_position/7".to_owned(), Refusal::Pile);
+        assert!(reinstated(&mut refused));
+        let left: Vec<&String> = refused.keys().collect();
+        assert_eq!(left, ["catalogue_position/7"]);
+        assert!(!reinstated(&mut refused), "nothing else was refused for it");
+    }
+}
