@@ -37,13 +37,20 @@ use crate::situation::Situation;
 use crate::star::data::StarData;
 use crate::star::evidence::StarEvidence;
 pub(crate) use follows::{NoiseFollows, noise_follows};
-use judge::{Judged, judge};
+use judge::{Judged, Known, judge};
 use rows::{Row, Source};
 
 /// Identities in the catalogue.
 const MAGNITUDE: &str = "magnitude_noise";
 const RATE: &str = "rate_noise";
 const OUTLIERS: &str = "outliers";
+/// Where noise is declared to be the same for all stars, less than this slope is none: over three magnitudes
+/// the noise changes by 1.4 %.
+const SLOPE_OF_NONE: f64 = 0.01;
+/// A slope this near to a declared one is as declared, as is any of centroids of windows that are sent: photon
+/// and read noise together follow a power of the flux only roughly, and their slope changes by this within
+/// half a magnitude.
+const SLOPE_OF_LIGHT: f64 = 0.1;
 /// Sigmas that a size takes to be seen.
 const SEEN: f64 = 5.0;
 /// Size of the spikes, in sigmas of the noise, for which their share is given.
@@ -205,14 +212,19 @@ pub(crate) fn claim(
         declared: &declared,
         folds,
     };
-    let outliers = declared_outliers(situation)?;
     let make = |belief: &dyn Fn(&Row) -> [f64; 2]| source.rows(belief);
-    let follows_light = situation.model.effects.iter().any(|e| e.id == MAGNITUDE);
-    let known = [
-        level.resolved,
-        follows_light || situation.bundle.images.is_some(),
-    ];
-    let Some(verdicts) = judge(&make, folds, known, outliers) else {
+    let follows_light = situation.model.effects.iter().any(|e| e.id == MAGNITUDE)
+        || situation.bundle.images.is_some();
+    let known = Known {
+        moving: level.resolved,
+        least_slope: if follows_light {
+            SLOPE_OF_LIGHT
+        } else {
+            SLOPE_OF_NONE
+        },
+        outliers: declared_outliers(situation)?,
+    };
+    let Some(verdicts) = judge(&make, folds, known) else {
         return Ok(NoiseEffects::default());
     };
     let mut verdicts = verdicts;
@@ -223,7 +235,7 @@ pub(crate) fn claim(
             ..source
         };
         let make = |belief: &dyn Fn(&Row) -> [f64; 2]| source.rows(belief);
-        if let Some(fast) = judge(&make, folds, known, outliers) {
+        if let Some(fast) = judge(&make, folds, known) {
             verdicts.magnitude.stands &= verdicts.magnitude.agrees(&fast.magnitude);
             verdicts.rate.stands &= verdicts.rate.agrees(&fast.rate);
         }

@@ -31,13 +31,6 @@ const TRIED: f64 = 3.0;
 /// Fewest stars and spread of magnitudes that show a slope.
 const MIN_STARS: usize = 4;
 const MIN_SPREAD_MAG: f64 = 0.02;
-/// Where noise is declared to be the same for all stars, less than this slope is none: over three magnitudes
-/// the noise changes by 1.4 %.
-const SLOPE_OF_NONE: f64 = 0.01;
-/// A slope this near to a declared one is as declared, as is any of centroids of windows that are sent: photon
-/// and read noise together follow a power of the flux only roughly, and their slope changes by this within
-/// half a magnitude.
-const SLOPE_OF_LIGHT: f64 = 0.1;
 /// Least relative spread of the squared rate.
 const MIN_SPREAD_RATE: f64 = 0.2;
 /// Largest slope, and noise of a rate in arcsec/(deg/s), that nature makes.
@@ -74,7 +67,7 @@ pub(super) struct Judged {
     pub(super) fewest: Option<f64>,
     /// Values with sigmas: slope; rate; share and size.
     pub(super) values: [[f64; 2]; 2],
-    /// What passes for nothing.
+    /// What of the first value passes for nothing.
     pub(super) least: f64,
 }
 
@@ -121,26 +114,30 @@ struct Bench<'a> {
     least_slope: f64,
 }
 
-/// Judges. `make` gives the rows under a belief of variance and soundness; `moving`
-/// says whether rates are known, `light` whether the declared noise is roughly that of light; `declared`
-/// are declared outliers (share, size).
-pub(super) fn judge(
-    make: &Make<'_>,
-    folds: &Folds,
-    [moving, light]: [bool; 2],
-    declared: Option<[f64; 2]>,
-) -> Option<Verdicts> {
+/// What is known before the residuals are looked at.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Known {
+    /// Whether rates are.
+    pub(super) moving: bool,
+    /// A slope that passes for nothing.
+    pub(super) least_slope: f64,
+    /// Declared share and size.
+    pub(super) outliers: Option<[f64; 2]>,
+}
+
+/// Judges. `make` gives the rows under a belief of variance and soundness.
+pub(super) fn judge(make: &Make<'_>, folds: &Folds, known: Known) -> Option<Verdicts> {
     let mut rows = make(&|row: &Row| [row.declared, 1.0]);
     let mut free = [false; PARAMETERS];
-    let mut model = Model::new(&rows, declared);
+    let mut model = Model::new(&rows, known.outliers);
     for _ in 0..ROUNDS {
         if rows.iter().filter(|r| !r.marked).count() < 10 * MIN_ROWS {
             return None;
         }
-        free = observable(&rows, moving);
+        free = observable(&rows, known.moving);
         let full = climb(&model, &rows, free)?;
         rows = make(&model.belief(&full.at));
-        model = Model::new(&rows, declared);
+        model = Model::new(&rows, known.outliers);
     }
     let stars = rows.iter().map(|r| r.star + 1).max()?;
     let bench = Bench {
@@ -148,7 +145,7 @@ pub(super) fn judge(
         model,
         folds,
         stars,
-        least_slope: if light { SLOPE_OF_LIGHT } else { SLOPE_OF_NONE },
+        least_slope: known.least_slope,
     };
     let full = climb(&bench.model, &bench.rows, free)?;
     let outliers = bench.spikes(&full);
@@ -265,13 +262,14 @@ impl Bench<'_> {
         let widened = self.model.widening(&full.at, &self.rows);
         // what has to be shown is more than what passes for nothing
         let least = if k == MAGNITUDE {
-            value.clamp(-self.least_slope, self.least_slope)
+            self.least_slope
         } else {
             0.0
         };
-        let ratio = 2.0 * (full.loglik - self.with(full, k, least).loglik) / widened;
+        let nearest = value.clamp(-least, least);
+        let ratio = 2.0 * (full.loglik - self.with(full, k, nearest).loglik) / widened;
         let mut p = likely(ratio, 1.0);
-        let beyond = value - least;
+        let beyond = value - nearest;
         p = p.max(wald(
             beyond,
             variance(&blocks),
@@ -309,7 +307,7 @@ impl Bench<'_> {
             stands: credible && gain > 0.0 && p_value < FAMILY_ALPHA,
             fewest: None,
             values: [values, [0.0; 2]],
-            least: least.abs(),
+            least,
         }
     }
 

@@ -3,7 +3,7 @@ use rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal, StudentT, Uniform};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-use super::judge::{Verdicts, judge};
+use super::judge::{Known, Verdicts, judge};
 use super::rows::Row;
 
 /// What acts on synthetic rows.
@@ -67,7 +67,12 @@ fn verdicts(seed: u64, frames: usize, truth: Truth) -> Verdicts {
             }
         }
     }
-    judge(&|_| rows.clone(), &folds, [true, false], None).expect("enough rows")
+    let known = Known {
+        moving: true,
+        least_slope: super::SLOPE_OF_NONE,
+        outliers: None,
+    };
+    judge(&|_| rows.clone(), &folds, known).expect("enough rows")
 }
 
 /// Claims of slope, rate, spikes.
@@ -80,6 +85,18 @@ fn claims(seeds: std::ops::Range<u64>, frames: usize, truth: Truth) -> [usize; 3
         }
     }
     count
+}
+
+/// What could have been seen counts from what passes for nothing, wherever below it the estimate lies.
+#[test]
+fn a_small_slope_is_held_against_all_that_passes_for_none() {
+    let v = verdicts(1, 300, Truth::default());
+    assert!(
+        v.magnitude.values[0][0].abs() < super::SLOPE_OF_NONE,
+        "{v:?}"
+    );
+    assert_eq!(v.magnitude.least, super::SLOPE_OF_NONE);
+    assert_eq!(v.rate.least, 0.0);
 }
 
 /// Each may be claimed once in 300: 60 seeds give 0.2 on average, and 3 or more one time in 900.
