@@ -328,26 +328,24 @@ pub(crate) fn polish(
             .copied()
             .collect();
         first += columns.len();
-        let whole = columns.len() == candidates[g].coefficients().len();
-        if whole
-            && let Some(better) = candidates[g].refined(&values)
-            && evidence.distance(candidates[g].as_ref(), better.as_ref(), &values) > same
-        {
-            candidates[g] = better.into();
-            changed = true;
-        }
         let before = Arc::clone(&candidates[g]);
+        let whole = columns.len() == before.coefficients().len();
+        let better = before.refined(&values).filter(|_| whole);
         let scanned = before.nonlinear().len();
+        if better.is_none() && scanned == 0 {
+            continue;
+        }
+        if let Some(better) = better {
+            candidates[g] = better.into();
+        }
         for k in 0..scanned {
             scan(evidence, folds, candidates, chosen, g, k)?;
         }
-        if scanned > 0 {
-            let now = candidates[g].as_ref();
-            if whole && evidence.distance(before.as_ref(), now, &values) <= same {
-                candidates[g] = before;
-            } else {
-                changed = true;
-            }
+        let now = candidates[g].as_ref();
+        if whole && evidence.distance(before.as_ref(), now, &values) <= same {
+            candidates[g] = before;
+        } else {
+            changed = true;
         }
     }
     Ok(changed)

@@ -358,7 +358,8 @@ fn beside_line(y: &[f64], f: &[f64], mag: &[f64], usual: Option<f64>) -> Option<
     let n = y.len();
     let known = mag.iter().any(|m| (m - mag[0]).abs() > 1e-6);
     let columns = 2 + usize::from(known);
-    let fewest = usual.map_or(MIN_STARS, |_| MIN_USUAL_STARS);
+    let (fewest, prior, usual) =
+        usual.map_or((MIN_STARS, 0.0, 0.0), |v| (MIN_USUAL_STARS, PRIOR, v));
     if n < fewest {
         return None;
     }
@@ -367,9 +368,8 @@ fn beside_line(y: &[f64], f: &[f64], mag: &[f64], usual: Option<f64>) -> Option<
     let y = DVector::from_column_slice(y);
     let beta = factor.solve(&(design.transpose() * &y));
     let squares = (&y - &design * &beta).norm_squared();
-    let prior = usual.map_or(0.0, |_| PRIOR);
     let freedom = prior + (n - columns) as f64;
-    let left = (prior * usual.unwrap_or(0.0) + squares) / freedom;
+    let left = (prior * usual + squares) / freedom;
     let variance = factor.inverse()[(0, 0)] * left;
     let law = StudentsT::new(0.0, 1.0, freedom).ok()?;
     let t = beta[0] / variance.sqrt();
