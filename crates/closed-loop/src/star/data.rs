@@ -534,13 +534,18 @@ impl StarData {
     /// Where this takes each row from its projection, px.
     fn shifted(&self, shift_arcsec: &[Vec<f64>]) -> [Vec<f64>; 2] {
         let scale = self.camera.arcsec_per_px();
-        std::array::from_fn(|axis| {
-            let rows = self.projected[axis].par_iter().enumerate();
-            let at = |(row, p): (usize, &f64)| {
-                p + (shift_arcsec[axis][row] - self.turned_arcsec(row)[axis]) / scale[axis]
-            };
-            rows.map(at).collect()
-        })
+        let rows = (0..self.t_s.len()).into_par_iter();
+        let (x, y) = rows
+            .map(|row| {
+                let turned = self.turned_arcsec(row);
+                let at = |axis: usize| {
+                    let shift = shift_arcsec[axis][row] - turned[axis];
+                    self.projected[axis][row] + shift / scale[axis]
+                };
+                (at(0), at(1))
+            })
+            .unzip();
+        [x, y]
     }
 
     /// Where the light falls, as far as is known, px.
