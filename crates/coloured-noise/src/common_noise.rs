@@ -10,24 +10,15 @@
 //! b_k+1 = D_k b_k + n_k        per axis first-order Gauss-Markov (coloured.rs)
 //! ```
 //!
-//! The Kalman filter of these three states turns theta^ into innovations that are
-//! independent and, times the inverse root of their covariance, of unit variance;
-//! the rest is divided by sigma. Columns go through the same linear filter, so
-//! that least squares afterwards is generalised least squares. The log-likelihood
-//! in the unit of the residuals then lacks, frame by frame,
+//! The slow parts are those of greatest likelihood axis by axis, the white ones of all axes together
+//! (joint.rs): stars off the boresight know one mixture of rotations far better than any axis of it.
 //!
-//! ```text
-//! -1/2 ln det F_k - 1/2 ln det N_k - (2 m_k - 3) ln sigma,    F_k: covariance of the innovation
-//! ```
-//!
-//! Source: Brown & Hwang 2012, ch. 4 and 5 (Gauss-Markov process, Kalman filter);
-//! statistics.md of the design notes, point 9.
+//! Source: Brown & Hwang 2012, ch. 4 (Gauss-Markov process).
 
-use std::ops::Range;
-
-use nalgebra::{DMatrix, Matrix3, Vector3};
+use nalgebra::{DMatrix, Matrix3};
 
 use crate::coloured::{Coloured, fit_alike};
+use crate::joint::Joint;
 
 /// Half the relative difference of two noises that serve a fit alike.
 const ALIKE: f64 = 0.02;
@@ -48,29 +39,36 @@ pub struct Rotations {
     t_s: Vec<f64>,
     /// Mean rotation of each bin per axis.
     mean: [Vec<f64>; 3],
+    /// Frames of each bin.
+    frames: Vec<usize>,
+    /// `(A^T A)^-1` of each bin; `None`: left out.
+    inverse: Vec<Option<Matrix3<f64>>>,
     /// Stars' worth of each bin: the centroid variance over it is the mean's.
     count: [Vec<f64>; 3],
     centroid: f64,
-    frames_per_bin: f64,
 }
 
 impl Rotations {
-    /// Mean rotations `mean` about X, Y and Z of bins of consecutive frames at `t_s`, s, each bin of as many
-    /// frames as `frames_per_bin` on average. `count` is the stars' worth of each mean: the variance
-    /// `centroid^2` of a centroid over it is the mean's; 0 leaves a bin out.
+    /// Mean rotations `theta` about X, Y and Z, three rows a bin, of bins of so many consecutive `frames` at
+    /// `t_s`, s. `inverse` is `(A^T A)^-1` of each bin's stars: times the variance `centroid^2` of a centroid
+    /// it is the covariance of their mean rotation; `None` leaves a bin out.
     pub fn new(
         t_s: Vec<f64>,
-        mean: [Vec<f64>; 3],
-        count: [Vec<f64>; 3],
+        theta: &[f64],
+        frames: Vec<usize>,
+        inverse: Vec<Option<Matrix3<f64>>>,
         centroid: f64,
-        frames_per_bin: f64,
     ) -> Self {
+        let mean = std::array::from_fn(|a| theta.iter().skip(a).step_by(3).copied().collect());
+        let worth = |a: usize| move |v: &Option<Matrix3<f64>>| v.map_or(0.0, |v| v[(a, a)].recip());
+        let count = std::array::from_fn(|a| inverse.iter().map(worth(a)).collect());
         Self {
             t_s,
             mean,
+            frames,
+            inverse,
             count,
             centroid,
-            frames_per_bin,
         }
     }
 
@@ -80,28 +78,42 @@ impl Rotations {
             let (y, count) = (&self.mean[axis], &self.count[axis]);
             // rotations are no whiter than their stars: a slow part of less than a step between frames is
             // white noise by another name
-            let least = self.centroid;
             let fitted = match near.map(|n| n.reference[axis]) {
-                Some(known) if known.slow > 0.0 => self
-                    .with_centroids(axis, known)
-                    .refit_above(least, &self.t_s, y, count),
-                _ => Coloured::fit_above(least, &self.t_s, y, count),
+                Some(known) if known.slow > 0.0 => self.by_itself(axis, known),
+                _ => Coloured::fit_above(self.centroid, &self.t_s, y, count),
             };
             self.beside_centroids(axis, fitted)
         };
         let (x, (y, z)) = rayon::join(|| of(0), || rayon::join(|| of(1), || of(2)));
-        let reference = [x, y, z];
-        CommonNoise {
+        let apart = CommonNoise {
             centroid: self.centroid,
-            reference,
+            reference: [x, y, z],
+        };
+        self.joint(&apart).0
+    }
+
+    /// `noise` with the white parts that suit all axes together, and the log-likelihood.
+    fn joint(&self, noise: &CommonNoise) -> (CommonNoise, f64) {
+        let [x, y, z] = &self.mean;
+        let rows = x.iter().zip(y).zip(z).flat_map(|((x, y), z)| [*x, *y, *z]);
+        let theta = DMatrix::from_iterator(3 * self.t_s.len(), 1, rows);
+        Joint {
+            t_s: &self.t_s,
+            theta: &theta,
+            frames: &self.frames,
+            inverse: &self.inverse,
         }
+        .with_white(noise)
     }
 
     /// How much more likely each axis's rotations are with the slow error than
-    /// without: twice the gain in log-likelihood.
+    /// without, by themselves: twice the gain in log-likelihood.
     pub fn slow_ratio(&self, noise: &CommonNoise) -> [f64; 3] {
         std::array::from_fn(|axis| {
-            let with = self.with_centroids(axis, noise.reference[axis]);
+            if noise.reference[axis].slow <= 0.0 {
+                return 0.0;
+            }
+            let with = self.by_itself(axis, noise.reference[axis]);
             let likely = with.log_likelihood(&self.t_s, &self.mean[axis], &self.count[axis]);
             2.0 * (likely - self.white_alone(axis))
         })
@@ -110,15 +122,58 @@ impl Rotations {
     /// As [`slow_ratio`](Self::slow_ratio), of X and Y together with a slow error that is the same about
     /// both: a reference knows no axis across its boresight from another.
     pub fn alike_ratio(&self, noise: &CommonNoise) -> f64 {
-        let both = [0, 1].map(|axis| (self.mean[axis].as_slice(), self.count[axis].as_slice()));
         let white: f64 = (0..2).map(|axis| self.white_alone(axis)).sum();
+        self.alike(noise)
+            .map_or(0.0, |(_, likely)| 2.0 * (likely - white))
+            .max(0.0)
+    }
+
+    /// The slow error that is the same about X and Y, and the log-likelihood of both by themselves.
+    fn alike(&self, noise: &CommonNoise) -> Option<(Coloured, f64)> {
+        let both = [0, 1].map(|axis| (self.mean[axis].as_slice(), self.count[axis].as_slice()));
         let starts = (0..2).filter(|&axis| noise.reference[axis].slow > 0.0);
-        let best = starts.filter_map(|axis| {
+        let fitted = starts.filter_map(|axis| {
             let start = self.with_centroids(axis, noise.reference[axis]);
-            fit_alike(self.centroid, &self.t_s, &both, &start).map(|(_, likely)| likely)
+            fit_alike(self.centroid, &self.t_s, &both, &start)
         });
-        best.map(|likely| 2.0 * (likely - white))
-            .fold(0.0, f64::max)
+        fitted.max_by(|a, b| a.1.total_cmp(&b.1))
+    }
+
+    /// What the slow parts of `noise` gain.
+    pub fn slow_gains(&self, noise: &CommonNoise) -> SlowGains {
+        let (_, with) = self.joint(noise);
+        let without = |axes: &[usize]| {
+            let mut rest = *noise;
+            for &axis in axes {
+                rest.reference[axis].slow = 0.0;
+            }
+            self.joint(&rest).1
+        };
+        let slow = |axis: usize| noise.reference[axis].slow > 0.0;
+        let axes = std::array::from_fn(|axis| {
+            let gain = || with - without(&[axis]);
+            if slow(axis) { gain().max(0.0) } else { 0.0 }
+        });
+        if !slow(0) && !slow(1) {
+            return SlowGains {
+                axes,
+                across: 0.0,
+                alike: 0.0,
+            };
+        }
+        let neither = without(&[0, 1]);
+        let alike = self.alike(noise).map_or(neither, |(alike, _)| {
+            let mut same = *noise;
+            for part in &mut same.reference[..2] {
+                (part.slow, part.tau_s) = (alike.slow, alike.tau_s);
+            }
+            self.joint(&same).1
+        });
+        SlowGains {
+            axes,
+            across: (with - neither).max(0.0),
+            alike: (alike - neither).max(0.0),
+        }
     }
 
     /// Log-likelihood of an axis's rotations under white noise.
@@ -134,10 +189,27 @@ impl Rotations {
         .log_likelihood(&self.t_s, y, count)
     }
 
-    /// Standard errors of the slow part of an axis, relative: of sigma and of tau.
+    /// The noise of an axis's rotations by themselves, from `reference` uphill; it has a slow part.
+    fn by_itself(&self, axis: usize, reference: Coloured) -> Coloured {
+        self.with_centroids(axis, reference).refit_above(
+            self.centroid,
+            &self.t_s,
+            &self.mean[axis],
+            &self.count[axis],
+        )
+    }
+
+    /// Standard errors of the slow part of an axis, relative: of sigma and of tau. `None`: it has none.
     pub fn slow_sigma(&self, noise: &CommonNoise, axis: usize) -> Option<[f64; 2]> {
-        self.with_centroids(axis, noise.reference[axis])
-            .relative_sigma(&self.t_s, &self.mean[axis], &self.count[axis])
+        let reference = noise.reference[axis];
+        if reference.slow <= 0.0 {
+            return None;
+        }
+        self.by_itself(axis, reference).relative_sigma(
+            &self.t_s,
+            &self.mean[axis],
+            &self.count[axis],
+        )
     }
 
     /// Noise of a rotation with that of its centroids, in the unit of a centroid.
@@ -160,10 +232,23 @@ impl Rotations {
     }
 
     fn usual_count(&self, axis: usize) -> f64 {
-        let kept = self.count[axis].iter().filter(|c| **c > 0.0).count().max(1);
+        let bins = self.count[axis].iter().zip(&self.frames);
+        let kept = bins.filter(|(c, _)| **c > 0.0);
         // a bin averages the reference's white noise as it does the centroids'
-        self.count[axis].iter().sum::<f64>() / (kept as f64 * self.frames_per_bin)
+        let (stars, frames) = kept.fold((0.0, 0), |(s, n), (c, f)| (s + c, n + f));
+        stars / frames.max(1) as f64
     }
+}
+
+/// What slow errors gain in log-likelihood over white noise alone, nats, all axes held together.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SlowGains {
+    /// That of each axis beside the others'.
+    pub axes: [f64; 3],
+    /// Those of X and Y.
+    pub across: f64,
+    /// One that is the same about X and Y in their place.
+    pub alike: f64,
 }
 
 impl CommonNoise {
@@ -174,101 +259,6 @@ impl CommonNoise {
             .iter()
             .zip(&other.reference)
             .all(|(a, b)| close(a.slow, b.slow) && (a.slow <= 0.0 || close(a.tau_s, b.tau_s)))
-    }
-}
-
-/// One bin of the filter.
-#[derive(Clone, Debug)]
-struct Step {
-    decay: Vector3<f64>,
-    gain: Matrix3<f64>,
-    /// L^-1 with F = L L^T; `None`: the bin has no attitude.
-    whitening: Option<Matrix3<f64>>,
-}
-
-/// The filter with its gains: they depend on times and stars alone.
-#[derive(Clone, Debug)]
-pub struct Filter {
-    steps: Vec<Step>,
-    /// What the log-likelihood of the innovations lacks to that of what the stars of each bin share, nats:
-    /// `-1/2 ln det F - 1/2 ln det N` summed over the bins, F the covariance of an innovation and N the normal
-    /// matrix of a rotation.
-    pub log_scale: f64,
-}
-
-impl Filter {
-    /// For bins at `t_s`, s, of so many `frames`, with the inverse normal matrix `(A^T A)^-1` of each
-    /// bin's rotation; `None` where its stars fix none.
-    pub fn new(
-        noise: &CommonNoise,
-        t_s: &[f64],
-        frames: &[usize],
-        inverse: &[Option<Matrix3<f64>>],
-    ) -> Self {
-        let per_axis =
-            |f: fn(&Coloured) -> f64| Vector3::from_iterator(noise.reference.iter().map(f));
-        let slow = per_axis(|r| r.slow * r.slow);
-        let white = Matrix3::from_diagonal(&per_axis(|r| r.white * r.white));
-        let variance = noise.centroid * noise.centroid;
-        let mut covariance = Matrix3::from_diagonal(&slow);
-        let mut log_scale = 0.0;
-        let mut steps = Vec::with_capacity(t_s.len());
-        for (bin, inverse) in inverse.iter().enumerate() {
-            let decay = if bin == 0 {
-                Vector3::zeros()
-            } else {
-                let step = t_s[bin] - t_s[bin - 1];
-                per_axis(|r| r.tau_s).map(|tau| (-step / tau).exp())
-            };
-            let d = Matrix3::from_diagonal(&decay);
-            let fresh = slow.zip_map(&decay, |s, d| s * (1.0 - d * d));
-            covariance = d * covariance * d + Matrix3::from_diagonal(&fresh);
-            let mut step = Step {
-                decay,
-                gain: Matrix3::zeros(),
-                whitening: None,
-            };
-            if let Some(inverse) = inverse
-                && let Some(factor) =
-                    (covariance + inverse * variance + white / frames[bin] as f64).cholesky()
-                && let Some(whitening) = factor.l().try_inverse()
-            {
-                step.gain = covariance * factor.inverse();
-                covariance -= step.gain * covariance;
-                covariance = 0.5 * (covariance + covariance.transpose());
-                log_scale += whitening.determinant().ln() + 0.5 * inverse.determinant().ln();
-                step.whitening = Some(whitening);
-            }
-            steps.push(step);
-        }
-        Self { steps, log_scale }
-    }
-
-    /// Whitened innovations of `columns` of `theta` (three rows a bin) at the bins `steps`, which are all that
-    /// `theta` holds; `state` is where the filter stands for each of `columns`, zero at first, and goes on
-    /// from block to block.
-    pub fn innovations(
-        &self,
-        steps: Range<usize>,
-        theta: &DMatrix<f64>,
-        columns: &[usize],
-        state: &mut [Vector3<f64>],
-    ) -> DMatrix<f64> {
-        let mut out = DMatrix::zeros(theta.nrows(), columns.len());
-        for ((&column, state), mut out) in columns.iter().zip(state).zip(out.column_iter_mut()) {
-            let theta = theta.column(column);
-            for (bin, step) in self.steps[steps.clone()].iter().enumerate() {
-                let mut mean = state.component_mul(&step.decay);
-                if let Some(whitening) = &step.whitening {
-                    let innovation = theta.fixed_rows::<3>(3 * bin) - mean;
-                    out.fixed_rows_mut::<3>(3 * bin)
-                        .copy_from(&(whitening * innovation));
-                    mean += step.gain * innovation;
-                }
-                *state = mean;
-            }
-        }
-        out
     }
 }
 
@@ -297,9 +287,18 @@ mod tests {
             }
             series
         });
+        let theta: Vec<f64> = (0..frames)
+            .flat_map(|k| mean.each_ref().map(|m| m[k]))
+            .collect();
         let t_s = (0..frames).map(|k| STEP_S * k as f64).collect();
-        let count = std::array::from_fn(|_| vec![STARS; frames]);
-        Rotations::new(t_s, mean, count, CENTROID, 1.0)
+        let inverse = Some(Matrix3::identity() / STARS);
+        Rotations::new(
+            t_s,
+            &theta,
+            vec![1; frames],
+            vec![inverse; frames],
+            CENTROID,
+        )
     }
 
     /// White rotations leave nothing to a slow error: what is claimed of one is likelier than white noise, or

@@ -25,7 +25,7 @@
 //! | the noise taken out of series and regressors | [`Coloured::whiten`] |
 //! | many steps at once | [`Coloured::steps`] |
 //! | likelihoods of rival noises | [`Coloured::log_likelihood`], [`LogProduct`] |
-//! | rotations of frames, and whether their error is slow | [`Rotations`] |
+//! | rotations of frames, and whether their error is slow | [`Rotations`], [`SlowGains`] |
 //! | the noise taken out of their columns | [`Filter`] |
 //!
 //! Series and sigmas are in one unit, whatever it is; times are seconds.
@@ -66,6 +66,9 @@
 
 mod coloured;
 mod common_noise;
+mod filter;
+mod joint;
 
 pub use coloured::{Coloured, LogProduct};
-pub use common_noise::{CommonNoise, Filter, Rotations};
+pub use common_noise::{CommonNoise, Rotations, SlowGains};
+pub use filter::Filter;

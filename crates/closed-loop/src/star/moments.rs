@@ -328,30 +328,25 @@ impl StarMoments {
         );
         let sse = left.dot(&(pick(self.rest(), columns) * &left));
         let mut rest = 0.0;
-        let mut mean: [Vec<f64>; 3] = std::array::from_fn(|_| Vec::with_capacity(self.t_s.len()));
-        let mut count = mean.clone();
+        let mut rotations = Vec::with_capacity(3 * self.t_s.len());
+        let mut inverse = Vec::with_capacity(self.t_s.len());
         for kept in &self.blocks {
             rest += kept.rest_scalars;
             let mut theta = kept.theta.column(residual).into_owned();
             for (&column, b) in fitted.iter().zip(beta.iter()) {
                 theta.axpy(-b, &kept.theta.column(column), 1.0);
             }
-            for (bin, inverse) in kept.inverse.iter().enumerate() {
-                for axis in 0..3 {
-                    mean[axis].push(theta[3 * bin + axis]);
-                    count[axis].push(inverse.map_or(0.0, |v| v[(axis, axis)].recip()));
-                }
-            }
+            rotations.extend_from_slice(theta.as_slice());
+            inverse.extend_from_slice(&kept.inverse);
         }
         let freedom = rest - freedom as f64;
         (freedom > 0.0).then(|| {
-            let frames = self.frames.iter().sum::<usize>();
             Rotations::new(
                 self.t_s.clone(),
-                mean,
-                count,
+                &rotations,
+                self.frames.clone(),
+                inverse,
                 (sse.max(0.0) / freedom).sqrt(),
-                frames as f64 / self.t_s.len().max(1) as f64,
             )
         })
     }

@@ -55,6 +55,9 @@ pub(crate) const WIDENING: f64 = 1.3;
 /// What a slow error of an axis pays for its size and correlation time, nats: a size is
 /// known to a fifth and a time to a factor of two, within the decades that they may have.
 const SLOW_PRICE: f64 = 4.0;
+/// What slow errors across the boresight pay beside that if they are not the same about both axes, nats: a
+/// reference in ten is so.
+const APART: f64 = 2.3;
 /// Most effects that are added.
 const MOST: usize = 8;
 
@@ -368,16 +371,12 @@ impl Trial<'_> {
     /// for amplitudes the evidence under the spread that suits them best, for a slow
     /// error of an axis `slow_price`, or its absence where that costs less.
     fn worth(&self, scored: &Scored, slow_price: f64) -> f64 {
-        let slow = scored.rotations.slow_ratio(&scored.noise);
-        let paid = slow.map(|r| (0.5 * r).clamp(0.0, slow_price));
-        let across = if slow_price.is_finite() {
-            // or one error about both axes, paid for once
-            let alike = 0.5 * scored.rotations.alike_ratio(&scored.noise) - slow_price;
-            (paid[0] + paid[1]).min(0.5 * (slow[0] + slow[1]) - alike)
-        } else {
-            paid[0] + paid[1]
-        };
-        let without = across + paid[2];
+        let slow = scored.rotations.slow_gains(&scored.noise);
+        let paid = slow.axes.map(|gain| gain.min(slow_price));
+        // none across the boresight, one that is the same about both axes, or one about each that has one
+        let alike = slow.across - slow.alike + slow_price;
+        let apart = paid[0] + paid[1] + APART;
+        let without = slow.across.min(alike.max(0.0)).min(apart) + paid[2];
         let effects: f64 = scored
             .parts
             .iter()

@@ -1,0 +1,115 @@
+//! The filter that takes common noise out of the rotations of frames.
+//!
+//! The Kalman filter of the three states of [`CommonNoise`] turns rotations into innovations that are
+//! independent and, times the inverse root of their covariance, of unit variance; what no rotation
+//! explains is divided by sigma. Columns go through the same linear filter, so
+//! that least squares afterwards is generalised least squares. The log-likelihood
+//! in the unit of the residuals then lacks, frame by frame,
+//!
+//! ```text
+//! -1/2 ln det F_k - 1/2 ln det N_k - (2 m_k - 3) ln sigma,    F_k: covariance of the innovation
+//! ```
+//!
+//! Source: Brown & Hwang 2012, ch. 5 (Kalman filter); statistics.md of the design notes, point 9.
+
+use std::ops::Range;
+
+use nalgebra::{DMatrix, Matrix3, Vector3};
+
+use crate::coloured::Coloured;
+use crate::common_noise::CommonNoise;
+
+/// One bin of the filter.
+#[derive(Clone, Debug)]
+pub(crate) struct Step {
+    decay: Vector3<f64>,
+    gain: Matrix3<f64>,
+    /// L^-1 with F = L L^T; `None`: the bin has no attitude.
+    pub(crate) whitening: Option<Matrix3<f64>>,
+}
+
+/// The filter with its gains: they depend on times and stars alone.
+#[derive(Clone, Debug)]
+pub struct Filter {
+    pub(crate) steps: Vec<Step>,
+    /// What the log-likelihood of the innovations lacks to that of what the stars of each bin share, nats:
+    /// `-1/2 ln det F - 1/2 ln det N` summed over the bins, F the covariance of an innovation and N the normal
+    /// matrix of a rotation.
+    pub log_scale: f64,
+}
+
+impl Filter {
+    /// For bins at `t_s`, s, of so many `frames`, with the inverse normal matrix `(A^T A)^-1` of each
+    /// bin's rotation; `None` where its stars fix none.
+    pub fn new(
+        noise: &CommonNoise,
+        t_s: &[f64],
+        frames: &[usize],
+        inverse: &[Option<Matrix3<f64>>],
+    ) -> Self {
+        let per_axis =
+            |f: fn(&Coloured) -> f64| Vector3::from_iterator(noise.reference.iter().map(f));
+        let slow = per_axis(|r| r.slow * r.slow);
+        let white = Matrix3::from_diagonal(&per_axis(|r| r.white * r.white));
+        let variance = noise.centroid * noise.centroid;
+        let mut covariance = Matrix3::from_diagonal(&slow);
+        let mut log_scale = 0.0;
+        let mut steps = Vec::with_capacity(t_s.len());
+        for (bin, inverse) in inverse.iter().enumerate() {
+            let decay = if bin == 0 {
+                Vector3::zeros()
+            } else {
+                let step = t_s[bin] - t_s[bin - 1];
+                per_axis(|r| r.tau_s).map(|tau| (-step / tau).exp())
+            };
+            let d = Matrix3::from_diagonal(&decay);
+            let fresh = slow.zip_map(&decay, |s, d| s * (1.0 - d * d));
+            covariance = d * covariance * d + Matrix3::from_diagonal(&fresh);
+            let mut step = Step {
+                decay,
+                gain: Matrix3::zeros(),
+                whitening: None,
+            };
+            if let Some(inverse) = inverse
+                && let Some(factor) =
+                    (covariance + inverse * variance + white / frames[bin] as f64).cholesky()
+                && let Some(whitening) = factor.l().try_inverse()
+            {
+                step.gain = covariance * factor.inverse();
+                covariance -= step.gain * covariance;
+                covariance = 0.5 * (covariance + covariance.transpose());
+                log_scale += whitening.determinant().ln() + 0.5 * inverse.determinant().ln();
+                step.whitening = Some(whitening);
+            }
+            steps.push(step);
+        }
+        Self { steps, log_scale }
+    }
+
+    /// Whitened innovations of `columns` of `theta` (three rows a bin) at the bins `steps`, which are all that
+    /// `theta` holds; `state` is where the filter stands for each of `columns`, zero at first, and goes on
+    /// from block to block.
+    pub fn innovations(
+        &self,
+        steps: Range<usize>,
+        theta: &DMatrix<f64>,
+        columns: &[usize],
+        state: &mut [Vector3<f64>],
+    ) -> DMatrix<f64> {
+        let mut out = DMatrix::zeros(theta.nrows(), columns.len());
+        for ((&column, state), mut out) in columns.iter().zip(state).zip(out.column_iter_mut()) {
+            let theta = theta.column(column);
+            for (bin, step) in self.steps[steps.clone()].iter().enumerate() {
+                let mut mean = state.component_mul(&step.decay);
+                if let Some(whitening) = &step.whitening {
+                    let innovation = theta.fixed_rows::<3>(3 * bin) - mean;
+                    out.fixed_rows_mut::<3>(3 * bin)
+                        .copy_from(&(whitening * innovation));
+                    mean += step.gain * innovation;
+                }
+                *state = mean;
+            }
+        }
+        out
+    }
+}
