@@ -93,35 +93,43 @@ fn too_large(described: &Described, set: &[usize], rest: &[usize]) -> Option<f64
 fn at_best(described: &Described, set: &[usize], rest: &[usize], times: f64) -> Option<f64> {
     let fits = &described.fitted.fits;
     let each = each(described.fitted.scalars);
-    let mut part = columns_of(&described.fitted.groups, set);
     let paid: f64 = set.iter().map(|&k| described.paid[k]).sum();
     let base = likelihood(fits, rest, &[])?;
-    let worth = |part: &[usize]| -> Option<f64> {
-        let price = paid + each * part.len() as f64;
-        Some(base + (likelihood(fits, rest, part)? - base) / times - price)
-    };
-    let mut best = worth(&part)?;
+    let part = columns_of(&described.fitted.groups, set);
+    let (likelihood, part) = needed(fits, rest, part, times, each)?;
+    Some(base + (likelihood - base) / times - paid - each * part.len() as f64)
+}
+
+/// The columns of `part` that are needed beside `rest`, one that is worth less than its price after the
+/// other left out, and the likelihood with them; gains count by `times` less, and a column costs `each`.
+fn needed(
+    fits: &Fits,
+    rest: &[usize],
+    mut part: Vec<usize>,
+    times: f64,
+    each: f64,
+) -> Option<(f64, Vec<usize>)> {
+    let mut best = likelihood(fits, rest, &part)?;
     while part.len() > 1 {
         let fewer = (0..part.len()).filter_map(|at| {
             let mut less = part.clone();
             less.remove(at);
-            Some((worth(&less)?, less))
+            Some((likelihood(fits, rest, &less)?, less))
         });
         let Some((value, less)) = fewer.max_by(|a, b| a.0.total_cmp(&b.0)) else {
             break;
         };
-        if value <= best {
+        if (best - value) / times >= each {
             break;
         }
         (best, part) = (value, less);
     }
-    Some(best)
+    Some((best, part))
 }
 
-/// The term of a description that is worth most: by how much, and the likelihood with it.
+/// The term of a description that is worth most, and by how much.
 struct Best<'a> {
     more: f64,
-    likelihood: f64,
     term: usize,
     part: &'a [usize],
 }
@@ -171,7 +179,6 @@ fn describe_at(described: &Described, rest: &[usize], times: f64) -> Option<(f64
                 if more > WORTH && best.as_ref().is_none_or(|best| more > best.more) && certain() {
                     best = Some(Best {
                         more,
-                        likelihood,
                         term: k,
                         part,
                     });
@@ -179,11 +186,12 @@ fn describe_at(described: &Described, rest: &[usize], times: f64) -> Option<(f64
             }
         }
         let Some(best) = best else { break };
-        worth += best.more;
-        base = best.likelihood;
-        with.extend(best.part);
+        let (likelihood, part) = needed(fits, &with, best.part.to_vec(), times, each)?;
+        worth += (likelihood - base) / times - each * part.len() as f64;
+        base = likelihood;
         let first = described.terms[best.term].first;
-        parts.push((best.term, best.part.iter().map(|c| c - first).collect()));
+        parts.push((best.term, part.iter().map(|c| c - first).collect()));
+        with.extend(part);
     }
     (!parts.is_empty()).then_some((worth, parts))
 }
