@@ -17,8 +17,8 @@
 //!
 //! Both pay for their k columns and for the c among which each of their parts was looked for: two
 //! misplaced stars are two choices of many, one slope is one. A description takes the columns
-//! that it needs, one axis of three, say: so the set pays for no more either, and is judged at
-//! its best part.
+//! that it needs, one axis of three, say, and pays for having picked them: so the set pays for no more either,
+//! and is judged at its best part.
 //!
 //! A line that the motion describes nearly as well is the motion's: of all frequencies it would have come
 //! upon that at which the tracker moves.
@@ -26,6 +26,7 @@
 //! Source: Schwarz 1978 for the price of a parameter.
 
 use block_regression::{Estimate, Fits};
+use statrs::function::factorial::ln_binomial;
 
 use crate::causes::description::Described;
 use crate::search::selection::{FAMILY_ALPHA, columns_of, each};
@@ -127,9 +128,10 @@ fn needed(
     Some((best, part))
 }
 
-/// The term of a description that is worth most, and by how much.
+/// The term of a description that is worth most: by how much, and the likelihood with it.
 struct Best<'a> {
     more: f64,
+    likelihood: f64,
     term: usize,
     part: &'a [usize],
 }
@@ -179,6 +181,7 @@ fn describe_at(described: &Described, rest: &[usize], times: f64) -> Option<(f64
                 if more > WORTH && best.as_ref().is_none_or(|best| more > best.more) && certain() {
                     best = Some(Best {
                         more,
+                        likelihood,
                         term: k,
                         part,
                     });
@@ -186,8 +189,18 @@ fn describe_at(described: &Described, rest: &[usize], times: f64) -> Option<(f64
             }
         }
         let Some(best) = best else { break };
-        let (likelihood, part) = needed(fits, &with, best.part.to_vec(), times, each)?;
-        worth += (likelihood - base) / times - each * part.len() as f64;
+        let mut more = best.more;
+        let (mut likelihood, mut part) = (best.likelihood, best.part.to_vec());
+        // a star is one place
+        if !described.terms[best.term].term.is_of_many() {
+            let (fewer, needed) = needed(fits, &with, part.clone(), times, each)?;
+            let picked = ln_binomial(part.len() as u64, needed.len() as u64);
+            let its = (fewer - base) / times - each * needed.len() as f64 - picked;
+            if its > more {
+                (more, likelihood, part) = (its, fewer, needed);
+            }
+        }
+        worth += more;
         base = likelihood;
         let first = described.terms[best.term].first;
         parts.push((best.term, part.iter().map(|c| c - first).collect()));
