@@ -437,12 +437,12 @@ impl<'a, 'd> Trial<'a, 'd> {
         let evidence = (self.with_noise)(noise);
         let design = evidence.whitened(&binned);
         let fitted = fit_design(&evidence, design.as_ref(), self.folds, &candidates).ok()?;
-        let amplitudes = amplitudes(&fitted, self.folds, &all, columns)?;
-        let predicted = evidence.generalised(self.folds, &binned, &amplitudes);
+        let set = columns_of(&fitted.groups, &all);
+        let out_of_fold = fitted.fits.out_of_fold(&set)?.total_loglik();
         Some(Scored {
             noise,
             loglik,
-            out_of_fold: self.loglik(&noise, &predicted),
+            out_of_fold: out_of_fold + self.log_scale(&noise),
             credible,
             amplitudes: values,
         })
@@ -495,6 +495,15 @@ impl<'a, 'd> Trial<'a, 'd> {
             candidates: vec![beta],
         };
         evidence.generalised(&one, binned, &amplitudes)
+    }
+
+    /// What the log-likelihood of whitened values lacks to that of the values themselves, nats.
+    fn log_scale(&self, noise: &[Coloured; 3]) -> f64 {
+        let nothing = vec![0.0; self.data.bins.t_s.len()];
+        let all = self.data.count.iter().flatten();
+        let scalars = all.filter(|n| **n > 0.0).count() as f64;
+        let scale = self.loglik(noise, &std::array::from_fn(|_| nothing.clone()));
+        scale + 0.5 * scalars * std::f64::consts::TAU.ln()
     }
 
     fn loglik(&self, noise: &[Coloured; 3], residual: &[Vec<f64>; 3]) -> f64 {
