@@ -249,16 +249,17 @@ impl Bench<'_> {
         }
         let without = self.without(full, k);
         let value = full.at[k];
-        let [blocks, stars, cells] = self.model.covariance(
+        let known = self.model.covariance(
             full,
             &self.rows,
             [&|r| r.block, &|r| r.star, &|r| {
                 r.block * self.stars + r.star
             }],
         );
-        let variance = |c: &Option<(super::variance::Matrix, usize)>| {
-            c.as_ref().map_or(0.0, |(m, _)| m[(k, k)])
-        };
+        // variances, and of how many sums
+        let [blocks, stars, cells] = known.map_or([(0.0, 0); 3], |c| {
+            c.clustered.map(|(matrix, count)| (matrix[(k, k)], count))
+        });
         let widened = self.model.widening(&full.at, &self.rows);
         // what has to be shown is more than what passes for nothing
         let least = if k == MAGNITUDE {
@@ -270,16 +271,11 @@ impl Bench<'_> {
         let ratio = 2.0 * (full.loglik - self.with(full, k, nearest).loglik) / widened;
         let mut p = likely(ratio, 1.0);
         let beyond = value - nearest;
-        p = p.max(wald(
-            beyond,
-            variance(&blocks),
-            blocks.as_ref().map_or(0, |c| c.1),
-            1,
-        ));
-        let mut sigma2 = variance(&blocks).max(variance(&cells));
+        p = p.max(wald(beyond, blocks.0, blocks.1, 1));
+        let mut sigma2 = blocks.0.max(cells.0);
         if k == MAGNITUDE {
-            let count = stars.as_ref().map_or(0, |c| c.1);
-            let variance = variance(&stars) * of_few(count, 2);
+            let (variance, count) = stars;
+            let variance = variance * of_few(count, 2);
             p = p.max(wald(beyond, variance, count, 2));
             sigma2 = sigma2.max(variance);
         }
@@ -353,14 +349,18 @@ impl Bench<'_> {
         let gain = self.gain(&rows, &with, &without);
         let share = sigmoid(with.at[SHARE]);
         let size = (0.5 * with.at[SIZE]).exp();
-        let covariances = self.model.covariance(
+        let known = self.model.covariance(
             &with,
             &rows,
             [&|r| r.block, &|r| r.block * self.stars + r.star],
         );
+        // a handful of spikes do not tell how they scatter
         let sigma = |k: usize| -> f64 {
-            let of = covariances.iter().flatten().map(|(m, _)| m[(k, k)]);
-            of.fold(0.0, f64::max).sqrt()
+            let all = known.iter().flat_map(|c| {
+                let clustered = c.clustered.iter().map(|(matrix, _)| matrix);
+                clustered.chain([&c.model])
+            });
+            all.map(|m| m[(k, k)]).fold(0.0, f64::max).sqrt()
         };
         let enough = share * rows.len() as f64 >= MIN_SPIKES
             && with.loglik > self.model.loglik_of_tails(&with.at, &rows) + BEYOND_TAILS;

@@ -258,20 +258,27 @@ impl Model {
         Vector::from_fn(|k, _| at[k].clamp(bounds[k][0], bounds[k][1]))
     }
 
-    /// Covariance of the free parameters and the number of clusters, for clusters numbered by each of
-    /// `clusters`. Parameters that are not free, or stand at a bound, have none.
+    /// Covariances of the free parameters. Parameters that are not free, or stand at a bound, have none.
+    /// `None`: `fit` is no summit.
     pub(super) fn covariance<const N: usize>(
         &self,
         fit: &Fit,
         rows: &[Row],
         clusters: [&dyn Fn(&Row) -> usize; N],
-    ) -> [Option<(Matrix, usize)>; N] {
+    ) -> Option<Covariance<N>> {
         let bounds = self.bounds();
         let inside: Vec<usize> = (0..PARAMETERS)
             .filter(|&k| fit.free[k] && fit.at[k] > bounds[k][0] && fit.at[k] < bounds[k][1])
             .collect();
-        let Some(inverse) = self.inverse_hessian(fit, rows, &inside) else {
-            return [const { None }; N];
+        let inverse = self.inverse_hessian(fit, rows, &inside)?;
+        let spread = |small: &nalgebra::DMatrix<f64>| {
+            let mut out = Matrix::zeros();
+            for (i, &row) in inside.iter().enumerate() {
+                for (j, &column) in inside.iter().enumerate() {
+                    out[(row, column)] = small[(i, j)];
+                }
+            }
+            out
         };
         let there = self.there(&fit.at);
         let mut levels = Levels::default();
@@ -279,7 +286,7 @@ impl Model {
             .iter()
             .map(|row| there.row(row, levels.own(&there, row)).1)
             .collect();
-        clusters.map(|cluster| {
+        let clustered = clusters.map(|cluster| {
             let p = inside.len();
             let count = rows.iter().map(|r| cluster(r) + 1).max().unwrap_or(0);
             let mut score = vec![Vector::zeros(); count];
@@ -295,14 +302,11 @@ impl Model {
                 middle += &s * s.transpose();
             }
             let widened = clusters as f64 / (clusters.max(2) - 1) as f64;
-            let small = &inverse * middle * &inverse * widened;
-            let mut out = Matrix::zeros();
-            for i in 0..p {
-                for j in 0..p {
-                    out[(inside[i], inside[j])] = small[(i, j)];
-                }
-            }
-            Some((out, clusters))
+            (spread(&(&inverse * middle * &inverse * widened)), clusters)
+        });
+        Some(Covariance {
+            model: spread(&inverse),
+            clustered,
         })
     }
 
@@ -348,6 +352,14 @@ impl Model {
             1.0
         }
     }
+}
+
+/// How well parameters are known.
+pub(super) struct Covariance<const N: usize> {
+    /// As the model says.
+    pub(super) model: Matrix,
+    /// As the sums over clusters scatter, and how many there are, for each way of numbering them.
+    pub(super) clustered: [(Matrix, usize); N],
 }
 
 /// The model at a point: what all rows share.
