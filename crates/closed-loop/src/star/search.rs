@@ -14,11 +14,12 @@
 //! with its own noise and all that its freedom costs,
 //!
 //! ```text
-//! worth = L - sum over effects ( ln cost + k/2 (1 + ln(q/k)) ) - 4 a slow axis
+//! worth = L - sum over effects ( ln cost + k/2 (1 + ln(q/k)) ) - sum over slow errors ( 4 )
 //! ```
 //!
 //! k parameters (instant, frequency and lag too), q the square of the amplitudes over
-//! their errors: the evidence if effects are spread like what was found. Without a slow
+//! their errors: the evidence if effects are spread like what was found. One slow error may act about X and Y
+//! alike; what differs about them, as hardly a reference does, pays more. Without a slow
 //! error the noise is white, so that what such an error would add is taken off. The
 //! likelier explanation is named; an effect that is worth less than a slow error in its
 //! place is not, even if that error would not be named either. The log-odds of a step of
