@@ -19,7 +19,7 @@
 //!
 //! k parameters (instant, frequency and lag too), q the square of the amplitudes over
 //! their errors: the evidence if effects are spread like what was found. One slow error may act about X and Y
-//! alike. Without a slow
+//! alike; what differs about them pays ln 2 more. Without a slow
 //! error the noise is white, so that what such an error would add is taken off. The
 //! likelier explanation is named; an effect that is worth less than a slow error in its
 //! place is not, even if that error would not be named either. The log-odds of a step of
@@ -56,6 +56,8 @@ pub(crate) const WIDENING: f64 = 1.3;
 /// What a slow error of an axis pays for its size and correlation time, nats: a size is
 /// known to a fifth and a time to a factor of two, within the decades that they may have.
 const SLOW_PRICE: f64 = 4.0;
+/// What slow errors pay beside that if they are not the same about X and Y, nats: every other one is so.
+const APART: f64 = std::f64::consts::LN_2;
 /// Most effects that are added.
 const MOST: usize = 8;
 
@@ -373,7 +375,7 @@ impl Trial<'_> {
         let paid = slow.axes.map(|gain| gain.min(slow_price));
         // none across the boresight, one that is the same about both axes, or one about each that has one
         let alike = slow.across - slow.alike + slow_price;
-        let apart = paid[0] + paid[1];
+        let apart = paid[0] + paid[1] + APART;
         let without = slow.across.min(alike.max(0.0)).min(apart) + paid[2];
         let effects: f64 = scored
             .parts
