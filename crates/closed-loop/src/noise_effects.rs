@@ -224,10 +224,9 @@ pub(crate) fn claim(
         },
         outliers: declared_outliers(situation)?,
     };
-    let Some(verdicts) = judge(&make, folds, known) else {
+    let Some(mut verdicts) = judge(&make, folds, known) else {
         return Ok(NoiseEffects::default());
     };
-    let mut verdicts = verdicts;
     if verdicts.magnitude.stands || verdicts.rate.stands {
         let quick = quick(data, residual);
         let source = Source {

@@ -37,7 +37,8 @@ pub struct CommonNoise {
 pub struct Rotations {
     /// Mean time of each bin, s.
     t_s: Vec<f64>,
-    /// Mean rotation of each bin per axis.
+    /// Mean rotation of each bin, three rows a bin, and the same per axis.
+    theta: DMatrix<f64>,
     mean: [Vec<f64>; 3],
     /// Frames of each bin.
     frames: Vec<usize>,
@@ -54,7 +55,7 @@ impl Rotations {
     /// it is the covariance of their mean rotation; `None` leaves a bin out.
     pub fn new(
         t_s: Vec<f64>,
-        theta: &[f64],
+        theta: Vec<f64>,
         frames: Vec<usize>,
         inverse: Vec<Option<Matrix3<f64>>>,
         centroid: f64,
@@ -64,6 +65,7 @@ impl Rotations {
         let count = std::array::from_fn(|a| inverse.iter().map(worth(a)).collect());
         Self {
             t_s,
+            theta: DMatrix::from_vec(theta.len(), 1, theta),
             mean,
             frames,
             inverse,
@@ -94,12 +96,9 @@ impl Rotations {
 
     /// `noise` with the white parts that suit all axes together, and the log-likelihood.
     fn joint(&self, noise: &CommonNoise) -> (CommonNoise, f64) {
-        let [x, y, z] = &self.mean;
-        let rows = x.iter().zip(y).zip(z).flat_map(|((x, y), z)| [*x, *y, *z]);
-        let theta = DMatrix::from_iterator(3 * self.t_s.len(), 1, rows);
         Joint {
             t_s: &self.t_s,
-            theta: &theta,
+            theta: &self.theta,
             frames: &self.frames,
             inverse: &self.inverse,
         }
@@ -292,13 +291,7 @@ mod tests {
             .collect();
         let t_s = (0..frames).map(|k| STEP_S * k as f64).collect();
         let inverse = Some(Matrix3::identity() / STARS);
-        Rotations::new(
-            t_s,
-            &theta,
-            vec![1; frames],
-            vec![inverse; frames],
-            CENTROID,
-        )
+        Rotations::new(t_s, theta, vec![1; frames], vec![inverse; frames], CENTROID)
     }
 
     /// White rotations leave nothing to a slow error: what is claimed of one is likelier than white noise, or

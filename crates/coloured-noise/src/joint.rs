@@ -238,7 +238,7 @@ mod tests {
             let data = OffAxis::new([0.0; 3], seed);
             let rotations = Rotations::new(
                 data.t_s.clone(),
-                data.theta.as_slice(),
+                data.theta.as_slice().to_vec(),
                 data.frames.clone(),
                 data.inverse.clone(),
                 CENTROID,

@@ -15,7 +15,7 @@ use block_regression::{BlockGrams, Design, Folds};
 use coloured_noise::Coloured;
 use effects::{AttitudeRows, Candidate};
 use focal_plane::{ARCSEC_PER_RAD, AttitudeResidual, AttitudeSeries, AttitudeSource, VectorsMut};
-use nalgebra::{DMatrix, UnitQuaternion};
+use nalgebra::{DMatrix, DVector, UnitQuaternion};
 use star_tracker::Disturbance;
 
 use crate::bins::{Bins, MOST};
@@ -143,29 +143,25 @@ pub(crate) struct AttitudeEvidence<'a> {
 }
 
 impl AttitudeEvidence<'_> {
-    /// Binned residuals with each fold's own constants and amplitudes, as the
+    /// Binned residuals beside `constant` and the amplitudes `beta`, as the
     /// whitening filter wants them, arcsec. `raw` is [`Self::binned`] of the
     /// candidates that the amplitudes belong to.
-    pub(crate) fn generalised(
+    pub(crate) fn left(
         &self,
-        folds: &Folds,
         raw: &DMatrix<f64>,
-        amplitudes: &Amplitudes,
+        constant: &DVector<f64>,
+        beta: &DVector<f64>,
     ) -> [Vec<f64>; 3] {
         let m = self.data.bins.rows.len();
-        let mut out: [Vec<f64>; 3] =
-            std::array::from_fn(|axis| self.data.binned(axis, &self.data.theta[axis]));
-        for (f, bins) in folds.fold_ranges().into_iter().enumerate() {
-            let (constant, beta) = (&amplitudes.nuisance[f], &amplitudes.candidates[f]);
-            for (axis, series) in out.iter_mut().enumerate() {
-                for k in bins.clone() {
-                    let row = raw.row(axis * m + k);
-                    let shift: f64 = (0..beta.len()).map(|j| row[3 + j] * beta[j]).sum();
-                    series[k] -= constant[axis] + shift;
-                }
+        std::array::from_fn(|axis| {
+            let mut series = self.data.binned(axis, &self.data.theta[axis]);
+            for (k, value) in series.iter_mut().enumerate() {
+                let row = raw.row(axis * m + k);
+                let shift: f64 = (0..beta.len()).map(|j| row[3 + j] * beta[j]).sum();
+                *value -= constant[axis] + shift;
             }
-        }
-        out
+            series
+        })
     }
 
     /// Constants and candidates of `rows`, arcsec, x then y then z of every row.

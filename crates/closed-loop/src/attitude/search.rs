@@ -32,7 +32,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 use crate::attitude::data::{AttitudeData, AttitudeEvidence};
 use crate::attitude::spatial_errors::SpatialErrors;
 use crate::error::CloseError;
-use crate::evidence::{Amplitudes, Evidence};
+use crate::evidence::Evidence;
 use crate::figures;
 use crate::search::empirical::EMPIRICAL;
 use crate::search::refusal::{Refusal, Refused};
@@ -489,21 +489,15 @@ impl<'a, 'd> Trial<'a, 'd> {
         for (i, &c) in set.iter().enumerate() {
             beta[c] = value[i];
         }
-        let one = Folds::whole(self.data.bins.rows.len());
-        let amplitudes = Amplitudes {
-            nuisance: vec![fitted.fits.nuisance(None, set, value)],
-            candidates: vec![beta],
-        };
-        evidence.generalised(&one, binned, &amplitudes)
+        evidence.left(binned, &fitted.fits.nuisance(None, set, value), &beta)
     }
 
     /// What the log-likelihood of whitened values lacks to that of the values themselves, nats.
     fn log_scale(&self, noise: &[Coloured; 3]) -> f64 {
-        let nothing = vec![0.0; self.data.bins.t_s.len()];
+        let nothing = std::array::from_fn(|_| vec![0.0; self.data.bins.t_s.len()]);
         let all = self.data.count.iter().flatten();
         let scalars = all.filter(|n| **n > 0.0).count() as f64;
-        let scale = self.loglik(noise, &std::array::from_fn(|_| nothing.clone()));
-        scale + 0.5 * scalars * std::f64::consts::TAU.ln()
+        self.loglik(noise, &nothing) + 0.5 * scalars * std::f64::consts::TAU.ln()
     }
 
     fn loglik(&self, noise: &[Coloured; 3], residual: &[Vec<f64>; 3]) -> f64 {

@@ -93,22 +93,44 @@ fn too_large(described: &Described, set: &[usize], rest: &[usize]) -> Option<f64
 /// Likelihood of `rest` and the part of `set` that is worth most, gains over `times`, after its price.
 fn at_best(described: &Described, set: &[usize], rest: &[usize], times: f64) -> Option<f64> {
     let fits = &described.fitted.fits;
-    let each = each(described.fitted.scalars);
+    let price = Price::of(described, times);
     let paid: f64 = set.iter().map(|&k| described.paid[k]).sum();
     let base = likelihood(fits, rest, &[])?;
     let part = columns_of(&described.fitted.groups, set);
-    let (likelihood, part) = needed(fits, rest, part, times, each)?;
-    Some(base + (likelihood - base) / times - paid - each * part.len() as f64)
+    let (likelihood, part) = needed(fits, rest, part, price)?;
+    Some(base + price.worth(likelihood - base, part.len()) - paid)
+}
+
+/// What columns pay.
+#[derive(Clone, Copy)]
+struct Price {
+    /// By how much less gains count.
+    times: f64,
+    /// Of a column, nats.
+    each: f64,
+}
+
+impl Price {
+    fn of(described: &Described, times: f64) -> Self {
+        Self {
+            times,
+            each: each(described.fitted.scalars),
+        }
+    }
+
+    /// What is left of `nats` that so many `columns` gain.
+    fn worth(self, nats: f64, columns: usize) -> f64 {
+        nats / self.times - self.each * columns as f64
+    }
 }
 
 /// The columns of `part` that are needed beside `rest`, one that is worth less than its price after the
-/// other left out, and the likelihood with them; gains count by `times` less, and a column costs `each`.
+/// other left out, and the likelihood with them.
 fn needed(
     fits: &Fits,
     rest: &[usize],
     mut part: Vec<usize>,
-    times: f64,
-    each: f64,
+    price: Price,
 ) -> Option<(f64, Vec<usize>)> {
     let mut best = likelihood(fits, rest, &part)?;
     while part.len() > 1 {
@@ -120,7 +142,7 @@ fn needed(
         let Some((value, less)) = fewer.max_by(|a, b| a.0.total_cmp(&b.0)) else {
             break;
         };
-        if (best - value) / times >= each {
+        if price.worth(best - value, 1) >= 0.0 {
             break;
         }
         (best, part) = (value, less);
@@ -156,7 +178,7 @@ pub(crate) fn describe(described: &Described, rest: &[usize]) -> Option<(f64, Ve
 /// The same where gains count by `times` less.
 fn describe_at(described: &Described, rest: &[usize], times: f64) -> Option<(f64, Vec<Part>)> {
     let fits = &described.fitted.fits;
-    let each = each(described.fitted.scalars);
+    let price = Price::of(described, times);
     let tried = parts_of_all(described);
     let mut with = rest.to_vec();
     let mut base = likelihood(fits, rest, &[])?;
@@ -173,7 +195,7 @@ fn describe_at(described: &Described, rest: &[usize], times: f64) -> Option<(f64
                     continue;
                 };
                 // what is in the description already has been paid for
-                let more = (likelihood - base) / times - each * part.len() as f64;
+                let more = price.worth(likelihood - base, part.len());
                 let certain = || {
                     beside(fits, &with, part)
                         .is_some_and(|(e, which)| e.p_value(&which) * (tried as f64) < FAMILY_ALPHA)
@@ -193,11 +215,11 @@ fn describe_at(described: &Described, rest: &[usize], times: f64) -> Option<(f64
         let (mut likelihood, mut part) = (best.likelihood, best.part.to_vec());
         // a star is one place
         if !described.terms[best.term].term.is_of_many() {
-            let (fewer, needed) = needed(fits, &with, part.clone(), times, each)?;
-            let picked = ln_binomial(part.len() as u64, needed.len() as u64);
-            let its = (fewer - base) / times - each * needed.len() as f64 - picked;
-            if its > more {
-                (more, likelihood, part) = (its, fewer, needed);
+            let (its, fewer) = needed(fits, &with, part.clone(), price)?;
+            let picked = ln_binomial(part.len() as u64, fewer.len() as u64);
+            let worth = price.worth(its - base, fewer.len()) - picked;
+            if worth > more {
+                (more, likelihood, part) = (worth, its, fewer);
             }
         }
         worth += more;

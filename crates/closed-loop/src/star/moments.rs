@@ -343,7 +343,7 @@ impl StarMoments {
         (freedom > 0.0).then(|| {
             Rotations::new(
                 self.t_s.clone(),
-                &rotations,
+                rotations,
                 self.frames.clone(),
                 inverse,
                 (sse.max(0.0) / freedom).sqrt(),
