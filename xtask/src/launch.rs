@@ -22,16 +22,29 @@ pub(crate) fn run_with(root: &Path, step: &Step, more: &[String]) -> Result<(), 
     run_one(root, step, more).map_err(|why| format!("failed: {} ({why})", step.name))
 }
 
+/// Runs a binary of the workspace that has been built, in the profile of this one: it lies beside it.
+pub(crate) fn run_built(root: &Path, program: &str, words: &[&str]) -> Result<(), String> {
+    println!("== {program} {}", words.join(" "));
+    let this = env::current_exe().map_err(|e| e.to_string())?;
+    let beside = this.with_file_name(format!("{program}{}", env::consts::EXE_SUFFIX));
+    launch(Command::new(beside).args(words).current_dir(root))
+        .map_err(|why| format!("failed: {program} ({why})"))
+}
+
 fn run_one(root: &Path, step: &Step, more: &[String]) -> Result<(), String> {
     let words = step.args.iter().copied();
     let words: Vec<&str> = words.chain(more.iter().map(String::as_str)).collect();
     println!("== {}: cargo {}", step.name, words.join(" "));
-    let status = Command::new(cargo())
-        .args(words)
-        .envs(step.env.iter().copied())
-        .current_dir(root)
-        .status();
-    match status {
+    launch(
+        Command::new(cargo())
+            .args(words)
+            .envs(step.env.iter().copied())
+            .current_dir(root),
+    )
+}
+
+fn launch(command: &mut Command) -> Result<(), String> {
+    match command.status() {
         Ok(status) if status.success() => Ok(()),
         Ok(status) => Err(status.to_string()),
         Err(error) => Err(error.to_string()),
@@ -94,5 +107,11 @@ mod tests {
         let more = ["--no-such-word".to_owned()];
         let result = run_with(Path::new("."), &step("version"), &more);
         assert!(result.unwrap_err().starts_with("failed: version ("));
+        let nothing = run_built(Path::new("."), "no-such-program", &[]);
+        assert!(
+            nothing
+                .unwrap_err()
+                .starts_with("failed: no-such-program (")
+        );
     }
 }

@@ -10,8 +10,9 @@
 //!
 //! G is the sum over the training blocks. A held-out block b is judged with the
 //! nuisance *and* the amplitudes of the others: its squared error is the
-//! quadratic form of `[-beta, 1]` in `T^T G_b T`. Its likelihood takes account of how well they are
-//! known,
+//! quadratic form of `[-beta, 1]` in `T^T G_b T`. Nuisance that lives in the fold alone (the direction of
+//! a star that is seen at no other time) is the fold's own: the others know nothing of it. The likelihood
+//! takes account of how well all these are known,
 //!
 //! ```text
 //! ln p(b | others) = Z(all) - Z(others)      Z = -(E/v + ln det(G_nn + L) + ln det(S + S_all/N)) / 2
@@ -84,6 +85,8 @@ use out_of_fold::gaussian;
 const OBSERVABLE_SHARE: f64 = 1e-7;
 /// Share of the nuisance's priors that is left where it is as good as free.
 const FREE: f64 = 1e-4;
+/// Share of a nuisance column's squared length outside a fold below which it lives in the fold alone.
+const UNSEEN: f64 = 1e-9;
 /// What all columns say counts for no more than this many times the blocks that there are.
 const MOST_BLOCKS: f64 = 2.0;
 
@@ -183,8 +186,14 @@ impl Fits {
             .into_par_iter()
             .map(|f| {
                 let pick = layout.picked(Some(f));
-                let fold = Eliminated::new(&sums.without(f), layout, variance, &pick)?;
+                let train = sums.without(f);
+                let mut fold = Eliminated::new(&train, layout, variance, &pick)?;
                 let (own, scalars) = &sums.fold[f];
+                let unseen = |&k: &usize| train.0[(k, k)] < UNSEEN * own[(k, k)];
+                let alone: Vec<usize> = (0..n).filter(unseen).collect();
+                if !alone.is_empty() {
+                    fold.learn(&alone, own, &pick)?;
+                }
                 let held = transformed(own, n, &pick, &fold.nuisance);
                 Some((fold, (held, *scalars)))
             })

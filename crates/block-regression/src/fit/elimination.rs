@@ -69,6 +69,32 @@ impl Eliminated {
         })
     }
 
+    /// Takes for the nuisance columns `alone`, of which this training data knows nothing, what suits the held
+    /// data best (`gram`), given all others.
+    pub(super) fn learn(
+        &mut self,
+        alone: &[usize],
+        gram: &DMatrix<f64>,
+        pick: &[usize],
+    ) -> Option<()> {
+        let n = self.prior.len();
+        let rows = gram.select_rows(alone);
+        let mut normal = rows.select_columns(alone);
+        for (i, &k) in alone.iter().enumerate() {
+            normal[(i, i)] += self.prior[k];
+        }
+        for &k in alone {
+            self.nuisance.row_mut(k).fill(0.0);
+        }
+        let mut left = picked(&rows, 0..alone.len(), pick);
+        left.gemm(-1.0, &rows.columns(0, n), &self.nuisance, 1.0);
+        let own = Cholesky::new(normal)?.solve(&left);
+        for (i, &k) in alone.iter().enumerate() {
+            self.nuisance.row_mut(k).copy_from(&own.row(i));
+        }
+        Some(())
+    }
+
     /// S and s of `set`.
     fn equations(&self, set: &[usize]) -> (DMatrix<f64>, DVector<f64>) {
         let last = self.train.ncols() - 1;

@@ -480,3 +480,40 @@ fn columns_that_act_in_a_part_of_the_time_lose_little() {
         "{ours} against {known}"
     );
 }
+
+/// A nuisance column that lives in the last fold alone is that fold's own: its residual is that of a fit in
+/// the fold, given what the others say of all else.
+#[test]
+fn what_lives_in_a_fold_alone_is_fitted_there() {
+    let mut table = table(1000, 0.0, 0.5, 4);
+    let frames = table.0.nrows();
+    let folds = Folds::cut(frames);
+    let last = folds.fold_ranges().last().cloned().unwrap();
+    for k in 0..frames {
+        let alone = last.contains(&k);
+        table.0[(k, 1)] = if alone {
+            1.0 + 0.3 * (k as f64).sin()
+        } else {
+            0.0
+        };
+        // as large as it is, nobody else can know of it
+        table.0[(k, 5)] += 30.0 * table.0[(k, 1)];
+    }
+    let (fits, folds) = fits(&table, [0.0, 1e-4]);
+    let fold = folds.count - 1;
+    let beta = fits.amplitudes_without(fold, &[0]).unwrap();
+    let nuisance = fits.nuisance(Some(fold), &[0], &beta);
+    let left: Vec<f64> = last
+        .clone()
+        .map(|k| table.0[(k, 5)] - nuisance[0] - beta[0] * table.0[(k, 2)])
+        .collect();
+    let of = |f: &dyn Fn(f64, f64) -> f64| -> f64 {
+        let each = last.clone().zip(&left);
+        each.map(|(k, r)| f(table.0[(k, 1)], *r)).sum()
+    };
+    let expected = of(&|c, r| c * r) / (of(&|c, _| c * c) + 1e-4);
+    assert!((nuisance[1] - expected).abs() < 1e-9 * expected.abs());
+    // noise of variance 1, and what is known of the amplitudes
+    let error = fits.out_of_fold(&[0]).unwrap().sse[fold] / last.len() as f64;
+    assert!((0.7..1.4).contains(&error), "{error}");
+}
