@@ -46,8 +46,14 @@ impl Estimate {
         let likeness = wider.sum().powi(2) / (p * wider.norm_squared());
         let alike = f_tail(square / (p * mean), p * likeness, b);
         let worst = f_tail(square / wider.max(), 1.0, b);
-        let white = ChiSquared::new(p).map_or(1.0, |law| law.sf(square));
-        alike.max(worst).max(white)
+        alike.max(worst).max(self.white_p_value(which))
+    }
+
+    /// The same if the noise were white.
+    pub fn white_p_value(&self, which: &[usize]) -> f64 {
+        let law = ChiSquared::new(which.len() as f64);
+        let tail = |square| law.map_or(1.0, |law| law.sf(square));
+        self.square(which).map_or(1.0, tail)
     }
 
     /// Squared distance of amplitudes `which` from zero if the noise were white.

@@ -26,14 +26,16 @@
 //! its columns are a proxy for something else.
 //!
 //! After each addition all chosen groups are judged again beside the others and
-//! those that no longer stand are dropped.
+//! those that no longer stand are dropped. Where none stands, two are tried at once: an effect that is left
+//! out scatters from block to block as coloured noise does, so that each of two large ones may hide the
+//! other. Tried are those that white noise would let stand; each must stand beside the other.
 //!
 //! Source: Schwarz 1978 for the price of a parameter; Genovese, Roeder & Wasserman 2006
 //! for weights of p-values.
 
 use std::collections::BTreeMap;
 
-use block_regression::{Fits, OutOfFold};
+use block_regression::{Estimate, Fits, OutOfFold};
 
 /// Chance that a bundle which follows its model gets any effect at all.
 pub(crate) const FAMILY_ALPHA: f64 = 0.01;
@@ -92,6 +94,9 @@ impl Judgement {
     }
 }
 
+/// How many of those that white noise would let stand are tried two by two.
+const HIDDEN: usize = 6;
+
 /// The outcome of the search.
 #[derive(Clone, Debug)]
 pub(crate) struct Selection {
@@ -120,8 +125,14 @@ pub(crate) fn select(fits: &Fits, groups: &[Group], may: &[bool], scalars: f64) 
     loop {
         let may: Vec<bool> = (0..groups.len()).map(|g| may[g] && !banned[g]).collect();
         let ranked = ranked(fits, groups, &may, &chosen, scalars, &cost);
-        let Some(&added) = ranked.first() else { break };
-        chosen.push(added);
+        let added = match ranked.first() {
+            Some(&g) => vec![g],
+            None => hidden(fits, groups, &may, &chosen, scalars, &cost),
+        };
+        if added.is_empty() {
+            break;
+        }
+        chosen.extend(added);
         prune(fits, groups, &mut chosen, &mut banned, &cost);
     }
     let judged = judged(fits, groups, &chosen, &cost);
@@ -164,6 +175,58 @@ pub(crate) fn ranked(
         .collect();
     standing.sort_by(|a, b| b.1.total_cmp(&a.1));
     standing.into_iter().map(|(g, _)| g).collect()
+}
+
+/// The two groups that gain most together where each stands beside the other, though neither does alone; or
+/// none.
+fn hidden(
+    fits: &Fits,
+    groups: &[Group],
+    may: &[bool],
+    chosen: &[usize],
+    scalars: f64,
+    cost: &[f64],
+) -> Vec<usize> {
+    let Some(base) = out_of_fold(fits, groups, chosen) else {
+        return Vec::new();
+    };
+    let rank = |g: usize, gain: f64| gain - price(&groups[g], scalars);
+    let mut alone: Vec<(usize, f64)> = (0..groups.len())
+        .filter(|&g| may[g] && !chosen.contains(&g))
+        .filter_map(|g| {
+            let (with, estimate, own) = beside(fits, groups, chosen, g)?;
+            let gain = with.total_loglik() - base.total_loglik();
+            let white = estimate.white_p_value(&own) * cost[g];
+            (gain > 0.0 && white < FAMILY_ALPHA).then(|| (g, rank(g, gain)))
+        })
+        .collect();
+    alone.sort_by(|a, b| b.1.total_cmp(&a.1));
+    alone.truncate(HIDDEN);
+    let mut best = (0.0, Vec::new());
+    for (i, &(a, worth)) in alone.iter().enumerate() {
+        let with_a = [chosen, &[a]].concat();
+        let Some(base_a) = out_of_fold(fits, groups, &with_a) else {
+            continue;
+        };
+        for &(b, _) in &alone[i + 1..] {
+            let family = |g: usize| &groups[g].family;
+            if with_a.iter().any(|&c| family(c) == family(b)) {
+                continue;
+            }
+            let second = judge(fits, groups, &with_a, b, &base_a, cost);
+            let both = worth + rank(b, second.delta_loglik);
+            if !second.stands() || both <= best.0 {
+                continue;
+            }
+            let with_b = [chosen, &[b]].concat();
+            let first = out_of_fold(fits, groups, &with_b)
+                .map(|base_b| judge(fits, groups, &with_b, a, &base_b, cost));
+            if first.is_some_and(|j| j.stands()) {
+                best = (both, vec![a, b]);
+            }
+        }
+    }
+    best.1
 }
 
 /// What a group pays for its parameters and choices, nats.
@@ -228,14 +291,7 @@ fn judge(
     base: &OutOfFold,
     cost: &[f64],
 ) -> Judgement {
-    let mut set = columns_of(groups, others);
-    let first = set.len();
-    set.extend(&groups[g].columns);
-    if set.len() == first {
-        return Judgement::UNSEEN;
-    }
-    let which: Vec<usize> = (first..set.len()).collect();
-    let (Some(with), Some(estimate)) = (fits.out_of_fold(&set), fits.estimate(&set)) else {
+    let Some((with, estimate, which)) = beside(fits, groups, others, g) else {
         return Judgement::UNSEEN;
     };
     Judgement {
@@ -250,8 +306,34 @@ fn judge(
     }
 }
 
+/// Both fits of a group beside others, and where its columns stand in them; `None` if it cannot be told
+/// from them.
+fn beside(
+    fits: &Fits,
+    groups: &[Group],
+    others: &[usize],
+    g: usize,
+) -> Option<(OutOfFold, Estimate, Vec<usize>)> {
+    let mut set = columns_of(groups, others);
+    let first = set.len();
+    set.extend(&groups[g].columns);
+    let which: Vec<usize> = (first..set.len()).collect();
+    if which.is_empty() {
+        return None;
+    }
+    Some((fits.out_of_fold(&set)?, fits.estimate(&set)?, which))
+}
+
 #[cfg(test)]
 mod tests {
+    use std::ops::Range;
+
+    use block_regression::{BlockGrams, Design, Folds, Layout};
+    use nalgebra::DMatrix;
+    use rand_core::SeedableRng;
+    use rand_distr::{Distribution, StandardNormal};
+    use rand_xoshiro::Xoshiro256PlusPlus;
+
     use super::*;
 
     fn group(kind: &'static str, columns: usize) -> Group {
@@ -287,5 +369,67 @@ mod tests {
         let picked = costs(&groups, &may);
         let each = 20.0 * (1.0 + 20.0 + 14.0_f64.sqrt());
         assert!((picked[3] - each).abs() < 1e-9 && (picked[4] - each).abs() < 1e-9);
+    }
+
+    /// Two columns that act in the same eight of fifty blocks, of which one changes its sign from block to block.
+    struct Hiding(DMatrix<f64>);
+
+    impl Hiding {
+        /// Each of `size` times the noise, a frame.
+        fn new(size: f64, folds: &Folds) -> Self {
+            let mut rng = Xoshiro256PlusPlus::seed_from_u64(8);
+            let frames = folds.blocks.last().map_or(0, |b| b.end);
+            let mut out = DMatrix::zeros(frames, 3);
+            for (b, block) in folds.blocks.iter().enumerate() {
+                for k in block.clone() {
+                    let noise: f64 = StandardNormal.sample(&mut rng);
+                    if b % 6 == 3 {
+                        out[(k, 0)] = 1.0;
+                        out[(k, 1)] = if b % 12 == 3 { 1.0 } else { -1.0 };
+                    }
+                    out[(k, 2)] = size * (out[(k, 0)] + out[(k, 1)]) + noise;
+                }
+            }
+            Self(out)
+        }
+    }
+
+    impl Design for Hiding {
+        fn width(&self) -> usize {
+            3
+        }
+        fn fill(&self, frames: Range<usize>, out: &mut DMatrix<f64>) -> usize {
+            *out = self.0.rows(frames.start, frames.len()).into_owned();
+            frames.len()
+        }
+    }
+
+    /// Alone, either scatters as the other acts, and does not stand: eight blocks whose scores are as often
+    /// 0 as twice the mean are F(1, 7) near 8. Together each stands by 12 sigma. Without an effect nothing does.
+    #[test]
+    fn two_that_hide_each_other_are_found() {
+        let folds = Folds::cut(1000);
+        let rows = folds.blocks.iter().enumerate().filter(|(b, _)| b % 6 == 3);
+        let rows: usize = rows.map(|(_, block)| block.len()).sum();
+        let layout = Layout {
+            nuisance_precision: Vec::new(),
+            candidates: 2,
+            residuals: 1,
+        };
+        let mut groups = vec![group("even", 1), group("odd", 1)];
+        groups[1].columns = vec![1];
+        for group in &mut groups {
+            group.bounds = vec![[-9.0, 9.0]];
+        }
+        let chosen = |size: f64| {
+            let grams = BlockGrams::accumulate(&Hiding::new(size, &folds), &folds);
+            let fits = Fits::new(&grams, &folds, &layout, 1.0).unwrap();
+            let cost = costs(&groups, &[true, true]);
+            let alone = judged(&fits, &groups, &[], &cost);
+            assert!(alone.iter().all(|j| !j.stands()), "{alone:?}");
+            select(&fits, &groups, &[true, true], 1000.0).chosen
+        };
+        assert_eq!(chosen(12.0 / (rows as f64).sqrt()).len(), 2);
+        assert_eq!(chosen(0.0), Vec::<usize>::new());
     }
 }
