@@ -18,8 +18,7 @@
 //! ```
 //!
 //! k parameters (instant, frequency and lag too), q the square of the amplitudes over
-//! their errors: the evidence if effects are spread like what was found. An effect has the amplitudes that it
-//! needs, one axis of three, say, and pays for the choice: ln m + ln C(m, k). One slow error may act about X and Y
+//! their errors: the evidence if effects are spread like what was found. One slow error may act about X and Y
 //! alike; what differs about them pays ln 2 more. Without a slow
 //! error the noise is white, so that what such an error would add is taken off. The
 //! likelier explanation is named; an effect that is worth less than a slow error in its
@@ -37,7 +36,6 @@ use coloured_noise::{CommonNoise, Rotations};
 use effects::Candidate;
 use rayon::prelude::*;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
-use statrs::function::factorial::ln_binomial;
 
 use crate::error::CloseError;
 use crate::evidence::Evidence;
@@ -60,8 +58,6 @@ pub(crate) const WIDENING: f64 = 1.3;
 const SLOW_PRICE: f64 = 4.0;
 /// What slow errors pay beside that if they are not the same about X and Y, nats: every other one is so.
 const APART: f64 = std::f64::consts::LN_2;
-/// Most amplitudes of which some are left out.
-const MOST_PICKED: usize = 6;
 /// Most effects that are added.
 const MOST: usize = 8;
 
@@ -255,40 +251,6 @@ struct Part {
     credible: bool,
 }
 
-impl Part {
-    /// What its freedom buys where nothing acts, nats, of the columns that it needs: others are left out, and
-    /// their likelihood with them.
-    fn freedom(&self, estimate: &Estimate) -> f64 {
-        let all: Vec<usize> = self.columns.clone().collect();
-        let square = |which: &[usize]| estimate.square(which).unwrap_or(0.0);
-        let whole = square(&all);
-        // every number of them is as likely, and every choice of so many
-        let sizes = (all.len().clamp(1, MOST_PICKED) as f64).ln();
-        let of = |without: Vec<usize>| {
-            let lost = square(&without);
-            let kept = all.len() - without.len();
-            // what is scanned is fitted too
-            let k = (kept + self.shapes) as f64;
-            let spread = ((whole - lost) / k.max(1.0)).max(1.0);
-            let picked = ln_binomial(all.len() as u64, kept as u64);
-            self.cost.ln() + sizes + picked + 0.5 * (lost + k * (1.0 + spread.ln()))
-        };
-        let subsets = if all.len() > MOST_PICKED {
-            1
-        } else {
-            (1 << all.len()) - 1
-        };
-        let left_out = (0..subsets).map(|bits: usize| {
-            let chosen = all.iter().enumerate();
-            chosen
-                .filter(|(i, _)| bits >> i & 1 == 1)
-                .map(|(_, &c)| c)
-                .collect()
-        });
-        left_out.map(of).fold(f64::INFINITY, f64::min)
-    }
-}
-
 /// What scores hypotheses: everything comes from one pass over the data.
 struct Trial<'a> {
     moments: &'a StarMoments,
@@ -415,8 +377,19 @@ impl Trial<'_> {
         let alike = slow.across - slow.alike + slow_price;
         let apart = paid[0] + paid[1] + APART;
         let without = slow.across.min(alike.max(0.0)).min(apart) + paid[2];
-        let freedom = |part: &Part| part.freedom(&scored.estimate);
-        scored.loglik - without - scored.parts.iter().map(freedom).sum::<f64>()
+        let effects: f64 = scored
+            .parts
+            .iter()
+            .map(|part| {
+                let which: Vec<usize> = part.columns.clone().collect();
+                let shapes = part.shapes;
+                let square = scored.estimate.square(&which).unwrap_or(0.0);
+                // what is scanned is fitted too
+                let k = (which.len() + shapes) as f64;
+                part.cost.ln() + 0.5 * k * (1.0 + (square / k.max(1.0)).max(1.0).ln())
+            })
+            .sum();
+        scored.loglik - without - effects
     }
 
     /// What the last of the candidates of `with` adds to `without`.
