@@ -21,7 +21,7 @@ use crate::hot_pixel::{HALF_WIDTH_PX, middle_of, pixel_of};
 /// Pixels that are proposed.
 const MOST_PIXELS: usize = 48;
 /// Rows within half-width of a pixel with which it is worth looking at.
-const LEAST_ROWS: u32 = 10;
+const LEAST_ROWS: u32 = 8;
 /// Pixels within whose half-width a star may be: its own and those around.
 const NEAR: [[i64; 2]; 9] = [
     [-1, -1],

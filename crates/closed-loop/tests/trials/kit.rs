@@ -13,6 +13,8 @@ pub(crate) enum Path {
     Drift,
     /// Hardly a pixel within the run.
     Still,
+    /// Steadily on: after 7 min all stars are others.
+    Scan,
     /// Slews to and fro about three axes, up to 5 px/s.
     Slews,
     /// To and fro every 8 s: the image reverses again and again.
@@ -43,6 +45,11 @@ impl Path {
             Self::Still => {
                 format!(
                     "[motion]\nkind = \"hold\"\n{start}\ndrift_arcsec_s = [0.06, -0.09, 0.01]\n"
+                )
+            }
+            Self::Scan => {
+                format!(
+                    "[motion]\nkind = \"hold\"\n{start}\ndrift_arcsec_s = [130.0, 90.0, 20.0]\n"
                 )
             }
             Self::Slews => {
