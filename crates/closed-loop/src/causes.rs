@@ -141,12 +141,8 @@ pub(crate) fn run<'a>(
             let plain = Described::new(&beside, folds, &searched.found, (quest.terms)(), &[])?;
             let axes = wander.axes().iter().filter(|a| **a).count();
             if let Some(instead) = in_place_of_wander(&described, &plain, axes) {
-                // what it beats speaks against no effect, whether refused for it or never put forward
-                let effects = || {
-                    let (white, _) = attempt(&beside, folds, quest.candidates, &may, None)?;
-                    Ok::<_, CloseError>(!white.found.selection.chosen.is_empty())
-                };
-                if reinstated(&mut refused) || effects()? {
+                // what it beats speaks against no effect
+                if reinstated(&mut refused) {
                     start = None;
                 } else {
                     kept.extend(whole(&plain, instead));
