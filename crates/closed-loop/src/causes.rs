@@ -231,8 +231,14 @@ pub(crate) fn run<'a>(
             refused.extend(small.into_iter().map(|f| (f, Refusal::Remainder)));
             continue;
         }
+        let found = judged_alone(found, &mut refused);
+        let worse = worse(&found);
+        if !worse.is_empty() && !last {
+            refused.extend(worse.into_iter().map(|f| (f, Refusal::Remainder)));
+            continue;
+        }
         let searched = Searched {
-            found: judged_alone(found, &mut refused),
+            found,
             evidence: evidence.clone(),
             wander,
         };
@@ -292,6 +298,16 @@ fn remainders(described: &Described, found: &Found) -> Vec<String> {
     let chosen = found.selection.chosen.iter();
     chosen
         .filter(|&&g| found.selection.judged[g].delta_loglik < REMAINDER * gain)
+        .map(|&g| family(found.candidates[g].as_ref()))
+        .collect()
+}
+
+/// Families of chosen effects with which the model predicts worse than without: they stand beside a
+/// description alone, which is not in it.
+fn worse(found: &Found) -> Vec<String> {
+    let chosen = found.selection.chosen.iter();
+    chosen
+        .filter(|&&g| found.selection.judged[g].delta_loglik <= 0.0)
         .map(|&g| family(found.candidates[g].as_ref()))
         .collect()
 }

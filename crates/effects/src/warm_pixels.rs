@@ -20,7 +20,8 @@ use crate::hot_pixel::{HALF_WIDTH_PX, middle_of, pixel_of};
 
 /// Pixels that are proposed.
 const MOST_PIXELS: usize = 48;
-/// Rows within half-width of a pixel with which it is worth looking at.
+/// Rows within half-width of a pixel with which it is worth looking at: with fewer, the pixels of a slew are
+/// so many that all effects pay for them.
 const LEAST_ROWS: u32 = 8;
 /// Pixels within whose half-width a star may be: its own and those around.
 const NEAR: [[i64; 2]; 9] = [
