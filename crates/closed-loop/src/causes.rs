@@ -295,19 +295,20 @@ fn remainders(described: &Described, found: &Found) -> Vec<String> {
     let alone = described.fitted.fits.out_of_fold(&set);
     let gain = describe(described, &set).zip(alone);
     let gain = gain.map_or(0.0, |((worth, _), alone)| worth - alone.total_loglik());
-    let chosen = found.selection.chosen.iter();
-    chosen
-        .filter(|&&g| found.selection.judged[g].delta_loglik < REMAINDER * gain)
-        .map(|&g| family(found.candidates[g].as_ref()))
-        .collect()
+    chosen_that(found, |gains| gains < REMAINDER * gain)
 }
 
 /// Families of chosen effects with which the model predicts worse than without: they stand beside a
 /// description alone, which is not in it.
 fn worse(found: &Found) -> Vec<String> {
+    chosen_that(found, |gains| gains <= 0.0)
+}
+
+/// Families of the chosen effects of whose gains, nats, this holds.
+fn chosen_that(found: &Found, holds: impl Fn(f64) -> bool) -> Vec<String> {
     let chosen = found.selection.chosen.iter();
     chosen
-        .filter(|&&g| found.selection.judged[g].delta_loglik <= 0.0)
+        .filter(|&&g| holds(found.selection.judged[g].delta_loglik))
         .map(|&g| family(found.candidates[g].as_ref()))
         .collect()
 }

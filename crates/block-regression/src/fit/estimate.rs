@@ -46,13 +46,12 @@ impl Estimate {
         let likeness = wider.sum().powi(2) / (p * wider.norm_squared());
         let alike = f_tail(square / (p * mean), p * likeness, b);
         let worst = f_tail(square / wider.max(), 1.0, b);
-        alike.max(worst).max(self.white_p_value(which))
+        alike.max(worst).max(chi_squared_tail(square, p))
     }
 
     /// The same if the noise were white.
     pub fn white_p_value(&self, which: &[usize]) -> f64 {
-        let law = ChiSquared::new(which.len() as f64);
-        let tail = |square| law.map_or(1.0, |law| law.sf(square));
+        let tail = |square| chi_squared_tail(square, which.len() as f64);
         self.square(which).map_or(1.0, tail)
     }
 
@@ -105,6 +104,11 @@ fn part(matrix: &DMatrix<f64>, which: &[usize]) -> DMatrix<f64> {
     DMatrix::from_fn(which.len(), which.len(), |i, j| {
         matrix[(which[i], which[j])]
     })
+}
+
+/// Chance of chi-squared of `p` parameters beyond `square`.
+fn chi_squared_tail(square: f64, p: f64) -> f64 {
+    ChiSquared::new(p).map_or(1.0, |law| law.sf(square))
 }
 
 /// Chance of F beyond `f` with `p` parameters, each with a variance from `blocks` blocks.

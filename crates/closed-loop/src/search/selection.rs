@@ -35,7 +35,7 @@
 
 use std::collections::BTreeMap;
 
-use block_regression::{Estimate, Fits, OutOfFold};
+use block_regression::{Fits, OutOfFold};
 
 /// Chance that a bundle which follows its model gets any effect at all.
 pub(crate) const FAMILY_ALPHA: f64 = 0.01;
@@ -124,10 +124,10 @@ pub(crate) fn select(fits: &Fits, groups: &[Group], may: &[bool], scalars: f64) 
     let mut banned = vec![false; groups.len()];
     loop {
         let may: Vec<bool> = (0..groups.len()).map(|g| may[g] && !banned[g]).collect();
-        let ranked = ranked(fits, groups, &may, &chosen, scalars, &cost);
-        let added = match ranked.first() {
-            Some(&g) => vec![g],
-            None => hidden(fits, groups, &may, &chosen, scalars, &cost),
+        let tried = tried(fits, groups, &may, &chosen, scalars, &cost);
+        let added = match tried.iter().find(|t| t.judgement.stands()) {
+            Some(best) => vec![best.group],
+            None => hidden(fits, groups, &tried, &chosen, scalars, &cost),
         };
         if added.is_empty() {
             break;
@@ -161,68 +161,79 @@ pub(crate) fn ranked(
     scalars: f64,
     cost: &[f64],
 ) -> Vec<usize> {
-    let Some(base) = out_of_fold(fits, groups, chosen) else {
-        return Vec::new();
-    };
-    let mut standing: Vec<(usize, f64)> = (0..groups.len())
-        .filter(|&g| may[g] && !chosen.contains(&g))
-        .filter(|&g| chosen.iter().all(|&c| groups[c].family != groups[g].family))
-        .filter_map(|g| {
-            let judgement = judge(fits, groups, chosen, g, &base, cost);
-            let rank = judgement.delta_loglik - price(&groups[g], scalars);
-            judgement.stands().then_some((g, rank))
-        })
-        .collect();
-    standing.sort_by(|a, b| b.1.total_cmp(&a.1));
-    standing.into_iter().map(|(g, _)| g).collect()
+    let tried = tried(fits, groups, may, chosen, scalars, cost).into_iter();
+    let standing = tried.filter(|t| t.judgement.stands());
+    standing.map(|t| t.group).collect()
 }
 
-/// The two groups that gain most together where each stands beside the other, though neither does alone; or
-/// none.
-fn hidden(
+/// A group that was tried beside the chosen ones.
+struct Tried {
+    group: usize,
+    judgement: Judgement,
+    /// Its p-value if the noise were white, times what the search costs it.
+    white: f64,
+    /// Gain after its price, nats.
+    rank: f64,
+}
+
+/// All groups that may be tried beside `chosen`, the largest gain after its price first.
+fn tried(
     fits: &Fits,
     groups: &[Group],
     may: &[bool],
     chosen: &[usize],
     scalars: f64,
     cost: &[f64],
-) -> Vec<usize> {
+) -> Vec<Tried> {
     let Some(base) = out_of_fold(fits, groups, chosen) else {
         return Vec::new();
     };
-    let rank = |g: usize, gain: f64| gain - price(&groups[g], scalars);
-    let mut alone: Vec<(usize, f64)> = (0..groups.len())
+    let mut tried: Vec<Tried> = (0..groups.len())
         .filter(|&g| may[g] && !chosen.contains(&g))
+        .filter(|&g| chosen.iter().all(|&c| groups[c].family != groups[g].family))
         .filter_map(|g| {
-            let (with, estimate, own) = beside(fits, groups, chosen, g)?;
-            let gain = with.total_loglik() - base.total_loglik();
-            let white = estimate.white_p_value(&own) * cost[g];
-            (gain > 0.0 && white < FAMILY_ALPHA).then(|| (g, rank(g, gain)))
+            let (judgement, white) = standing(fits, groups, chosen, g, &base, cost)?;
+            Some(Tried {
+                group: g,
+                rank: judgement.delta_loglik - price(&groups[g], scalars),
+                judgement,
+                white,
+            })
         })
         .collect();
-    alone.sort_by(|a, b| b.1.total_cmp(&a.1));
-    alone.truncate(HIDDEN);
+    tried.sort_by(|a, b| b.rank.total_cmp(&a.rank));
+    tried
+}
+
+/// The two groups that gain most together where each stands beside the other, though of those `tried` none
+/// does alone; or none.
+fn hidden(
+    fits: &Fits,
+    groups: &[Group],
+    tried: &[Tried],
+    chosen: &[usize],
+    scalars: f64,
+    cost: &[f64],
+) -> Vec<usize> {
+    let alone = tried
+        .iter()
+        .filter(|t| t.judgement.delta_loglik > 0.0 && t.white < FAMILY_ALPHA);
+    let alone: Vec<&Tried> = alone.take(HIDDEN).collect();
     let mut best = (0.0, Vec::new());
-    for (i, &(a, worth)) in alone.iter().enumerate() {
-        let with_a = [chosen, &[a]].concat();
-        let Some(base_a) = out_of_fold(fits, groups, &with_a) else {
-            continue;
-        };
-        for &(b, _) in &alone[i + 1..] {
-            let family = |g: usize| &groups[g].family;
-            if with_a.iter().any(|&c| family(c) == family(b)) {
+    for (i, a) in alone.iter().enumerate() {
+        for b in &alone[i + 1..] {
+            if groups[a.group].family == groups[b.group].family {
                 continue;
             }
-            let second = judge(fits, groups, &with_a, b, &base_a, cost);
-            let both = worth + rank(b, second.delta_loglik);
-            if !second.stands() || both <= best.0 {
+            let pair = [a.group, b.group];
+            let set = [chosen, &pair].concat();
+            let within = |g| within(fits, groups, &set, g, cost).filter(Judgement::stands);
+            let Some(second) = within(b.group) else {
                 continue;
-            }
-            let with_b = [chosen, &[b]].concat();
-            let first = out_of_fold(fits, groups, &with_b)
-                .map(|base_b| judge(fits, groups, &with_b, a, &base_b, cost));
-            if first.is_some_and(|j| j.stands()) {
-                best = (both, vec![a, b]);
+            };
+            let both = a.rank + second.delta_loglik - price(&groups[b.group], scalars);
+            if both > best.0 && within(a.group).is_some() {
+                best = (both, pair.to_vec());
             }
         }
     }
@@ -247,13 +258,7 @@ pub(crate) fn judged(
     cost: &[f64],
 ) -> Vec<Judgement> {
     (0..groups.len())
-        .map(|g| {
-            let others: Vec<usize> = chosen.iter().copied().filter(|&c| c != g).collect();
-            match out_of_fold(fits, groups, &others) {
-                Some(base) => judge(fits, groups, &others, g, &base, cost),
-                None => Judgement::UNSEEN,
-            }
-        })
+        .map(|g| within(fits, groups, chosen, g, cost).unwrap_or(Judgement::UNSEEN))
         .collect()
 }
 
@@ -266,13 +271,8 @@ fn prune(
     cost: &[f64],
 ) {
     loop {
-        let fallen = chosen.iter().copied().find(|&g| {
-            let others: Vec<usize> = chosen.iter().copied().filter(|&c| c != g).collect();
-            out_of_fold(fits, groups, &others).is_some_and(|base| {
-                let judgement = judge(fits, groups, &others, g, &base, cost);
-                !judgement.stands()
-            })
-        });
+        let falls = |&g: &usize| within(fits, groups, chosen, g, cost).is_some_and(|j| !j.stands());
+        let fallen = chosen.iter().copied().find(falls);
         let Some(g) = fallen else { return };
         banned[g] = true;
         chosen.retain(|&c| c != g);
@@ -283,18 +283,39 @@ fn out_of_fold(fits: &Fits, groups: &[Group], chosen: &[usize]) -> Option<OutOfF
     fits.out_of_fold(&columns_of(groups, chosen))
 }
 
-fn judge(
+/// Standing of a group beside the others of `set`; `None` if these cannot be told apart.
+fn within(
+    fits: &Fits,
+    groups: &[Group],
+    set: &[usize],
+    g: usize,
+    cost: &[f64],
+) -> Option<Judgement> {
+    let others: Vec<usize> = set.iter().copied().filter(|&c| c != g).collect();
+    let base = out_of_fold(fits, groups, &others)?;
+    let standing = standing(fits, groups, &others, g, &base, cost);
+    Some(standing.map_or(Judgement::UNSEEN, |(judgement, _)| judgement))
+}
+
+/// Standing of a group beside `others`, and its p-value if the noise were white; `None` if it cannot be told
+/// from them.
+fn standing(
     fits: &Fits,
     groups: &[Group],
     others: &[usize],
     g: usize,
     base: &OutOfFold,
     cost: &[f64],
-) -> Judgement {
-    let Some((with, estimate, which)) = beside(fits, groups, others, g) else {
-        return Judgement::UNSEEN;
-    };
-    Judgement {
+) -> Option<(Judgement, f64)> {
+    let mut set = columns_of(groups, others);
+    let first = set.len();
+    set.extend(&groups[g].columns);
+    let which: Vec<usize> = (first..set.len()).collect();
+    if which.is_empty() {
+        return None;
+    }
+    let (with, estimate) = (fits.out_of_fold(&set)?, fits.estimate(&set)?);
+    let judgement = Judgement {
         delta_loglik: with.total_loglik() - base.total_loglik(),
         credible: groups[g]
             .bounds
@@ -303,25 +324,8 @@ fn judge(
             .all(|([low, high], &i)| (*low..=*high).contains(&estimate.value[i])),
         p_value: (estimate.p_value(&which) * cost[g]).min(1.0),
         observable: true,
-    }
-}
-
-/// Both fits of a group beside others, and where its columns stand in them; `None` if it cannot be told
-/// from them.
-fn beside(
-    fits: &Fits,
-    groups: &[Group],
-    others: &[usize],
-    g: usize,
-) -> Option<(OutOfFold, Estimate, Vec<usize>)> {
-    let mut set = columns_of(groups, others);
-    let first = set.len();
-    set.extend(&groups[g].columns);
-    let which: Vec<usize> = (first..set.len()).collect();
-    if which.is_empty() {
-        return None;
-    }
-    Some((fits.out_of_fold(&set)?, fits.estimate(&set)?, which))
+    };
+    Some((judgement, estimate.white_p_value(&which) * cost[g]))
 }
 
 #[cfg(test)]
