@@ -142,7 +142,7 @@ pub(crate) fn run<'a>(
             let axes = wander.axes().iter().filter(|a| **a).count();
             if let Some(instead) = in_place_of_wander(&described, &plain, axes) {
                 // what it beats speaks against no effect
-                if reinstated(&mut refused) {
+                if reinstated(&mut refused) || suffice(&beside, folds, quest, &may)? {
                     start = None;
                 } else {
                     kept.extend(whole(&plain, instead));
@@ -253,6 +253,19 @@ pub(crate) fn run<'a>(
     Err(CloseError::Singular)
 }
 
+/// Whether the effects that are found without a slow error of the reference explain as much as any
+/// description.
+fn suffice(
+    level: &StarEvidence<'_>,
+    folds: &Folds,
+    quest: &Quest<'_>,
+    may: &[bool],
+) -> Result<bool, CloseError> {
+    let (searched, _) = attempt(level, folds, quest.candidates, may, None)?;
+    let described = Described::new(level, folds, &searched.found, (quest.terms)(), &[])?;
+    Ok(!described.chosen.is_empty() && stand_ins(&described).is_none())
+}
+
 /// Whether any effect had been refused for a slow error of the reference: that is none, and they may be
 /// named again.
 fn reinstated(refused: &mut Refused) -> bool {
@@ -338,7 +351,8 @@ fn whole(described: &Described, parts: Vec<Part>) -> Vec<Arc<dyn Candidate>> {
 }
 
 /// What the stars follow, where that beats a slow error of the reference about `axes` axes:
-/// `coloured` is beside it, `plain` under white noise.
+/// `coloured` is beside it, `plain` under white noise. Not the time alone: a slow error is what the time
+/// alone describes, and folds that know nothing of each other's predict it worse.
 fn in_place_of_wander(coloured: &Described, plain: &Described, axes: usize) -> Option<Vec<Part>> {
     let set = columns_of(&plain.fitted.groups, &plain.chosen);
     let (worth, parts) = describe(plain, &set)?;
@@ -346,7 +360,8 @@ fn in_place_of_wander(coloured: &Described, plain: &Described, axes: usize) -> O
     let with = coloured.fitted.fits.out_of_fold(&set)?.total_loglik() + coloured.fitted.log_scale;
     // a size and a time each
     let paid = axes as f64 * plain.fitted.scalars.max(2.0).ln();
-    (worth > with - paid + BY_FAR).then_some(parts)
+    let time = parts.iter().all(|(k, _)| plain.terms[*k].term.is_of_time());
+    (!time && worth > with - paid + BY_FAR).then_some(parts)
 }
 
 /// Slow noise that is left of the stars themselves.

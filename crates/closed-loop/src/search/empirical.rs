@@ -250,6 +250,11 @@ impl Empirical {
         of_motion && self.by.is_none()
     }
 
+    /// Whether it is the time alone.
+    pub(crate) fn is_of_time(&self) -> bool {
+        matches!(self.variable, Variable::Time) && self.by.is_none()
+    }
+
     /// Whether it is a shift of each star.
     pub(crate) fn is_of_stars(&self) -> bool {
         matches!(self.variable, Variable::Star(_)) && self.by.is_none()
