@@ -41,6 +41,9 @@ mod stand_ins;
 
 /// Nats by which a description must be worth more than a slow error of the reference.
 const BY_FAR: f64 = 8.0;
+/// Nats by which a slow error of the reference is no likelier than effects in its place: a description that
+/// beats it speaks for them.
+const TIE: f64 = 2.0;
 /// Searches whose outcome is refused before one is taken as it is.
 const MOST_REFUSALS: usize = 10;
 /// Chance beyond which an effect is doubted beside slow noise of the stars.
@@ -49,6 +52,8 @@ const DOUBT: f64 = 1e-4;
 /// wrong motions are one in some hundred, so that three among a dozen share another cause.
 const MISPLACED: &str = "catalogue_position";
 const MOST_MISPLACED: usize = 2;
+/// The effect of the acceleration.
+const SMEAR: &str = "exposure_smear";
 /// Share of what a description gains below which an effect beside it is what it leaves.
 const REMAINDER: f64 = 0.05;
 /// Slow: over this share of the span.
@@ -125,6 +130,11 @@ pub(crate) fn run<'a>(
             refused.extend(families.map(|f| (f, Refusal::Wander)));
             continue;
         }
+        let own = of_own_path(&beside, &searched);
+        if !own.is_empty() && !last {
+            refused.extend(own.into_iter().map(|f| (f, Refusal::OwnPath)));
+            continue;
+        }
         let pile = pile(&searched.found, white.data.stars.len());
         if !pile.is_empty() && !last {
             refused.extend(pile.into_iter().map(|f| (f, Refusal::Pile)));
@@ -141,8 +151,9 @@ pub(crate) fn run<'a>(
             let plain = Described::new(&beside, folds, &searched.found, (quest.terms)(), &[])?;
             let axes = wander.axes().iter().filter(|a| **a).count();
             if let Some(instead) = in_place_of_wander(&described, &plain, axes) {
+                let tie = searched.behind.is_some_and(|nats| nats < TIE);
                 // what it beats speaks against no effect
-                if reinstated(&mut refused) || suffice(&beside, folds, quest, &may)? {
+                if reinstated(&mut refused) || tie && suffice(&beside, folds, quest, &may)? {
                     start = None;
                 } else {
                     kept.extend(whole(&plain, instead));
@@ -212,6 +223,7 @@ pub(crate) fn run<'a>(
             found,
             evidence,
             wander,
+            behind,
         } = searched;
         let evidence = evidence.map(|e| e.keeping(&[]));
         let level = evidence.as_ref().unwrap_or(white);
@@ -241,6 +253,7 @@ pub(crate) fn run<'a>(
             found,
             evidence: evidence.clone(),
             wander,
+            behind,
         };
         return Ok(Named {
             slow: slow_left(level, &searched),
@@ -264,6 +277,17 @@ fn suffice(
     let (searched, _) = attempt(level, folds, quest.candidates, may, None)?;
     let described = Described::new(level, folds, &searched.found, (quest.terms)(), &[])?;
     Ok(!described.chosen.is_empty() && stand_ins(&described).is_none())
+}
+
+/// Families of the chosen effects that see the acceleration, where it comes from many samples of a reference
+/// that errs slowly: such a path follows the error, and what it makes of it goes with the error itself.
+fn of_own_path(level: &StarEvidence<'_>, searched: &Searched<'_>) -> Vec<String> {
+    if searched.wander.is_none() || !level.of_many {
+        return Vec::new();
+    }
+    let chosen = searched.found.selection.chosen.iter();
+    let chosen = chosen.map(|&g| searched.found.candidates[g].as_ref());
+    chosen.filter(|c| c.id() == SMEAR).map(family).collect()
 }
 
 /// Whether any effect had been refused for a slow error of the reference: that is none, and they may be

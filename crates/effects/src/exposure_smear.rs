@@ -16,7 +16,7 @@
 //! Source: \[M23\] Section 4.2.1 names the effect; the series is that of the mean of a path.
 
 use focal_plane::{Camera, PointsMut, VectorsMut, rotation_vector};
-use nalgebra::Vector3;
+use nalgebra::{UnitQuaternion, Vector3};
 use star_tracker::{Disturbance, Stages};
 
 use crate::candidate::check_columns;
@@ -166,13 +166,13 @@ impl Candidate for SmearCandidate {
             return false;
         };
         let squared = self.about_s * self.about_s;
+        let mut hint = 0;
         for (i, &t_s) in rows.t_s.iter().enumerate() {
-            let mean = || {
-                let now = source.attitude(t_s)?;
+            let mut mean = || {
                 let mut mean = Vector3::zeros();
                 for (node, weight) in GAUSS_LEGENDRE_8 {
-                    let then = source.attitude(t_s + 0.5 * self.about_s * node)?;
-                    mean += rotation_vector(&then, &now) * (0.5 * weight);
+                    let turn = source.turn(t_s, 0.5 * self.about_s * node, &mut hint)?;
+                    mean += rotation_vector(&turn, &UnitQuaternion::identity()) * (0.5 * weight);
                 }
                 Some(mean)
             };

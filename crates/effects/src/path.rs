@@ -28,8 +28,6 @@ pub(crate) const GAUSS_LEGENDRE_8: [(f64, f64); 8] = [
 pub(crate) struct Path<'a> {
     camera: &'a Camera,
     rows: &'a StarRows<'a>,
-    /// The attitude of the last row's time: rows of one frame share it.
-    last: Option<(u64, UnitQuaternion<f64>)>,
     hint: usize,
 }
 
@@ -38,7 +36,6 @@ impl<'a> Path<'a> {
         Self {
             camera,
             rows,
-            last: None,
             hint: 0,
         }
     }
@@ -52,14 +49,8 @@ impl<'a> Path<'a> {
     /// How the tracker turns between the time of row `i` and `d_s` later: the same for all rows of a
     /// frame. `None` without an attitude to follow.
     pub(crate) fn turn(&mut self, i: usize, d_s: f64) -> Option<UnitQuaternion<f64>> {
-        let (t_s, attitude) = (self.rows.t_s[i], self.rows.attitude?);
-        let now = match self.last {
-            Some((bits, q)) if bits == t_s.to_bits() => q,
-            _ => attitude.attitude_near(t_s, &mut self.hint)?,
-        };
-        self.last = Some((t_s.to_bits(), now));
-        let later = attitude.attitude_near(t_s + d_s, &mut self.hint)?;
-        Some(later * now.inverse())
+        let attitude = self.rows.attitude?;
+        attitude.turn(self.rows.t_s[i], d_s, &mut self.hint)
     }
 
     /// Shift of row `i` by a [`turn`](Self::turn), px.

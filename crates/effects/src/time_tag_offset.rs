@@ -12,6 +12,7 @@
 //! `v(t + d) = v - d omega x v`.
 
 use focal_plane::{Camera, PointsMut, VectorsMut, rotation_vector};
+use nalgebra::UnitQuaternion;
 use star_tracker::{Disturbance, Stages, StarView};
 
 use crate::candidate::check_columns;
@@ -139,14 +140,15 @@ impl Candidate for OffsetCandidate {
     fn attitude_columns(&self, rows: &AttitudeRows<'_>, out: VectorsMut<'_>) -> bool {
         check_columns(1, rows.len(), out.x.len());
         let rated = rows.wx_rad_s.len() == rows.len();
+        let mut hint = 0;
         for (i, &t_s) in rows.t_s.iter().enumerate() {
-            let chord = || {
+            let mut chord = || {
                 let (source, d_s) = (rows.attitude?, self.about_s);
-                let now = source.attitude(t_s)?;
                 if d_s.abs() < SMALLEST_S {
                     return source.rate_rad_s(t_s).map(|rate| -rate);
                 }
-                Some(rotation_vector(&source.attitude(t_s + d_s)?, &now) / d_s)
+                let turn = source.turn(t_s, d_s, &mut hint)?;
+                Some(rotation_vector(&turn, &UnitQuaternion::identity()) / d_s)
             };
             let theta = match chord() {
                 Some(theta) => theta,

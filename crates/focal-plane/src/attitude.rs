@@ -50,6 +50,14 @@ pub trait AttitudeSource: Send + Sync {
         self.attitude(t_s)
     }
 
+    /// How it turns between `t_s` and `d_s` later, `q(t + d) q(t)^-1`, with a hint as for
+    /// [`attitude_near`](Self::attitude_near). A source that knows the motion around each of many
+    /// instants by itself tells what it knows around `t_s`.
+    fn turn(&self, t_s: f64, d_s: f64, hint: &mut usize) -> Option<UnitQuaternion<f64>> {
+        let now = self.attitude_near(t_s, hint)?;
+        Some(self.attitude_near(t_s + d_s, hint)? * now.inverse())
+    }
+
     /// [`attitude`](Self::attitude) for many times, all four components NaN where it gives `None`.
     ///
     /// # Panics
@@ -73,6 +81,9 @@ impl<S: AttitudeSource + ?Sized> AttitudeSource for &S {
     fn attitude_near(&self, t_s: f64, hint: &mut usize) -> Option<UnitQuaternion<f64>> {
         (**self).attitude_near(t_s, hint)
     }
+    fn turn(&self, t_s: f64, d_s: f64, hint: &mut usize) -> Option<UnitQuaternion<f64>> {
+        (**self).turn(t_s, d_s, hint)
+    }
     fn attitude_into(&self, t_s: &[f64], out: QuaternionsMut<'_>) {
         (**self).attitude_into(t_s, out);
     }
@@ -90,6 +101,9 @@ impl<S: AttitudeSource + ?Sized> AttitudeSource for Box<S> {
     }
     fn attitude_near(&self, t_s: f64, hint: &mut usize) -> Option<UnitQuaternion<f64>> {
         (**self).attitude_near(t_s, hint)
+    }
+    fn turn(&self, t_s: f64, d_s: f64, hint: &mut usize) -> Option<UnitQuaternion<f64>> {
+        (**self).turn(t_s, d_s, hint)
     }
     fn attitude_into(&self, t_s: &[f64], out: QuaternionsMut<'_>) {
         (**self).attitude_into(t_s, out);

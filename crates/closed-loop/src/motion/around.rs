@@ -5,7 +5,8 @@
 //! `-2 e_k/h^2` and more, and a smear "explains" the reference's white noise. So
 //! around a frame the path is the polynomial through the neighbours alone, three
 //! on each side that lie at least one step away, or two with their measured rates;
-//! beside a hole, and at the ends, through those of one side:
+//! beside a hole, and at the ends, through those of one side. Of noisy samples it is
+//! the polynomial of that degree nearest to more neighbours ([`super::stencil`]):
 //!
 //! ```text
 //! q(t_k + s) = exp( p_k(s) ) q_k      p_k(s_i) = log(q_i q_k^-1) = phi_i,  |s_i| >= 0.9 h
@@ -25,12 +26,13 @@
 
 use focal_plane::{AttitudeSeries, AttitudeSource, rotation_from_vector, rotation_vector};
 use nalgebra::{UnitQuaternion, Vector3};
+use rayon::prelude::*;
 use spectra::robust::median_step;
 
+use super::stencil::{SIDE, Stencil};
 use crate::gaps::GAP_STEPS;
 
-/// Neighbours on each side, without and with rates.
-const SIDE: usize = 3;
+/// Neighbours on each side with rates.
 const SIDE_WITH_RATES: usize = 2;
 /// Most conditions of a polynomial.
 const MOST: usize = 4 * SIDE_WITH_RATES;
@@ -46,10 +48,12 @@ const NOWHERE: usize = usize::MAX;
 pub(crate) struct Around {
     t_s: Vec<f64>,
     pieces: Vec<Option<Piece>>,
-    /// How far from its time a path may be asked, s.
-    reach_s: f64,
+    /// Between samples, s.
+    step_s: f64,
     /// Whether there are paths, not attitudes alone.
     resolved: bool,
+    /// Whether the samples have white noise.
+    white: bool,
 }
 
 #[derive(Clone, Debug)]
@@ -60,6 +64,8 @@ struct Piece {
     nodes: [f64; MOST],
     newton: [Vector3<f64>; MOST],
     count: usize,
+    /// How far neighbours on both sides reach, s.
+    far_s: f64,
 }
 
 impl Around {
@@ -67,15 +73,17 @@ impl Around {
     /// not resolve one (`resolved`), or hardly a frame has neighbours enough.
     pub(crate) fn new(series: &AttitudeSeries, t_s: &[f64], resolved: bool) -> Self {
         let step = median_step(series.t_s()).unwrap_or(f64::INFINITY);
+        let stencil = resolved.then(|| Stencil::of(series));
         let pieces = t_s
-            .iter()
-            .map(|&t| Piece::new(series, step, t, resolved))
+            .par_iter()
+            .map(|&t| Piece::new(series, step, t, stencil.as_ref()))
             .collect();
         let mut around = Self {
             t_s: t_s.to_vec(),
             pieces,
-            reach_s: step,
+            step_s: step,
             resolved,
+            white: stencil.is_some_and(|s| s.most > SIDE),
         };
         let paths = around.pieces.iter().flatten().filter(|p| p.count > 0);
         if resolved && 2 * paths.count() < t_s.len() {
@@ -97,6 +105,11 @@ impl Around {
     /// Whether the samples tell how the tracker moved between them.
     pub(crate) fn resolved(&self) -> bool {
         self.resolved
+    }
+
+    /// Whether paths come from more neighbours than they need, of samples with white noise.
+    pub(crate) fn is_of_many(&self) -> bool {
+        self.white
     }
 
     /// Whether it is not known how the tracker moved around a frame, where it is around others.
@@ -122,56 +135,68 @@ impl Around {
         *hint = self.nearest(t_s, *hint)?;
         let s = t_s - self.t_s[*hint];
         let piece = self.pieces[*hint].as_ref()?;
-        let reach = if piece.count > 0 { self.reach_s } else { 0.0 };
-        (s.abs() <= reach).then_some((piece, s))
+        (s.abs() <= piece.reach_s(self.step_s)).then_some((piece, s))
     }
 }
 
 impl Piece {
-    fn new(series: &AttitudeSeries, step: f64, t_s: f64, resolved: bool) -> Option<Self> {
+    fn new(
+        series: &AttitudeSeries,
+        step: f64,
+        t_s: f64,
+        stencil: Option<&Stencil>,
+    ) -> Option<Self> {
         let held = Self {
             q: series.attitude(t_s)?,
             nodes: [0.0; MOST],
             newton: [Vector3::zeros(); MOST],
             count: 0,
+            far_s: 0.0,
         };
-        Some(if resolved {
-            held.through_neighbours(series, step, t_s)
-        } else {
-            held
+        Some(match stencil {
+            Some(stencil) => held.beside(series, step, t_s, stencil),
+            None => held,
         })
     }
 
-    fn through_neighbours(mut self, series: &AttitudeSeries, step: f64, t_s: f64) -> Self {
+    /// The path of the neighbours.
+    fn beside(mut self, series: &AttitudeSeries, step: f64, t_s: f64, stencil: &Stencil) -> Self {
         let times = series.t_s();
         let samples = series.quaternions();
         let reach = series.max_gap_s().min(GAP_STEPS * step);
         let before = times.partition_point(|&t| t <= t_s - NEAR * step);
         let after = times.partition_point(|&t| t < t_s + NEAR * step);
         let rates = series.given_rates_rad_s();
-        let side = if rates.is_some() {
-            SIDE_WITH_RATES
+        let (side, most) = if rates.is_some() {
+            (SIDE_WITH_RATES, SIDE_WITH_RATES)
         } else {
-            SIDE
+            (SIDE, stencil.most)
         };
-        let mut used: Vec<usize> = Vec::with_capacity(2 * side);
         // outward on each side, as far as no hole is crossed
-        let mut last = t_s;
-        for i in (0..before).rev().take(side) {
-            if last - times[i] > reach {
-                break;
-            }
-            last = times[i];
-            used.push(i);
+        let within = |last: &mut f64, i: usize| {
+            let near = (times[i] - *last).abs() <= reach;
+            *last = times[i];
+            near.then_some(i)
+        };
+        let left = (0..before).rev().take(most);
+        let left: Vec<usize> = left.scan(t_s, |last, i| within(last, i)).collect();
+        let right = (after..times.len()).take(most);
+        let right: Vec<usize> = right.scan(t_s, |last, i| within(last, i)).collect();
+        if let (Some(&first), Some(&last)) = (left.last(), right.last()) {
+            let within = |i: usize| (times[i] - t_s).abs();
+            self.far_s = within(first).min(within(last));
         }
-        last = t_s;
-        for (i, &t) in times.iter().enumerate().skip(after).take(side) {
-            if t - last > reach {
-                break;
+        if rates.is_none() && most > SIDE {
+            let place = |i: &usize| (times[*i] - t_s, rotation_vector(&samples[*i], &self.q));
+            let [left, right] = [&left, &right].map(|s| s.iter().map(place).collect::<Vec<_>>());
+            if let Some(powers) = stencil.widest(&left, &right) {
+                self.newton[..powers.len()].copy_from_slice(&powers);
+                self.count = powers.len();
+                return self;
             }
-            last = t;
-            used.push(i);
         }
+        let [left, right] = [&left, &right].map(|s| s.iter().take(side));
+        let used: Vec<usize> = left.chain(right).copied().collect();
         let rates = rates.filter(|r| used.iter().all(|&i| r[i].iter().all(|w| w.is_finite())));
         let repeats = if rates.is_some() { 2 } else { 1 };
         let count = repeats * used.len();
@@ -201,6 +226,11 @@ impl Piece {
         }
         self.count = count;
         self
+    }
+
+    /// How far its path may be asked.
+    fn reach_s(&self, step: f64) -> f64 {
+        if self.count > 0 { step } else { 0.0 }
     }
 
     fn value(&self, s: f64) -> Vector3<f64> {
@@ -237,6 +267,19 @@ impl AttitudeSource for Around {
     fn attitude_near(&self, t_s: f64, hint: &mut usize) -> Option<UnitQuaternion<f64>> {
         let (piece, s) = self.piece(t_s, hint)?;
         Some(rotation_from_vector(&piece.value(s)) * piece.q)
+    }
+
+    /// Of samples with white noise as the frame at `t_s` knows it: another frame's path holds the error of
+    /// this one.
+    fn turn(&self, t_s: f64, d_s: f64, hint: &mut usize) -> Option<UnitQuaternion<f64>> {
+        let (piece, s) = self.piece(t_s, hint)?;
+        let now = rotation_from_vector(&piece.value(s));
+        let later = if self.white && (s + d_s).abs() <= piece.far_s {
+            rotation_from_vector(&piece.value(s + d_s))
+        } else {
+            self.attitude_near(t_s + d_s, hint)? * piece.q.inverse()
+        };
+        Some(later * now.inverse())
     }
 
     /// To first order in the rotation from the frame's attitude.
@@ -362,6 +405,46 @@ mod tests {
         };
         assert!(correlation(&around).abs() < 5.0 / (t_s.len() as f64).sqrt());
         assert!(correlation(&motion) < -0.3);
+    }
+
+    /// Slews of 20 s (half of them speeding up, half slowing down) every minute at 5 Hz, and samples of which the
+    /// interpolating path's acceleration (1.2 s/h^2) has as much noise as the slews accelerate on average. A
+    /// smear by a path is too small by the share of its noise, here a half: of more neighbours, by less
+    /// than a twentieth. The exposure is longer than a step: the path stays that of its frame.
+    #[test]
+    fn the_acceleration_of_noisy_samples_is_told() {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(10);
+        let (h, a) = (0.2, 1e-4);
+        let pull = |t: f64| match t.rem_euclid(60.0) {
+            s if s < 10.0 => a,
+            s if s < 20.0 => -a,
+            _ => 0.0,
+        };
+        let n = 3000;
+        let t_s: Vec<f64> = (0..n).map(|k| h * f64::from(k)).collect();
+        let (mut angle, mut rate) = (0.0, 0.0);
+        let sigma = a / 3.0_f64.sqrt() * h * h / 1.23;
+        let q: Vec<_> = t_s
+            .iter()
+            .map(|&t| {
+                let e: f64 = StandardNormal.sample(&mut rng);
+                let q = rotation_from_vector(&(Vector3::x() * (angle + sigma * e)));
+                angle += h * rate + 0.5 * h * h * pull(t);
+                rate += h * pull(t);
+                q
+            })
+            .collect();
+        let motion = AttitudeSeries::new(t_s.clone(), q, None).unwrap();
+        let around = Around::new(&motion, &t_s, true);
+        let (mut both, mut own, mut hint) = (0.0, 0.0, 0);
+        for &t in &t_s[30..t_s.len() - 30] {
+            let half = 0.3;
+            let turns = [-half, half].map(|d| around.turn(t, d, &mut hint).unwrap());
+            let told: f64 = turns.iter().map(|q| q.scaled_axis().x).sum::<f64>() / (half * half);
+            both += told * pull(t);
+            own += told * told;
+        }
+        assert!((both / own - 1.0).abs() < 0.05, "{}", both / own);
     }
 
     /// Beside a hole the path comes from one side: a parabola is met to the square of its turn (1e-5),

@@ -8,6 +8,7 @@ use std::collections::BTreeMap;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Refusal {
     Wander,
+    OwnPath,
     Pile,
     SlowStars,
     StandIn,
@@ -26,6 +27,7 @@ impl Refusal {
     pub(crate) fn why(self) -> &'static str {
         match self {
             Self::Wander => "a slow error of the reference is the likelier explanation",
+            Self::OwnPath => "the slow error of the reference makes as much of its own path",
             Self::Pile => {
                 "more stars would be misplaced than a catalogue has: something moves them all"
             }

@@ -90,6 +90,10 @@ impl AttitudeSource for Turned<'_> {
         Some(self.turn * self.source.attitude_near(t_s, hint)?)
     }
 
+    fn turn(&self, t_s: f64, d_s: f64, hint: &mut usize) -> Option<UnitQuaternion<f64>> {
+        Some(self.turn * self.source.turn(t_s, d_s, hint)? * self.turn.inverse())
+    }
+
     fn rate_rad_s(&self, t_s: f64) -> Option<Vector3<f64>> {
         Some(self.turn * self.source.rate_rad_s(t_s)?)
     }

@@ -78,6 +78,8 @@ pub(crate) struct Searched<'a> {
     /// The evidence under the noise that was found; `None`: as it was given.
     pub(crate) evidence: Option<StarEvidence<'a>>,
     pub(crate) wander: Option<Wander>,
+    /// Nats by which effects in place of the slow error are less likely, where there are any.
+    pub(crate) behind: Option<f64>,
 }
 
 /// One search on `white` evidence, and what of its outcome a slow error of the reference explains
@@ -110,10 +112,11 @@ pub(crate) fn attempt<'a>(
     let instead = Instead::of(white, folds, &found, may, &wander.noise, known)?;
     // Less than that imitates no effect, and would only hide one.
     if wander.axes().contains(&true) {
-        let better = instead.is_some_and(|i| i.refused.is_empty() && i.worth > worth);
-        if !better {
+        let better = |i: &Instead| i.refused.is_empty() && i.worth > worth;
+        if !instead.as_ref().is_some_and(better) {
             let searched = Searched {
                 wander: Some(wander),
+                behind: instead.map(|i| worth - i.worth),
                 ..searched
             };
             return Ok((searched, Vec::new()));
@@ -139,6 +142,7 @@ impl Searched<'_> {
             found,
             evidence: None,
             wander: None,
+            behind: None,
         }
     }
 }
@@ -524,6 +528,7 @@ fn coloured<'a>(
                     },
                     evidence: Some(white.with_noise(&noise)),
                     wander: None,
+                    behind: None,
                 },
                 wander: Wander {
                     noise,
