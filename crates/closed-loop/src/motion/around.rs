@@ -26,7 +26,6 @@
 
 use focal_plane::{AttitudeSeries, AttitudeSource, rotation_from_vector, rotation_vector};
 use nalgebra::{UnitQuaternion, Vector3};
-use rayon::prelude::*;
 use spectra::robust::median_step;
 
 use super::stencil::{SIDE, Stencil};
@@ -75,7 +74,7 @@ impl Around {
         let step = median_step(series.t_s()).unwrap_or(f64::INFINITY);
         let stencil = resolved.then(|| Stencil::of(series));
         let pieces = t_s
-            .par_iter()
+            .iter()
             .map(|&t| Piece::new(series, step, t, stencil.as_ref()))
             .collect();
         let mut around = Self {
