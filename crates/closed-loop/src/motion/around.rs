@@ -51,8 +51,6 @@ pub(crate) struct Around {
     step_s: f64,
     /// Whether there are paths, not attitudes alone.
     resolved: bool,
-    /// Whether the samples have white noise.
-    white: bool,
 }
 
 #[derive(Clone, Debug)]
@@ -63,8 +61,8 @@ struct Piece {
     nodes: [f64; MOST],
     newton: [Vector3<f64>; MOST],
     count: usize,
-    /// How far neighbours on both sides reach, s.
-    far_s: f64,
+    /// Of samples with white noise, how far the neighbours that it comes from reach on both sides, s.
+    own_s: f64,
 }
 
 impl Around {
@@ -82,12 +80,11 @@ impl Around {
             pieces,
             step_s: step,
             resolved,
-            white: stencil.is_some_and(|s| s.most > SIDE),
         };
         let paths = around.pieces.iter().flatten().filter(|p| p.count > 0);
         if resolved && 2 * paths.count() < t_s.len() {
             around.resolved = false;
-            around.pieces.iter_mut().flatten().for_each(|p| p.count = 0);
+            around.pieces.iter_mut().flatten().for_each(Piece::forget);
         }
         around
     }
@@ -106,9 +103,9 @@ impl Around {
         self.resolved
     }
 
-    /// Whether paths come from more neighbours than they need, of samples with white noise.
-    pub(crate) fn is_of_many(&self) -> bool {
-        self.white
+    /// Whether what acts around a frame's time follows the path of that frame: of samples with white noise.
+    pub(crate) fn has_own_paths(&self) -> bool {
+        self.pieces.iter().flatten().any(|p| p.own_s > 0.0)
     }
 
     /// Whether it is not known how the tracker moved around a frame, where it is around others.
@@ -150,7 +147,7 @@ impl Piece {
             nodes: [0.0; MOST],
             newton: [Vector3::zeros(); MOST],
             count: 0,
-            far_s: 0.0,
+            own_s: 0.0,
         };
         Some(match stencil {
             Some(stencil) => held.beside(series, step, t_s, stencil),
@@ -181,21 +178,18 @@ impl Piece {
         let left: Vec<usize> = left.scan(t_s, |last, i| within(last, i)).collect();
         let right = (after..times.len()).take(most);
         let right: Vec<usize> = right.scan(t_s, |last, i| within(last, i)).collect();
-        if let (Some(&first), Some(&last)) = (left.last(), right.last()) {
-            let within = |i: usize| (times[i] - t_s).abs();
-            self.far_s = within(first).min(within(last));
-        }
-        if rates.is_none() && most > SIDE {
-            let place = |i: &usize| (times[*i] - t_s, rotation_vector(&samples[*i], &self.q));
+        let place = |i: &usize| (times[*i] - t_s, rotation_vector(&samples[*i], &self.q));
+        if most > SIDE {
             let [left, right] = [&left, &right].map(|s| s.iter().map(place).collect::<Vec<_>>());
-            if let Some(powers) = stencil.widest(&left, &right) {
+            if let Some((m, powers)) = stencil.widest(&left, &right) {
                 self.newton[..powers.len()].copy_from_slice(&powers);
                 self.count = powers.len();
+                self.own_s = right[m - 1].0.min(-left[m - 1].0);
                 return self;
             }
         }
-        let [left, right] = [&left, &right].map(|s| s.iter().take(side));
-        let used: Vec<usize> = left.chain(right).copied().collect();
+        let [left, right] = [&left, &right].map(|s| &s[..s.len().min(side)]);
+        let used = [left, right].concat();
         let rates = rates.filter(|r| used.iter().all(|&i| r[i].iter().all(|w| w.is_finite())));
         let repeats = if rates.is_some() { 2 } else { 1 };
         let count = repeats * used.len();
@@ -205,9 +199,9 @@ impl Piece {
         let (nodes, newton) = (&mut self.nodes, &mut self.newton);
         let mut slope = [Vector3::zeros(); MOST];
         for (j, &i) in used.iter().enumerate() {
-            let phi = rotation_vector(&samples[i], &self.q);
+            let (s, phi) = place(&i);
             for at in repeats * j..repeats * (j + 1) {
-                nodes[at] = times[i] - t_s;
+                nodes[at] = s;
                 newton[at] = phi;
                 slope[at] = rates.map_or_else(Vector3::zeros, |rates| -unrolled(&phi, &rates[i]));
             }
@@ -224,7 +218,17 @@ impl Piece {
             }
         }
         self.count = count;
+        if stencil.most > SIDE
+            && let (Some(&first), Some(&last)) = (left.last(), right.last())
+        {
+            self.own_s = (times[last] - t_s).min(t_s - times[first]);
+        }
         self
+    }
+
+    /// Leaves the attitude alone.
+    fn forget(&mut self) {
+        (self.count, self.own_s) = (0, 0.0);
     }
 
     /// How far its path may be asked.
@@ -273,7 +277,7 @@ impl AttitudeSource for Around {
     fn turn(&self, t_s: f64, d_s: f64, hint: &mut usize) -> Option<UnitQuaternion<f64>> {
         let (piece, s) = self.piece(t_s, hint)?;
         let now = rotation_from_vector(&piece.value(s));
-        let later = if self.white && (s + d_s).abs() <= piece.far_s {
+        let later = if (s + d_s).abs() <= piece.own_s {
             rotation_from_vector(&piece.value(s + d_s))
         } else {
             self.attitude_near(t_s + d_s, hint)? * piece.q.inverse()
@@ -473,6 +477,39 @@ mod tests {
             assert!(around.attitude(t_s[k] + 0.01).is_none());
             assert!(around.rate_rad_s(t_s[k]).is_none());
         }
+    }
+
+    /// The same of noisy samples, of a tracker at rest that swings at last: many are used, of the swing fewer. A
+    /// frame without a path tells of no turn, and one with a path no more than its own neighbours know: however
+    /// far off, what is told is within some of the noise, where a path continued beyond them would be hundreds
+    /// off.
+    #[test]
+    fn a_path_is_not_continued() {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
+        let (sigma, omega) = (1e-6, std::f64::consts::TAU / 18.0);
+        let path = |t: f64| Vector3::x() * 1e-3 * (1.0 - (omega * (t - 1170.0).max(0.0)).cos());
+        let run = |from: f64, n: usize| (0..n).map(move |k| from + STEP * k as f64);
+        let t_s: Vec<f64> = run(0.0, 2400).chain(run(1220.0, 3)).collect();
+        let q = t_s.iter().map(|&t| {
+            let noise: Vector3<f64> = Vector3::from_fn(|_, _| StandardNormal.sample(&mut rng));
+            rotation_from_vector(&(path(t) + noise * sigma))
+        });
+        let motion = AttitudeSeries::new(t_s.clone(), q.collect(), None).unwrap();
+        let around = Around::new(&motion, &t_s, true);
+        assert!(around.has_own_paths());
+        let mut hint = 0;
+        for (k, &t) in t_s.iter().enumerate() {
+            if around.lost(k) {
+                assert!(k >= 2400 && around.turn(t, 0.3, &mut hint).is_none(), "{t}");
+            } else if (30..2370).contains(&k) {
+                for d in [6.0, 12.0, 18.0, 24.0].map(|steps| steps * STEP) {
+                    let turn = around.turn(t, d, &mut hint).unwrap();
+                    let off = turn.scaled_axis() - (path(t + d) - path(t));
+                    assert!(off.norm() < 20.0 * sigma, "{t}: {d} s, {off}");
+                }
+            }
+        }
+        assert!((2400..2403).all(|k| around.lost(k)));
     }
 
     /// Where most frames are lost, or the motion is not resolved, none has a path; all have attitudes.

@@ -79,13 +79,13 @@ impl Stencil {
         }
     }
 
-    /// The polynomial of most neighbours that the noise explains, by its powers: those of `before` and
-    /// `after`, nearest first, as many of one as of the other. `None`: none of more than three.
+    /// The polynomial of most neighbours that the noise explains, by its powers, and how many those are: of
+    /// `before` and `after`, nearest first, as many of one as of the other. `None`: none of more than three.
     pub(crate) fn widest(
         &self,
         before: &[Place],
         after: &[Place],
-    ) -> Option<[Vector3<f64>; COEFFICIENTS]> {
+    ) -> Option<(usize, [Vector3<f64>; COEFFICIENTS])> {
         let most = before.len().min(after.len()).min(self.most);
         let mut best = None;
         for m in WIDER.into_iter().take_while(|&m| m <= most) {
@@ -102,7 +102,7 @@ impl Stencil {
             if misfit > nu + BEYOND * (2.0 * nu).sqrt() {
                 break;
             }
-            best = Some(fitted);
+            best = Some((m, fitted));
         }
         best
     }
@@ -287,7 +287,7 @@ mod tests {
                 // one in a thousand is none
                 noise(1.0).widest(&side(-1.0), &side(1.0))
             })
-            .flat_map(|fitted| (2.0 * fitted[2]).abs().iter().copied().collect::<Vec<_>>())
+            .flat_map(|(_, fitted)| (2.0 * fitted[2]).abs().iter().copied().collect::<Vec<_>>())
             .collect();
         let sigma = robust::median(&mut all).unwrap() / 0.6745;
         assert!(

@@ -39,8 +39,8 @@ pub(crate) struct StarEvidence<'a> {
     pub(crate) motion: Option<&'a dyn AttitudeSource>,
     /// Whether the motion is known between the samples, not attitudes alone.
     pub(crate) resolved: bool,
-    /// Whether it comes from more of the reference's samples than it needs.
-    pub(crate) of_many: bool,
+    /// Whether what acts around a frame's time follows that frame's own path.
+    pub(crate) own_paths: bool,
     /// First guess of the noise of a centroid, per axis, arcsec.
     pub(crate) sigma_guess_arcsec: f64,
     /// Noise that the stars of a frame share; `None`: white.
@@ -77,7 +77,7 @@ impl<'a> StarEvidence<'a> {
             residuals: Arc::new(residuals),
             motion: source(motion),
             resolved: motion.is_some_and(Around::resolved),
-            of_many: motion.is_some_and(Around::is_of_many),
+            own_paths: motion.is_some_and(Around::has_own_paths),
             // circular to per axis
             sigma_guess_arcsec: temporal.map_or(1.0, |s| s / std::f64::consts::SQRT_2),
             noise: None,

@@ -115,7 +115,7 @@ impl<'a> Sky<'a> {
             residuals: vec![[none(), none()]].into(),
             motion: Some(flown),
             resolved: true,
-            of_many: false,
+            own_paths: false,
             sigma_guess_arcsec: 1.0,
             noise: None,
             weight: vec![1.0; data.t_s.len()].into(),
