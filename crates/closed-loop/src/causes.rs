@@ -24,7 +24,7 @@ use crate::figures;
 use crate::noise_effects;
 use crate::search::empirical::Empirical;
 use crate::search::refusal::{Refusal, Refused};
-use crate::search::selection::{columns_of, costs, judged};
+use crate::search::selection::{columns_of, costs};
 use crate::search::{Found, borrowed, family, first_column, fit};
 use crate::star::evidence::StarEvidence;
 use crate::star::search::{Searched, attempt, declared_noise};
@@ -124,20 +124,15 @@ pub(crate) fn run<'a>(
                 figures::considered(&searched.found, 0.0, &Refused::new(), &quest.surroundings);
             oversize.retain(|c| c.refused.is_some());
         }
-        if !wander.is_empty() && !last {
-            let all = &searched.found.candidates;
-            let families = wander.into_iter().map(|g| family(all[g].as_ref()));
-            refused.extend(families.map(|f| (f, Refusal::Wander)));
-            continue;
-        }
-        let own = of_own_path(&beside, &searched);
-        if !own.is_empty() && !last {
-            refused.extend(own.into_iter().map(|f| (f, Refusal::OwnPath)));
-            continue;
-        }
-        let pile = pile(&searched.found, white.data.stars.len());
-        if !pile.is_empty() && !last {
-            refused.extend(pile.into_iter().map(|f| (f, Refusal::Pile)));
+        let all = &searched.found.candidates;
+        let wander: Vec<String> = wander.iter().map(|&g| family(all[g].as_ref())).collect();
+        let own = || of_own_path(&beside, &searched);
+        let pile = || pile(&searched.found, white.data.stars.len());
+        if !last
+            && (refuse(&mut refused, wander, Refusal::Wander)
+                || refuse(&mut refused, own(), Refusal::OwnPath)
+                || refuse(&mut refused, pile(), Refusal::Pile))
+        {
             continue;
         }
         let level = searched.evidence.as_ref().unwrap_or(&beside);
@@ -151,7 +146,7 @@ pub(crate) fn run<'a>(
             let plain = Described::new(&beside, folds, &searched.found, (quest.terms)(), &[])?;
             let axes = wander.axes().iter().filter(|a| **a).count();
             if let Some(instead) = in_place_of_wander(&described, &plain, axes) {
-                let tie = searched.behind.is_some_and(|nats| nats < TIE);
+                let tie = wander.behind.is_some_and(|nats| nats < TIE);
                 // what it beats speaks against no effect
                 if reinstated(&mut refused) || tie && suffice(&beside, folds, quest, &may)? {
                     start = None;
@@ -164,8 +159,7 @@ pub(crate) fn run<'a>(
         let slow = slow_left(level, &searched);
         if let Some(slow) = slow.filter(|_| !last) {
             let doubtful = doubtful(&described, &searched.found, slow.inflation(), &may);
-            if !doubtful.is_empty() {
-                refused.extend(doubtful.into_iter().map(|f| (f, Refusal::SlowStars)));
+            if refuse(&mut refused, doubtful, Refusal::SlowStars) {
                 continue;
             }
         }
@@ -223,7 +217,6 @@ pub(crate) fn run<'a>(
             found,
             evidence,
             wander,
-            behind,
         } = searched;
         let evidence = evidence.map(|e| e.keeping(&[]));
         let level = evidence.as_ref().unwrap_or(white);
@@ -239,21 +232,18 @@ pub(crate) fn run<'a>(
             continue;
         }
         let small = remainders(&described, &found);
-        if !small.is_empty() && !last {
-            refused.extend(small.into_iter().map(|f| (f, Refusal::Remainder)));
+        if !last && refuse(&mut refused, small, Refusal::Remainder) {
             continue;
         }
         let found = judged_alone(found, &mut refused);
         let worse = worse(&found);
-        if !worse.is_empty() && !last {
-            refused.extend(worse.into_iter().map(|f| (f, Refusal::Remainder)));
+        if !last && refuse(&mut refused, worse, Refusal::Remainder) {
             continue;
         }
         let searched = Searched {
             found,
             evidence: evidence.clone(),
             wander,
-            behind,
         };
         return Ok(Named {
             slow: slow_left(level, &searched),
@@ -264,6 +254,13 @@ pub(crate) fn run<'a>(
         });
     }
     Err(CloseError::Singular)
+}
+
+/// Refuses `families`; whether there are any.
+fn refuse(refused: &mut Refused, families: Vec<String>, why: Refusal) -> bool {
+    let any = !families.is_empty();
+    refused.extend(families.into_iter().map(|f| (f, why)));
+    any
 }
 
 /// Whether the effects that are found without a slow error of the reference explain as much as any
@@ -301,10 +298,10 @@ fn reinstated(refused: &mut Refused) -> bool {
 /// Judges every effect anew without what is only described: beside it, an effect that it stands for
 /// cannot be seen. What would stand then has been refused.
 fn judged_alone(mut found: Found, refused: &mut Refused) -> Found {
-    let (fits, groups) = (&found.fitted.fits, &found.fitted.groups);
+    let groups = &found.fitted.groups;
     let chosen = &found.selection.chosen;
     let cost = costs(groups, &vec![true; groups.len()]);
-    let judged = judged(fits, groups, chosen, &cost);
+    let judged = found.fitted.trials(&cost).judged(chosen);
     for (g, judged) in judged.iter().enumerate() {
         if judged.stands() && !chosen.contains(&g) {
             let family = family(found.candidates[g].as_ref());

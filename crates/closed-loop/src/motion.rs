@@ -28,6 +28,7 @@ use focal_plane::{AttitudeSeries, AttitudeSource, Camera, rotation_vector};
 use nalgebra::{UnitQuaternion, Vector3};
 
 use crate::gaps::longest_step;
+use stencil::Stencil;
 
 /// Largest ratio of prediction error to step at which the motion is resolved.
 const RESOLVED: f64 = 0.3;
@@ -50,12 +51,23 @@ fn resolved(t_s: &[f64], q: &[UnitQuaternion<f64>], arm: f64) -> bool {
     count > 0 && error <= RESOLVED * RESOLVED * step
 }
 
-/// A series as a motion around each frame, as far as its samples resolve one; rates that were
-/// measured do not come from differences.
+/// A series as a motion around each frame, as far as its samples resolve one.
 pub(crate) fn around(series: &AttitudeSeries, t_s: &[f64], arm: f64) -> Around {
+    let stencil = is_motion(series, arm).then(|| Stencil::of(series));
+    Around::new(series, t_s, stencil.as_ref())
+}
+
+/// Whether it is not known how the tracker moved around each of the times, where it is around others.
+pub(crate) fn lost(series: &AttitudeSeries, t_s: &[f64], arm: f64) -> Vec<bool> {
+    let stencil = is_motion(series, arm).then_some(Stencil::PLAIN);
+    let around = Around::new(series, t_s, stencil.as_ref());
+    (0..t_s.len()).map(|k| around.lost(k)).collect()
+}
+
+/// Rates that were measured do not come from differences.
+fn is_motion(series: &AttitudeSeries, arm: f64) -> bool {
     let known = series.given_rates_rad_s().is_some();
-    let resolved = known || resolved(series.t_s(), series.quaternions(), arm);
-    Around::new(series, t_s, resolved)
+    known || resolved(series.t_s(), series.quaternions(), arm)
 }
 
 /// What a star half-way up the field's edge moves by as it rolls.

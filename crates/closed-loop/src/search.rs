@@ -17,7 +17,7 @@ use nalgebra::DVector;
 
 use crate::error::CloseError;
 use crate::evidence::{Amplitudes, Evidence};
-use selection::{Group, Selection, columns_of, select};
+use selection::{Group, Selection, Trials, columns_of, select};
 
 pub(crate) mod empirical;
 pub(crate) mod instants;
@@ -54,6 +54,16 @@ pub(crate) struct Fitted {
 }
 
 impl Fitted {
+    /// What its groups are tried on, each of which pays its `cost` for the search.
+    pub(crate) fn trials<'a>(&'a self, cost: &'a [f64]) -> Trials<'a> {
+        Trials {
+            fits: &self.fits,
+            groups: &self.groups,
+            cost,
+            scalars: self.scalars,
+        }
+    }
+
     /// Noise variance beside `chosen`.
     pub(crate) fn variance_beside(&self, chosen: &[usize]) -> Option<f64> {
         self.fits.variance(&columns_of(&self.groups, chosen))

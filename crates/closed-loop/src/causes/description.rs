@@ -16,7 +16,7 @@ use crate::causes::invariance::{Changing, Inner, Way};
 use crate::error::CloseError;
 use crate::figures::{self, Followed};
 use crate::search::empirical::{Empirical, Variable, flux_of, range};
-use crate::search::selection::{columns_of, costs, each, judged};
+use crate::search::selection::{Judgement, columns_of, costs, each};
 use crate::search::{Fitted, Found, borrowed, fit};
 use crate::situation::Situation;
 use crate::situation::channels_of_interest;
@@ -249,14 +249,11 @@ pub(crate) fn offer(
     };
     found.candidates.push(Arc::new(term.clone()));
     found.fitted = fit(evidence, folds, &borrowed(&found.candidates))?;
-    let (fitted, chosen) = (&found.fitted, &found.selection.chosen);
-    let mut all = judged(
-        &fitted.fits,
-        &fitted.groups,
-        chosen,
-        &vec![terms.len() as f64; fitted.groups.len()],
-    );
-    found.selection.judged.extend(all.pop());
+    let (fitted, selection) = (&found.fitted, &mut found.selection);
+    let cost = vec![terms.len() as f64; fitted.groups.len()];
+    let last = fitted.groups.len() - 1;
+    let judged = fitted.trials(&cost).within(&selection.chosen, last);
+    selection.judged.push(judged.unwrap_or(Judgement::UNSEEN));
     Ok(())
 }
 

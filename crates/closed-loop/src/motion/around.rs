@@ -67,13 +67,13 @@ struct Piece {
 
 impl Around {
     /// The motion of `series` around times in ascending order; attitudes alone where its samples do
-    /// not resolve one (`resolved`), or hardly a frame has neighbours enough.
-    pub(crate) fn new(series: &AttitudeSeries, t_s: &[f64], resolved: bool) -> Self {
+    /// not resolve one (no `stencil`), or hardly a frame has neighbours enough.
+    pub(crate) fn new(series: &AttitudeSeries, t_s: &[f64], stencil: Option<&Stencil>) -> Self {
         let step = median_step(series.t_s()).unwrap_or(f64::INFINITY);
-        let stencil = resolved.then(|| Stencil::of(series));
+        let resolved = stencil.is_some();
         let pieces = t_s
             .iter()
-            .map(|&t| Piece::new(series, step, t, stencil.as_ref()))
+            .map(|&t| Piece::new(series, step, t, stencil))
             .collect();
         let mut around = Self {
             t_s: t_s.to_vec(),
@@ -313,6 +313,10 @@ mod tests {
 
     const STEP: f64 = 0.5;
 
+    fn of(motion: &AttitudeSeries, t_s: &[f64]) -> Around {
+        Around::new(motion, t_s, Some(&Stencil::of(motion)))
+    }
+
     fn series(path: impl Fn(f64) -> Vector3<f64>, n: usize) -> AttitudeSeries {
         let t_s: Vec<f64> = (0..n).map(|k| STEP * k as f64).collect();
         let q = t_s
@@ -335,7 +339,7 @@ mod tests {
         let omega = std::f64::consts::TAU * 0.11;
         let motion = series(|t| Vector3::x() * 1e-3 * (omega * t).sin(), 200);
         let t_s: Vec<f64> = (10..190).map(|k| STEP * f64::from(k)).collect();
-        let around = Around::new(&motion, &t_s, true);
+        let around = of(&motion, &t_s);
         for &t in &t_s {
             let got = acceleration(&around, t).x;
             let true_one = -1e-3 * omega * omega * (omega * t).sin();
@@ -366,7 +370,7 @@ mod tests {
             base = turn * base;
         }
         let motion = AttitudeSeries::new(t_s.clone(), q, Some(rates)).unwrap();
-        let around = Around::new(&motion, &t_s, true);
+        let around = of(&motion, &t_s);
         for &t in &t_s[10..190] {
             let got = acceleration(&around, t).x;
             let true_one = -1e-3 * omega * omega * (omega * t).sin();
@@ -394,7 +398,7 @@ mod tests {
         let noise: Vec<f64> = (0..4000).map(|_| StandardNormal.sample(&mut rng)).collect();
         let motion = series(|t| Vector3::y() * 1e-6 * noise[nearest(t)], 4000);
         let t_s: Vec<f64> = (10..3990).map(|k| STEP * f64::from(k)).collect();
-        let around = Around::new(&motion, &t_s, true);
+        let around = of(&motion, &t_s);
         let correlation = |motion: &dyn AttitudeSource| {
             let (mut ae, mut aa, mut ee) = (0.0, 0.0, 0.0);
             for &t in &t_s {
@@ -438,7 +442,7 @@ mod tests {
             })
             .collect();
         let motion = AttitudeSeries::new(t_s.clone(), q, None).unwrap();
-        let around = Around::new(&motion, &t_s, true);
+        let around = of(&motion, &t_s);
         let (mut both, mut own, mut hint) = (0.0, 0.0, 0);
         for &t in &t_s[30..t_s.len() - 30] {
             let half = 0.3;
@@ -462,7 +466,7 @@ mod tests {
             .map(|&t| rotation_from_vector(&(Vector3::z() * 1e-3 * t * t)))
             .collect();
         let motion = AttitudeSeries::new(t_s.clone(), q, None).unwrap();
-        let around = Around::new(&motion, &t_s, true);
+        let around = of(&motion, &t_s);
         assert!(around.resolved());
         for &t in &t_s[..10] {
             let rate = around.rate_rad_s(t).unwrap();
@@ -495,7 +499,7 @@ mod tests {
             rotation_from_vector(&(path(t) + noise * sigma))
         });
         let motion = AttitudeSeries::new(t_s.clone(), q.collect(), None).unwrap();
-        let around = Around::new(&motion, &t_s, true);
+        let around = of(&motion, &t_s);
         assert!(around.has_own_paths());
         let mut hint = 0;
         for (k, &t) in t_s.iter().enumerate() {
@@ -522,10 +526,7 @@ mod tests {
         let q = t_s.iter().map(turn).collect();
         let motion = AttitudeSeries::new(t_s.clone(), q, None).unwrap();
         let smooth = series(|t| Vector3::z() * 1e-3 * t, 30);
-        for around in [
-            Around::new(&motion, &t_s, true),
-            Around::new(&smooth, smooth.t_s(), false),
-        ] {
+        for around in [of(&motion, &t_s), Around::new(&smooth, smooth.t_s(), None)] {
             assert!(!around.resolved() && !around.lost(4));
             let t = around.t_s[4];
             assert!(around.attitude(t).is_some() && around.attitude(t + 0.01).is_none());

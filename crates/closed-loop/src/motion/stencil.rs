@@ -33,7 +33,7 @@ use crate::gaps::longest_step;
 /// Neighbours on each side whose polynomial goes through all.
 pub(crate) const SIDE: usize = 3;
 /// Coefficients of the polynomial.
-pub(crate) const COEFFICIENTS: usize = 2 * SIDE;
+const COEFFICIENTS: usize = 2 * SIDE;
 /// More neighbours on each side that are tried.
 const WIDER: [usize; 5] = [6, 8, 12, 16, 24];
 /// Standard deviations beyond which a misfit is not noise.
@@ -46,7 +46,7 @@ const PREDICTIONS: usize = 2000;
 const MEDIAN: f64 = 0.4549;
 
 /// A neighbour: its time from the frame's, and its turn from it.
-pub(crate) type Place = (f64, Vector3<f64>);
+type Place = (f64, Vector3<f64>);
 
 /// What the samples of a series allow.
 #[derive(Clone, Debug)]
@@ -58,6 +58,12 @@ pub(crate) struct Stencil {
 }
 
 impl Stencil {
+    /// The nearest alone.
+    pub(crate) const PLAIN: Self = Self {
+        variance: Vector3::new(0.0, 0.0, 0.0),
+        most: SIDE,
+    };
+
     pub(crate) fn of(series: &AttitudeSeries) -> Self {
         let mut most = SIDE;
         let first = errors(series, SIDE);

@@ -117,25 +117,31 @@ pub(crate) fn columns_of(groups: &[Group], chosen: &[usize]) -> Vec<usize> {
 /// Runs the search. `scalars` is the number of independent scalars in the data;
 /// only groups that `may` be chosen are, and only they are paid for.
 pub(crate) fn select(fits: &Fits, groups: &[Group], may: &[bool], scalars: f64) -> Selection {
-    let cost = costs(groups, may);
+    let cost = &costs(groups, may);
+    let trials = Trials {
+        fits,
+        groups,
+        cost,
+        scalars,
+    };
     let mut chosen: Vec<usize> = Vec::new();
     // Each round adds one or stops; a group dropped by the backward check may
     // not return, so the search ends.
     let mut banned = vec![false; groups.len()];
     loop {
         let may: Vec<bool> = (0..groups.len()).map(|g| may[g] && !banned[g]).collect();
-        let tried = tried(fits, groups, &may, &chosen, scalars, &cost);
+        let tried = trials.tried(&may, &chosen);
         let added = match tried.iter().find(|t| t.judgement.stands()) {
             Some(best) => vec![best.group],
-            None => hidden(fits, groups, &tried, &chosen, scalars, &cost),
+            None => trials.hidden(&tried, &chosen),
         };
         if added.is_empty() {
             break;
         }
         chosen.extend(added);
-        prune(fits, groups, &mut chosen, &mut banned, &cost);
+        trials.prune(&mut chosen, &mut banned);
     }
-    let judged = judged(fits, groups, &chosen, &cost);
+    let judged = trials.judged(&chosen);
     Selection { chosen, judged }
 }
 
@@ -151,95 +157,6 @@ pub(crate) fn costs(groups: &[Group], may: &[bool]) -> Vec<f64> {
     groups.iter().map(|g| root(g) * all.max(1.0)).collect()
 }
 
-/// Groups that may be added to `chosen`, best first: by the gain out of fold after
-/// the price of their parameters and choices.
-pub(crate) fn ranked(
-    fits: &Fits,
-    groups: &[Group],
-    may: &[bool],
-    chosen: &[usize],
-    scalars: f64,
-    cost: &[f64],
-) -> Vec<usize> {
-    let tried = tried(fits, groups, may, chosen, scalars, cost).into_iter();
-    let standing = tried.filter(|t| t.judgement.stands());
-    standing.map(|t| t.group).collect()
-}
-
-/// A group that was tried beside the chosen ones.
-struct Tried {
-    group: usize,
-    judgement: Judgement,
-    /// Its p-value if the noise were white, times what the search costs it.
-    white: f64,
-    /// Gain after its price, nats.
-    rank: f64,
-}
-
-/// All groups that may be tried beside `chosen`, the largest gain after its price first.
-fn tried(
-    fits: &Fits,
-    groups: &[Group],
-    may: &[bool],
-    chosen: &[usize],
-    scalars: f64,
-    cost: &[f64],
-) -> Vec<Tried> {
-    let Some(base) = out_of_fold(fits, groups, chosen) else {
-        return Vec::new();
-    };
-    let mut tried: Vec<Tried> = (0..groups.len())
-        .filter(|&g| may[g] && !chosen.contains(&g))
-        .filter(|&g| chosen.iter().all(|&c| groups[c].family != groups[g].family))
-        .filter_map(|g| {
-            let (judgement, white) = standing(fits, groups, chosen, g, &base, cost)?;
-            Some(Tried {
-                group: g,
-                rank: judgement.delta_loglik - price(&groups[g], scalars),
-                judgement,
-                white,
-            })
-        })
-        .collect();
-    tried.sort_by(|a, b| b.rank.total_cmp(&a.rank));
-    tried
-}
-
-/// The two groups that gain most together where each stands beside the other, though of those `tried` none
-/// does alone; or none.
-fn hidden(
-    fits: &Fits,
-    groups: &[Group],
-    tried: &[Tried],
-    chosen: &[usize],
-    scalars: f64,
-    cost: &[f64],
-) -> Vec<usize> {
-    let alone = tried
-        .iter()
-        .filter(|t| t.judgement.delta_loglik > 0.0 && t.white < FAMILY_ALPHA);
-    let alone: Vec<&Tried> = alone.take(HIDDEN).collect();
-    let mut best = (0.0, Vec::new());
-    for (i, a) in alone.iter().enumerate() {
-        for b in &alone[i + 1..] {
-            if groups[a.group].family == groups[b.group].family {
-                continue;
-            }
-            let pair = [a.group, b.group];
-            let set = [chosen, &pair].concat();
-            let within = |g| within(fits, groups, &set, g, cost).filter(Judgement::stands);
-            let Some(second) = within(b.group) else {
-                continue;
-            };
-            let both = a.rank + second.delta_loglik - price(&groups[b.group], scalars);
-            if both > best.0 && within(a.group).is_some() {
-                best = (both, pair.to_vec());
-            }
-        }
-    }
-    best.1
-}
-
 /// What a group pays for its parameters and choices, nats.
 pub(crate) fn price(group: &Group, scalars: f64) -> f64 {
     (group.columns.len() + group.choices) as f64 * each(scalars)
@@ -250,82 +167,142 @@ pub(crate) fn each(scalars: f64) -> f64 {
     0.5 * scalars.max(2.0).ln()
 }
 
-/// Standing of every group beside (for a chosen one: within) `chosen`.
-pub(crate) fn judged(
-    fits: &Fits,
-    groups: &[Group],
-    chosen: &[usize],
-    cost: &[f64],
-) -> Vec<Judgement> {
-    (0..groups.len())
-        .map(|g| within(fits, groups, chosen, g, cost).unwrap_or(Judgement::UNSEEN))
-        .collect()
+/// A group that was tried beside the chosen ones.
+pub(crate) struct Tried {
+    pub(crate) group: usize,
+    pub(crate) judgement: Judgement,
+    /// Its p-value if the noise were white, times what the search costs it.
+    white: f64,
+    /// Gain after its price, nats.
+    rank: f64,
 }
 
-/// Drops chosen groups that no longer stand beside the others.
-fn prune(
-    fits: &Fits,
-    groups: &[Group],
-    chosen: &mut Vec<usize>,
-    banned: &mut [bool],
-    cost: &[f64],
-) {
-    loop {
-        let falls = |&g: &usize| within(fits, groups, chosen, g, cost).is_some_and(|j| !j.stands());
-        let fallen = chosen.iter().copied().find(falls);
-        let Some(g) = fallen else { return };
-        banned[g] = true;
-        chosen.retain(|&c| c != g);
+/// What groups are tried on.
+#[derive(Clone, Copy)]
+pub(crate) struct Trials<'a> {
+    pub(crate) fits: &'a Fits,
+    pub(crate) groups: &'a [Group],
+    /// What each pays for the search ([`costs`]).
+    pub(crate) cost: &'a [f64],
+    /// Independent scalars in the data.
+    pub(crate) scalars: f64,
+}
+
+impl Trials<'_> {
+    /// All groups that may be tried beside `chosen`, the largest gain out of fold after the price of their
+    /// parameters and choices first.
+    pub(crate) fn tried(&self, may: &[bool], chosen: &[usize]) -> Vec<Tried> {
+        let Some(base) = self.out_of_fold(chosen) else {
+            return Vec::new();
+        };
+        let groups = self.groups;
+        let mut tried: Vec<Tried> = (0..groups.len())
+            .filter(|&g| may[g] && !chosen.contains(&g))
+            .filter(|&g| chosen.iter().all(|&c| groups[c].family != groups[g].family))
+            .filter_map(|g| {
+                let (judgement, white) = self.standing(chosen, g, &base)?;
+                Some(Tried {
+                    group: g,
+                    rank: judgement.delta_loglik - price(&groups[g], self.scalars),
+                    judgement,
+                    white,
+                })
+            })
+            .collect();
+        tried.sort_by(|a, b| b.rank.total_cmp(&a.rank));
+        tried
     }
-}
 
-fn out_of_fold(fits: &Fits, groups: &[Group], chosen: &[usize]) -> Option<OutOfFold> {
-    fits.out_of_fold(&columns_of(groups, chosen))
-}
-
-/// Standing of a group beside the others of `set`; `None` if these cannot be told apart.
-fn within(
-    fits: &Fits,
-    groups: &[Group],
-    set: &[usize],
-    g: usize,
-    cost: &[f64],
-) -> Option<Judgement> {
-    let others: Vec<usize> = set.iter().copied().filter(|&c| c != g).collect();
-    let base = out_of_fold(fits, groups, &others)?;
-    let standing = standing(fits, groups, &others, g, &base, cost);
-    Some(standing.map_or(Judgement::UNSEEN, |(judgement, _)| judgement))
-}
-
-/// Standing of a group beside `others`, and its p-value if the noise were white; `None` if it cannot be told
-/// from them.
-fn standing(
-    fits: &Fits,
-    groups: &[Group],
-    others: &[usize],
-    g: usize,
-    base: &OutOfFold,
-    cost: &[f64],
-) -> Option<(Judgement, f64)> {
-    let mut set = columns_of(groups, others);
-    let first = set.len();
-    set.extend(&groups[g].columns);
-    let which: Vec<usize> = (first..set.len()).collect();
-    if which.is_empty() {
-        return None;
-    }
-    let (with, estimate) = (fits.out_of_fold(&set)?, fits.estimate(&set)?);
-    let judgement = Judgement {
-        delta_loglik: with.total_loglik() - base.total_loglik(),
-        credible: groups[g]
-            .bounds
+    /// The two groups that gain most together where each stands beside the other, though of those `tried` none
+    /// does alone; or none.
+    fn hidden(&self, tried: &[Tried], chosen: &[usize]) -> Vec<usize> {
+        let alone = tried
             .iter()
-            .zip(&which)
-            .all(|([low, high], &i)| (*low..=*high).contains(&estimate.value[i])),
-        p_value: (estimate.p_value(&which) * cost[g]).min(1.0),
-        observable: true,
-    };
-    Some((judgement, estimate.white_p_value(&which) * cost[g]))
+            .filter(|t| t.judgement.delta_loglik > 0.0 && t.white < FAMILY_ALPHA);
+        let alone: Vec<&Tried> = alone.take(HIDDEN).collect();
+        let mut best = (0.0, Vec::new());
+        for (i, a) in alone.iter().enumerate() {
+            for b in &alone[i + 1..] {
+                if self.groups[a.group].family == self.groups[b.group].family {
+                    continue;
+                }
+                let pair = [a.group, b.group];
+                let set = [chosen, &pair].concat();
+                let within = |g| self.within(&set, g).filter(Judgement::stands);
+                let Some(second) = within(b.group) else {
+                    continue;
+                };
+                let price = price(&self.groups[b.group], self.scalars);
+                let both = a.rank + second.delta_loglik - price;
+                if both > best.0 && within(a.group).is_some() {
+                    best = (both, pair.to_vec());
+                }
+            }
+        }
+        best.1
+    }
+
+    /// Standing of every group beside (for a chosen one: within) `chosen`.
+    pub(crate) fn judged(&self, chosen: &[usize]) -> Vec<Judgement> {
+        let base = self.out_of_fold(chosen);
+        let beside = |g| Some(self.standing(chosen, g, base.as_ref()?)?.0);
+        let judge = |g| {
+            if chosen.contains(&g) {
+                self.within(chosen, g)
+            } else {
+                beside(g)
+            }
+        };
+        let all = 0..self.groups.len();
+        all.map(|g| judge(g).unwrap_or(Judgement::UNSEEN)).collect()
+    }
+
+    /// Drops chosen groups that no longer stand beside the others.
+    fn prune(&self, chosen: &mut Vec<usize>, banned: &mut [bool]) {
+        loop {
+            let falls = |&g: &usize| self.within(chosen, g).is_some_and(|j| !j.stands());
+            let fallen = chosen.iter().copied().find(falls);
+            let Some(g) = fallen else { return };
+            banned[g] = true;
+            chosen.retain(|&c| c != g);
+        }
+    }
+
+    fn out_of_fold(&self, chosen: &[usize]) -> Option<OutOfFold> {
+        self.fits.out_of_fold(&columns_of(self.groups, chosen))
+    }
+
+    /// Standing of a group of `set` beside the others; `None` if these cannot be told apart.
+    pub(crate) fn within(&self, set: &[usize], g: usize) -> Option<Judgement> {
+        let others: Vec<usize> = set.iter().copied().filter(|&c| c != g).collect();
+        let base = self.out_of_fold(&others)?;
+        let standing = self.standing(&others, g, &base);
+        Some(standing.map_or(Judgement::UNSEEN, |(judgement, _)| judgement))
+    }
+
+    /// Standing of a group beside `others`, and its p-value if the noise were white; `None` if it cannot be told
+    /// from them.
+    fn standing(&self, others: &[usize], g: usize, base: &OutOfFold) -> Option<(Judgement, f64)> {
+        let mut set = columns_of(self.groups, others);
+        let first = set.len();
+        set.extend(&self.groups[g].columns);
+        let which: Vec<usize> = (first..set.len()).collect();
+        if which.is_empty() {
+            return None;
+        }
+        let (with, estimate) = (self.fits.out_of_fold(&set)?, self.fits.estimate(&set)?);
+        let bounds = self.groups[g].bounds.iter().zip(&which);
+        let judgement = Judgement {
+            delta_loglik: with.total_loglik() - base.total_loglik(),
+            credible: bounds
+                .into_iter()
+                .all(|([low, high], &i)| (*low..=*high).contains(&estimate.value[i])),
+            p_value: (estimate.p_value(&which) * self.cost[g]).min(1.0),
+            observable: true,
+        };
+        let white = estimate.white_p_value(&which) * self.cost[g];
+        Some((judgement, white))
+    }
 }
 
 #[cfg(test)]
@@ -428,8 +405,13 @@ mod tests {
         let chosen = |size: f64| {
             let grams = BlockGrams::accumulate(&Hiding::new(size, &folds), &folds);
             let fits = Fits::new(&grams, &folds, &layout, 1.0).unwrap();
-            let cost = costs(&groups, &[true, true]);
-            let alone = judged(&fits, &groups, &[], &cost);
+            let trials = Trials {
+                fits: &fits,
+                groups: &groups,
+                cost: &costs(&groups, &[true, true]),
+                scalars: 1000.0,
+            };
+            let alone = trials.judged(&[]);
             assert!(alone.iter().all(|j| !j.stands()), "{alone:?}");
             select(&fits, &groups, &[true, true], 1000.0).chosen
         };

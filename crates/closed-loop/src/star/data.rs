@@ -678,15 +678,11 @@ fn set_aside_lost(inputs: &Inputs<'_>, attitude: &mut [Option<UnitQuaternion<f64
         AttitudeSeries::new(t_s.clone(), q, None).ok()
     };
     let arm = motion::roll_arm(inputs.camera);
-    let around = match inputs.reference {
-        Some(reference) => Some(motion::around(reference, &t_s, arm)),
-        None => own().map(|own| motion::around(&own, &t_s, arm)),
+    let lost = match inputs.reference {
+        Some(reference) => motion::lost(reference, &t_s, arm),
+        None => own().map_or_else(Vec::new, |own| motion::lost(&own, &t_s, arm)),
     };
-    if let Some(around) = around {
-        for (i, &k) in solved.iter().enumerate() {
-            if around.lost(i) {
-                attitude[k] = None;
-            }
-        }
+    for (&k, _) in solved.iter().zip(lost).filter(|(_, lost)| *lost) {
+        attitude[k] = None;
     }
 }

@@ -106,7 +106,7 @@ impl AttitudeSource for Turned<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::motion::Around;
+    use crate::motion;
     use crate::star::data::{Inputs, Star};
     use centroid::CentroidError;
     use effects::{ParameterValue, Parameters, Surroundings};
@@ -195,8 +195,10 @@ mod tests {
         }
         // and move as they do
         let t_s = data.frames.t_s.clone();
-        data.follow(Some(&Around::new(&askew, &t_s, true).turned(&data.turn())));
-        truth.follow(Some(&Around::new(&straight, &t_s, true)));
+        data.follow(Some(
+            &motion::around(&askew, &t_s, 1.0).turned(&data.turn()),
+        ));
+        truth.follow(Some(&motion::around(&straight, &t_s, 1.0)));
         for axis in 0..2 {
             for row in 0..data.t_s.len() {
                 let (v, its) = (data.velocity[axis][row], truth.velocity[axis][row]);

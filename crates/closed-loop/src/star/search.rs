@@ -40,7 +40,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 use crate::error::CloseError;
 use crate::evidence::Evidence;
 use crate::search::selection::{
-    FAMILY_ALPHA, Group, Judgement, Selection, columns_of, costs, judged, price, ranked,
+    FAMILY_ALPHA, Group, Judgement, Selection, columns_of, costs, price,
 };
 use crate::search::{Fitted, Found, borrowed, fit_grams, polish, search};
 use crate::star::evidence::StarEvidence;
@@ -70,6 +70,8 @@ pub(crate) struct Wander {
     pub(crate) ratio: [f64; 3],
     /// The same of X and Y together with one size and time.
     pub(crate) alike: f64,
+    /// Nats by which effects in its place are less likely, where there are any.
+    pub(crate) behind: Option<f64>,
 }
 
 /// What the search ends with.
@@ -78,8 +80,6 @@ pub(crate) struct Searched<'a> {
     /// The evidence under the noise that was found; `None`: as it was given.
     pub(crate) evidence: Option<StarEvidence<'a>>,
     pub(crate) wander: Option<Wander>,
-    /// Nats by which effects in place of the slow error are less likely, where there are any.
-    pub(crate) behind: Option<f64>,
 }
 
 /// One search on `white` evidence, and what of its outcome a slow error of the reference explains
@@ -114,9 +114,9 @@ pub(crate) fn attempt<'a>(
     if wander.axes().contains(&true) {
         let better = |i: &Instead| i.refused.is_empty() && i.worth > worth;
         if !instead.as_ref().is_some_and(better) {
+            let behind = instead.map(|i| worth - i.worth);
             let searched = Searched {
-                wander: Some(wander),
-                behind: instead.map(|i| worth - i.worth),
+                wander: Some(Wander { behind, ..wander }),
                 ..searched
             };
             return Ok((searched, Vec::new()));
@@ -142,7 +142,6 @@ impl Searched<'_> {
             found,
             evidence: None,
             wander: None,
-            behind: None,
         }
     }
 }
@@ -484,15 +483,9 @@ fn coloured<'a>(
         let mut shortlist: Vec<usize> = Vec::new();
         if chosen.len() < MOST {
             for fitted in [&plain, &filtered] {
-                let list = ranked(
-                    &fitted.fits,
-                    &fitted.groups,
-                    &open,
-                    &chosen,
-                    fitted.scalars,
-                    &trial.cost,
-                );
-                shortlist.extend(list.into_iter().take(SHORTLIST));
+                let tried = fitted.trials(&trial.cost).tried(&open, &chosen).into_iter();
+                let standing = tried.filter(|t| t.judgement.stands());
+                shortlist.extend(standing.map(|t| t.group).take(SHORTLIST));
             }
         }
         shortlist.sort_unstable();
@@ -513,7 +506,7 @@ fn coloured<'a>(
             .max_by(|a, b| a.1.total_cmp(&b.1));
         let Some((added, _, its_noise)) = best else {
             let fitted = beside(under(&noise)?)?;
-            let mut judged = judged(&fitted.fits, &fitted.groups, &chosen, &trial.cost);
+            let mut judged = fitted.trials(&trial.cost).judged(&chosen);
             for (&g, judgement) in chosen.iter().zip(stands) {
                 judged[g] = judgement;
             }
@@ -528,13 +521,13 @@ fn coloured<'a>(
                     },
                     evidence: Some(white.with_noise(&noise)),
                     wander: None,
-                    behind: None,
                 },
                 wander: Wander {
                     noise,
                     alike: base.rotations.alike_ratio(&noise),
                     rotations: base.rotations,
                     ratio,
+                    behind: None,
                 },
                 white: white.drawn.is_none().then_some(plain),
                 moments,
