@@ -94,6 +94,20 @@ impl Folds {
         out
     }
 
+    /// One part in `parts` of each block, a later one in each block than in the one before, so that what
+    /// comes again as blocks do is seen at all its stages.
+    pub fn thinned(&self, parts: usize) -> Self {
+        let part = |(k, block): (usize, &Range<usize>)| {
+            let edge = |i: usize| block.start + i * block.len() / parts;
+            edge(k % parts)..edge(k % parts + 1)
+        };
+        Self {
+            blocks: self.blocks.iter().enumerate().map(part).collect(),
+            fold_of_block: self.fold_of_block.clone(),
+            ..*self
+        }
+    }
+
     /// The frames of each fold.
     pub fn fold_ranges(&self) -> Vec<Range<usize>> {
         (0..self.count)
@@ -163,6 +177,18 @@ mod tests {
         assert_eq!((folds.blocks.len(), coarse.blocks.len()), (60, 15));
         assert_eq!(coarse.blocks[0].end, folds.blocks[4].end);
         assert!(coarse.blocks.windows(2).all(|w| w[0].end == w[1].start));
+    }
+
+    #[test]
+    fn thinned_blocks_are_every_part_in_turn() {
+        let folds = Folds::cut(100_003);
+        let thin = folds.thinned(8);
+        assert_eq!(thin.fold_of_block, folds.fold_of_block);
+        for (k, (part, block)) in thin.blocks.iter().zip(&folds.blocks).enumerate() {
+            let expected = block.start + (k % 8) * block.len() / 8;
+            assert_eq!(part.start, expected);
+            assert!(part.end <= block.end && part.len().abs_diff(block.len() / 8) <= 1);
+        }
     }
 
     #[test]

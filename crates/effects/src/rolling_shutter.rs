@@ -137,9 +137,10 @@ impl Candidate for ShutterCandidate {
         }
         let mut path = Path::new(camera, rows);
         for i in 0..rows.len() {
-            // three substitutions: each shrinks the error by line_time |vy|, 4e-4 in a fast slew
-            let mut shift = [0.0; 2];
-            for _ in 0..3 {
+            // from the velocity two substitutions: each shrinks the error by line_time |vy|, 4e-4 in a fast slew
+            let mut shift =
+                [rows.vx_px_s[i], rows.vy_px_s[i]].map(|v| v * self.about_s * rows.y_px[i]);
+            for _ in 0..2 {
                 shift = path.shift(i, self.about_s * (rows.y_px[i] + shift[1]));
             }
             out.x[i] = shift[0] / self.about_s;

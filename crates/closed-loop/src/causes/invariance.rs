@@ -135,10 +135,14 @@ impl Candidate for Changing<'_> {
         out.x.fill(0.0);
         out.y.fill(0.0);
         for (way, columns) in self.ways() {
+            let values = match way {
+                Way::With(variable, _) => variable.values(rows),
+                Way::Star(_) => Vec::new(),
+            };
             for i in 0..n {
                 let (k, z) = match way {
-                    Way::With(variable, [low, high]) => {
-                        let z = (2.0 * variable.value(rows, i) - low - high) / (high - low);
+                    Way::With(_, [low, high]) => {
+                        let z = (2.0 * values[i] - low - high) / (high - low);
                         (columns.start, if z.is_finite() { z } else { 0.0 })
                     }
                     Way::Star(ids) => match ids.iter().position(|&id| id == rows.star_id[i]) {

@@ -56,6 +56,8 @@ pub(crate) struct Around {
 #[derive(Clone, Debug)]
 struct Piece {
     q: UnitQuaternion<f64>,
+    /// Back to there from where the path is at the frame's own time.
+    back: UnitQuaternion<f64>,
     /// Times of the neighbours from the frame's, and Newton's coefficients; none where the path is not
     /// known.
     nodes: [f64; MOST],
@@ -93,6 +95,7 @@ impl Around {
     pub(crate) fn turned(mut self, turn: &UnitQuaternion<f64>) -> Self {
         for piece in self.pieces.iter_mut().flatten() {
             piece.q = turn * piece.q;
+            piece.back = turn * piece.back * turn.inverse();
             piece.newton.iter_mut().for_each(|phi| *phi = turn * *phi);
         }
         self
@@ -144,13 +147,14 @@ impl Piece {
     ) -> Option<Self> {
         let held = Self {
             q: series.attitude(t_s)?,
+            back: UnitQuaternion::identity(),
             nodes: [0.0; MOST],
             newton: [Vector3::zeros(); MOST],
             count: 0,
             own_s: 0.0,
         };
         Some(match stencil {
-            Some(stencil) => held.beside(series, step, t_s, stencil),
+            Some(stencil) => held.beside(series, step, t_s, stencil).ready(),
             None => held,
         })
     }
@@ -226,9 +230,15 @@ impl Piece {
         self
     }
 
+    fn ready(mut self) -> Self {
+        self.back = rotation_from_vector(&self.value(0.0)).inverse();
+        self
+    }
+
     /// Leaves the attitude alone.
     fn forget(&mut self) {
         (self.count, self.own_s) = (0, 0.0);
+        self.back = UnitQuaternion::identity();
     }
 
     /// How far its path may be asked.
@@ -276,13 +286,17 @@ impl AttitudeSource for Around {
     /// this one.
     fn turn(&self, t_s: f64, d_s: f64, hint: &mut usize) -> Option<UnitQuaternion<f64>> {
         let (piece, s) = self.piece(t_s, hint)?;
-        let now = rotation_from_vector(&piece.value(s));
+        let back = if s == 0.0 {
+            piece.back
+        } else {
+            rotation_from_vector(&piece.value(s)).inverse()
+        };
         let later = if (s + d_s).abs() <= piece.own_s {
             rotation_from_vector(&piece.value(s + d_s))
         } else {
             self.attitude_near(t_s + d_s, hint)? * piece.q.inverse()
         };
-        Some(later * now.inverse())
+        Some(later * back)
     }
 
     /// To first order in the rotation from the frame's attitude.

@@ -152,6 +152,18 @@ impl Variable {
             Self::Phase(_) | Self::Star(_) | Self::Slot(_) | Self::Window => f64::NAN,
         }
     }
+
+    /// Its values in all rows.
+    pub(crate) fn values(&self, rows: &StarRows<'_>) -> Vec<f64> {
+        match self {
+            Self::Housekeeping(_, series) => {
+                let mut out = vec![0.0; rows.len()];
+                series.at_into(rows.t_s, &mut out);
+                out
+            }
+            _ => (0..rows.len()).map(|i| self.value(rows, i)).collect(),
+        }
+    }
 }
 
 /// Flux over that of magnitude 5.
@@ -359,11 +371,11 @@ impl Candidate for Empirical {
         out.y.fill(0.0);
         let per_arcsec = camera.arcsec_per_px().map(|s| 1.0 / s);
         let half = camera.half_size_px();
+        let by = self.by.as_ref();
+        let by = by.map(|(by, scale)| (by.values(rows), scale));
+        let values = self.variable.values(rows);
         for i in 0..n {
-            let times = self
-                .by
-                .as_ref()
-                .map_or(1.0, |(by, scale)| scale.of(by.value(rows, i)));
+            let times = by.as_ref().map_or(1.0, |(by, scale)| scale.of(by[i]));
             let mut put = |k: usize, dx: f64, dy: f64| {
                 if k < count {
                     out.x[k * n + i] = times * dx * per_arcsec[0];
@@ -373,8 +385,8 @@ impl Candidate for Empirical {
             let (x, y) = (rows.x_px[i] / half[0], rows.y_px[i] / half[1]);
             let at = [rows.x_px[i], rows.y_px[i]];
             match &self.variable {
-                Variable::Position(axis) => {
-                    for (k, g) in legendre(self.scale.of(at[*axis])).into_iter().enumerate() {
+                Variable::Position(_) => {
+                    for (k, g) in legendre(self.scale.of(values[i])).into_iter().enumerate() {
                         put(2 * k, g, 0.0);
                         put(2 * k + 1, 0.0, g);
                     }
@@ -385,7 +397,8 @@ impl Candidate for Empirical {
                     let variance = rows.landed_variance_px2[*axis][i];
                     let (mut s, mut c) = (sin, cos);
                     for (k, order) in (1..).enumerate().take(HARMONICS) {
-                        let [x, y] = along.map(|a| a * effects::left_of_wave(order, variance));
+                        let left = effects::left_of_wave(order, variance);
+                        let [x, y] = along.map(|a| a * left);
                         put(2 * k, s * x, s * y);
                         put(2 * k + 1, c * x, c * y);
                         (s, c) = (s * cos + c * sin, c * cos - s * sin);
@@ -435,8 +448,8 @@ impl Candidate for Empirical {
                         put(2 * k + 1, 0.0, 1.0);
                     }
                 }
-                smooth => {
-                    let g = legendre(self.scale.of(smooth.value(rows, i)));
+                _ => {
+                    let g = legendre(self.scale.of(values[i]));
                     for (k, g) in g.into_iter().enumerate().take(count.div_ceil(4)) {
                         put(4 * k, g, 0.0);
                         put(4 * k + 1, 0.0, g);

@@ -26,6 +26,8 @@ use crate::star::nuisance::StarNuisance;
 
 /// Frames whose columns are gone through at once where no products are formed.
 pub(crate) const CHUNK_FRAMES: usize = 64;
+/// Of so many such columns in two forms are compared, or twice as many.
+const MOST_COMPARED: usize = 300;
 
 /// The columns of one bundle's star rows.
 pub(crate) struct StarColumns<'a> {
@@ -230,9 +232,10 @@ impl StarColumns<'_> {
         let weight = &mut out.weight;
         weight.clear();
         weight.extend(rows.clone().map(|row| self.weight_of(row)));
-        for (i, &w) in weight.iter().enumerate() {
-            let values = out.shared.column_mut(i);
-            values.into_iter().for_each(|v| *v = weighed(*v, w));
+        let shared = out.shared.nrows().max(1);
+        let rows_of_shared = out.shared.as_mut_slice().chunks_exact_mut(shared);
+        for (values, &w) in rows_of_shared.zip(&*weight) {
+            values.iter_mut().for_each(|v| *v = weighed(*v, w));
         }
         for own in out.own.iter_mut().filter(|m| !m.is_empty()) {
             for column in own.as_mut_slice().chunks_exact_mut(weight.len()) {
@@ -245,13 +248,15 @@ impl StarColumns<'_> {
     }
 
     /// Weighed squares of what the first two candidates, at the same `values`, shift the rows apart by,
-    /// arcsec^2; infinite where one of them does not act.
+    /// arcsec^2, of a long run as some of its frames tell; infinite where one of them does not act.
     pub(crate) fn distance(&self, values: &[f64]) -> f64 {
         let data = self.data;
         let arcsec = data.camera.arcsec_per_px();
         let frames = data.frames.frames();
-        let chunks: Vec<f64> = (0..frames.div_ceil(CHUNK_FRAMES))
-            .into_par_iter()
+        let chunks = frames.div_ceil(CHUNK_FRAMES);
+        let every = (chunks / MOST_COMPARED).max(1);
+        let compared = (0..chunks).into_par_iter().step_by(every);
+        let squares: Vec<f64> = compared
             .map(|chunk| {
                 let end = ((chunk + 1) * CHUNK_FRAMES).min(frames);
                 let first_row = &data.frames.first_row;
@@ -277,7 +282,7 @@ impl StarColumns<'_> {
                 sum
             })
             .collect();
-        chunks.iter().sum()
+        squares.iter().sum::<f64>() * every as f64
     }
 
     /// What `amplitudes` (nuisance and candidates) shift the filled rows of `frames`

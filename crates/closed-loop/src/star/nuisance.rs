@@ -147,9 +147,10 @@ impl StarNuisance {
                 }
                 if let Some((order, _)) = self.distortion {
                     DistortionField::basis_into(order, data.camera.normalised(at), &mut basis);
-                    let polynomials = out.shared.column_mut(i);
+                    let count = basis.len() - 1;
+                    let polynomials = &mut out.shared.as_mut_slice()[i * count..(i + 1) * count];
                     let basis = basis[1..].iter().zip(&self.moments[1..]);
-                    for (out, (value, mean)) in polynomials.into_iter().zip(basis) {
+                    for (out, (value, mean)) in polynomials.iter_mut().zip(basis) {
                         *out = value - mean;
                     }
                 }

@@ -60,6 +60,9 @@ const SLOW_PRICE: f64 = 4.0;
 const APART: f64 = std::f64::consts::LN_2;
 /// Most effects that are added.
 const MOST: usize = 8;
+/// Rows of a long run, which is searched in one of so many parts before the whole is.
+const LONG_ROWS: usize = 300_000;
+const PARTS: usize = 8;
 
 /// The slow error of the reference as it was found.
 #[derive(Clone, Debug)]
@@ -91,8 +94,9 @@ pub(crate) fn attempt<'a>(
     may: &[bool],
     start: Option<CommonNoise>,
 ) -> Result<(Searched<'a>, Vec<usize>), CloseError> {
+    let candidates = prepared(white, folds, candidates(), may, start);
     let Some(start) = start else {
-        let found = search(white, folds, candidates(), may, None)?;
+        let found = search(white, folds, candidates, may, None)?;
         return Ok((Searched::plain(found), Vec::new()));
     };
     let Coloured {
@@ -101,7 +105,7 @@ pub(crate) fn attempt<'a>(
         white: begun,
         moments,
         worth,
-    } = coloured(white, folds, candidates(), may, start)?;
+    } = coloured(white, folds, candidates, may, start)?;
     // from the forms that were polished beside the slow error: nearly those that suit white noise
     let candidates = searched.found.candidates.clone();
     let found = search(white, folds, candidates, may, begun)?;
@@ -133,6 +137,28 @@ pub(crate) fn attempt<'a>(
         .filter(|&g| causes.contains(&family(g)))
         .collect();
     Ok((Searched::plain(found), refused))
+}
+
+/// The candidates in the forms that a part of a long run gives them: of the whole, each other form costs a
+/// pass.
+fn prepared(
+    white: &StarEvidence<'_>,
+    folds: &Folds,
+    candidates: Vec<Arc<dyn Candidate>>,
+    may: &[bool],
+    start: Option<CommonNoise>,
+) -> Vec<Arc<dyn Candidate>> {
+    if white.data.t_s.len() <= LONG_ROWS {
+        return candidates;
+    }
+    let part = folds.thinned(PARTS);
+    let found = match start {
+        Some(start) => {
+            coloured(white, &part, candidates.clone(), may, start).map(|c| c.searched.found)
+        }
+        None => search(white, &part, candidates.clone(), may, None),
+    };
+    found.map_or(candidates, |found| found.candidates)
 }
 
 impl Searched<'_> {
