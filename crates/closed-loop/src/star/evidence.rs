@@ -7,6 +7,7 @@
 //!
 //! Source: [M23] Fig. 4 for what a residual is.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use block_regression::{BlockGrams, Folds};
@@ -28,6 +29,9 @@ use crate::star::moments::{Keep, MOST_BINS, StarMoments};
 use crate::star::nuisance::StarNuisance;
 use crate::star::reference_noise;
 use crate::star::weights;
+
+/// Chunks of frames whose shifts are held at once.
+const SHIFTED: usize = 256;
 
 /// Star measurements as evidence.
 #[derive(Clone)]
@@ -208,23 +212,25 @@ impl Evidence for StarEvidence<'_> {
                     .map(move |at| (fold, at..(at + CHUNK_FRAMES).min(end)))
             })
             .collect();
-        let shifts: Vec<[DVector<f64>; 2]> = chunks
-            .par_iter()
-            .map_init(Filled::default, |filled, (fold, frames)| {
-                columns.fill(frames.clone(), &layout, filled);
-                columns.shift(frames.clone(), &layout, filled, &whole[*fold])
-            })
-            .collect();
-        for ((fold, frames), shift) in chunks.into_iter().zip(shifts) {
+        let shift = |filled: &mut Filled, (fold, frames): &(usize, Range<usize>)| {
+            columns.fill(frames.clone(), &layout, filled);
+            columns.shift(frames.clone(), &layout, filled, &whole[*fold])
+        };
+        // some at a time: all would be as large again as what comes of them
+        let shifts = chunks.chunks(SHIFTED).flat_map(|some| {
+            let shifts = some.par_iter().map_init(Filled::default, shift);
+            shifts.collect::<Vec<[DVector<f64>; 2]>>()
+        });
+        for ((fold, frames), shift) in chunks.iter().zip(shifts) {
             let first = data.frames.first_row[frames.start];
             for axis in 0..2 {
                 for (i, s) in shift[axis].iter().enumerate() {
                     out.modelled[axis][first + i] = *s;
-                    out.axes[axis][first + i] = self.residual(fold)[axis][first + i] - s;
+                    out.axes[axis][first + i] = self.residual(*fold)[axis][first + i] - s;
                 }
             }
             if data.free_attitude {
-                for frame in frames {
+                for frame in frames.clone() {
                     remove_attitude(data, frame, &mut out.axes);
                 }
             }

@@ -63,6 +63,8 @@ const MOST: usize = 8;
 /// Rows of a long run, which is searched in one of so many parts before the whole is.
 const LONG_ROWS: usize = 300_000;
 const PARTS: usize = 8;
+/// And in blocks of so many of the whole.
+const FEWER_BLOCKS: usize = 3;
 
 /// The slow error of the reference as it was found.
 #[derive(Clone, Debug)]
@@ -151,7 +153,7 @@ fn prepared(
     if white.data.t_s.len() <= LONG_ROWS {
         return candidates;
     }
-    let part = folds.thinned(PARTS);
+    let part = folds.coarser(FEWER_BLOCKS).thinned(PARTS);
     let found = match start {
         Some(start) => {
             coloured(white, &part, candidates.clone(), may, start).map(|c| c.searched.found)
