@@ -63,8 +63,8 @@ const SLOW_SHARE: f64 = 0.2;
 pub(crate) struct Quest<'a> {
     /// Effects that may be named.
     pub(crate) candidates: &'a dyn Fn() -> Vec<Arc<dyn Candidate>>,
-    /// Terms that describe.
-    pub(crate) terms: &'a dyn Fn() -> Vec<Empirical>,
+    /// Terms that describe, beside a slow error of the reference or not.
+    pub(crate) terms: &'a dyn Fn(bool) -> Vec<Empirical>,
     /// What effects may change with.
     pub(crate) ways: &'a [Way],
     /// What sizes are told in.
@@ -141,9 +141,10 @@ pub(crate) fn run<'a>(
             reinstated(&mut refused);
             continue;
         }
-        let described = Described::new(level, folds, &searched.found, (quest.terms)(), quest.ways)?;
+        let terms = (quest.terms)(searched.wander.is_some());
+        let described = Described::new(level, folds, &searched.found, terms, quest.ways)?;
         if let Some(wander) = searched.wander.as_ref().filter(|_| !last) {
-            let plain = Described::new(&beside, folds, &searched.found, (quest.terms)(), &[])?;
+            let plain = Described::new(&beside, folds, &searched.found, (quest.terms)(false), &[])?;
             let axes = wander.axes().iter().filter(|a| **a).count();
             if let Some(instead) = in_place_of_wander(&described, &plain, axes) {
                 let tie = wander.behind.is_some_and(|nats| nats < TIE);
@@ -222,7 +223,8 @@ pub(crate) fn run<'a>(
         let level = evidence.as_ref().unwrap_or(white);
         let fitted = fit(level, folds, &borrowed(&found.candidates))?;
         let found = Found { fitted, ..found };
-        let described = Described::new(level, folds, &found, (quest.terms)(), quest.ways)?;
+        let terms = (quest.terms)(wander.is_some());
+        let described = Described::new(level, folds, &found, terms, quest.ways)?;
         // how an effect changes may be among what is described
         let beside = best_beside(&found, &may);
         if let Some(change) = changing(&described, beside).filter(|_| !last) {
@@ -272,7 +274,7 @@ fn suffice(
     may: &[bool],
 ) -> Result<bool, CloseError> {
     let (searched, _) = attempt(level, folds, quest.candidates, may, None)?;
-    let described = Described::new(level, folds, &searched.found, (quest.terms)(), &[])?;
+    let described = Described::new(level, folds, &searched.found, (quest.terms)(false), &[])?;
     Ok(!described.chosen.is_empty() && stand_ins(&described).is_none())
 }
 

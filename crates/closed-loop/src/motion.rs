@@ -35,6 +35,25 @@ const RESOLVED: f64 = 0.3;
 
 /// Whether a series of attitudes tells how the tracker moved between them.
 fn resolved(t_s: &[f64], q: &[UnitQuaternion<f64>], arm: f64) -> bool {
+    predicts(t_s, q, arm, |_, next| *next)
+}
+
+/// Whether it tells how that motion changed: the same against second differences, of which a walk of variance
+/// s^2 a step has 2 s^2 and the error 20/36 s^2. What such a walk seems to accelerate by goes with itself, though
+/// rates are given: a path through attitudes holds it.
+pub(crate) fn accelerates(series: &AttitudeSeries, arm: f64) -> bool {
+    let change = |last: &Vector3<f64>, next: &Vector3<f64>| last + next;
+    predicts(series.t_s(), series.quaternions(), arm, change)
+}
+
+/// Whether samples are predicted by their neighbours within a share of `size`, of the turns to those before and
+/// after.
+fn predicts(
+    t_s: &[f64],
+    q: &[UnitQuaternion<f64>],
+    arm: f64,
+    size: impl Fn(&Vector3<f64>, &Vector3<f64>) -> Vector3<f64>,
+) -> bool {
     let longest = longest_step(t_s);
     let (mut error, mut step, mut count) = (0.0, 0.0, 0_u32);
     for (t, w) in t_s.windows(5).zip(q.windows(5)) {
@@ -45,7 +64,7 @@ fn resolved(t_s: &[f64], q: &[UnitQuaternion<f64>], arm: f64) -> bool {
         let predicted = (4.0 * (b + d) - a - e) / 6.0;
         let moves = Vector3::new(1.0, 1.0, arm);
         error += predicted.component_mul(&moves).norm_squared();
-        step += d.component_mul(&moves).norm_squared();
+        step += size(&b, &d).component_mul(&moves).norm_squared();
         count += 1;
     }
     count > 0 && error <= RESOLVED * RESOLVED * step
@@ -124,6 +143,26 @@ mod tests {
             .collect();
         assert!(!resolved(&time(), &rolled, 1.0));
         assert!(resolved(&time(), &rolled, 0.005));
+    }
+
+    /// A walk of 3e-7 rad a step on a steady drift of 1e-4: steps are the drift's, their changes the walk's, of which
+    /// the error is sqrt(20/72) = 0.53. On a swing that changes by 1e-5 a step they are the swing's.
+    #[test]
+    fn a_walk_on_a_drift_does_not_accelerate() {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(6);
+        let mut series = |path: &dyn Fn(f64) -> f64| {
+            let mut walk = Vector3::zeros();
+            let q = time().into_iter().map(|t| {
+                let step: [f64; 3] = std::array::from_fn(|_| StandardNormal.sample(&mut rng));
+                walk += Vector3::from(step) * 3e-7;
+                rotation_from_vector(&(walk + Vector3::new(path(t), 0.0, 0.0)))
+            });
+            AttitudeSeries::new(time(), q.collect(), None).unwrap()
+        };
+        let drift = series(&|t| 2e-4 * t);
+        assert!(resolved(drift.t_s(), drift.quaternions(), 1.0) && !accelerates(&drift, 1.0));
+        let swing = series(&|t| 1e-3 * (0.2 * t).sin());
+        assert!(accelerates(&swing, 1.0));
     }
 
     /// A path of 3e-5 rad a step, and holes across which it turns by up to 1e-2.

@@ -29,7 +29,7 @@ mod directions;
 pub(crate) mod evidence;
 pub(crate) mod frame_rotation;
 #[cfg(test)]
-mod harness;
+pub(crate) mod harness;
 mod light;
 mod misalignment;
 mod moments;

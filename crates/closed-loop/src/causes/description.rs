@@ -306,8 +306,13 @@ pub(crate) fn of_noise(situation: &Situation<'_>, data: &StarData) -> Vec<(Varia
     list
 }
 
-/// Every variable that the bundle gives values of, and the pairs that matter.
-pub(crate) fn terms(situation: &Situation<'_>, data: &StarData) -> Vec<Empirical> {
+/// Every variable that the bundle gives values of, and the pairs that matter; without `acceleration` where
+/// that is none.
+pub(crate) fn terms(
+    situation: &Situation<'_>,
+    data: &StarData,
+    acceleration: bool,
+) -> Vec<Empirical> {
     let largest = |series: &[Vec<f64>; 2]| {
         let [low, high] = range(series.iter().flatten().copied());
         let size = low.abs().max(high.abs());
@@ -347,7 +352,9 @@ pub(crate) fn terms(situation: &Situation<'_>, data: &StarData) -> Vec<Empirical
     for single in [&time, &rate, &mag, &colour] {
         terms.extend(one(single));
     }
-    terms.extend(one(&(Variable::Acceleration, largest(&data.acceleration))));
+    if acceleration {
+        terms.extend(one(&(Variable::Acceleration, largest(&data.acceleration))));
+    }
     if mag.1[0] >= mag.1[1] || !mag.1[0].is_finite() {
         // no magnitudes
         terms.extend(one(&(Variable::Flux, range(&data.log_flux))));

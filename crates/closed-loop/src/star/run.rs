@@ -214,6 +214,8 @@ fn explain(
     let own = own.map(|(variants, zero_px)| anew(variants, &zero_px));
     let level = own.as_ref().unwrap_or(&measured);
     let ways = description::ways(situation, data);
+    let reference = situation.reference.as_ref();
+    let accelerates = reference.is_none_or(|r| motion::accelerates(r, arm));
     let named = |line: Option<SharedLine>| {
         let candidates = || {
             let mut list = catalogue_candidates(&scene);
@@ -224,7 +226,7 @@ fn explain(
         };
         let quest = Quest {
             candidates: &candidates,
-            terms: &|| description::terms(situation, data),
+            terms: &|wander| description::terms(situation, data, accelerates || !wander),
             ways: &ways,
             surroundings: situation.surroundings(),
         };
@@ -260,7 +262,7 @@ fn explain(
             folds,
             &mut searched.found,
             &described.follows(1.0),
-            description::terms(situation, data),
+            description::terms(situation, data, true),
             &situation.surroundings(),
         )?;
     }

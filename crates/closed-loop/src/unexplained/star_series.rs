@@ -11,8 +11,8 @@
 //!
 //! Times the frequencies, and stars, or the instants. A step has to stay one: where the stars are
 //! as slow without it as with it, they wander. And it has to be the stars': what a frame turned by
-//! is known but for its noise, and a reference that wanders leaves a step in all stars alike, so
-//! that one has to be beyond chance at its instant without all that the stars of a frame share, too.
+//! is known but for its noise, and a reference that wanders leaves a step or a line in all stars alike, so
+//! that one has to be beyond chance at its instant or frequency without all that the stars of a frame share, too.
 //!
 //! Source: Scargle 1982 (periodogram); Wilks 1938.
 
@@ -27,7 +27,7 @@ use crate::unexplained::around::Around;
 
 /// Chance that either is told although there is none.
 const ALPHA: f64 = 0.001;
-/// The same of a step that was found, at its instant, without what the stars of a frame share.
+/// The same of one that was found, at its instant or frequency, without what the stars of a frame share.
 const ALPHA_ALONE: f64 = 0.01;
 /// Points of a star's series, and fewest.
 const MOST_POINTS: usize = 1200;
@@ -124,8 +124,13 @@ pub(crate) fn search(
         return out;
     };
     out.bin_hz = 1.0 / (last - first);
-    if let Some((f, p, squares)) = line(&series, last - first) {
-        out.line_hz = Some(f);
+    if let Some(lines) = Lines::of(&series, last - first)
+        && let Some((k, p, squares)) = lines.best()
+        && let Some(apart) = Lines::of(&by_itself, last - first)
+        && k < apart.bins
+        && apart.at(k).0 < ALPHA_ALONE
+    {
+        out.line_hz = Some(lines.frequency_hz(k));
         out.p_value = p;
         out.explained = squares / (2.0 * rows);
     }
@@ -197,60 +202,84 @@ fn series(data: &StarData, own: &[Vec<f64>], weight: &[f64]) -> Vec<Own> {
     each.collect()
 }
 
-/// The line that is most certain: its frequency, chance, and the squares that it takes.
-fn line(series: &[Own], span: f64) -> Option<(f64, f64, f64)> {
-    let median = |s: &Own| median_step(&s.t_s).unwrap_or(f64::INFINITY);
-    let step = series.iter().map(median).fold(0.0, f64::max);
-    let grid = 1.0 / (USUAL.finer as f64 * span);
-    let first = MIN_CYCLES / span;
-    let bins = ((0.5 / step - first) / grid).floor();
-    // no series, or no time between points
-    if !bins.is_finite() || bins < (4 * USUAL.finer * (USUAL.count + USUAL.guard)) as f64 {
-        return None;
-    }
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "a positive number of grid points, limited by the number of points"
-    )]
-    let bins = bins as usize;
-    let power: Vec<Vec<f64>> = series
-        .par_iter()
-        .map(|s| s.powers(first, grid, bins))
-        .collect();
-    // power over what is usual around, and how many it is the mean of
-    let relative = |p: &[f64], k: usize| -> (f64, f64) {
-        let (sum, count) = USUAL.sum(p, k);
-        (p[k] * count / sum, count)
-    };
-    let chance = |mean: f64, of: f64, around: f64| -> f64 {
-        FisherSnedecor::new(4.0 * of, 4.0 * around).map_or(1.0, |law| law.sf(mean))
-    };
-    let stars = series.len() as f64;
-    let best = (0..bins)
-        .into_par_iter()
-        .map(|k| {
-            let each: Vec<(f64, f64)> = power.iter().map(|p| relative(p, k)).collect();
-            let sum: f64 = each.iter().map(|e| e.0).sum();
-            let around: f64 = each.iter().map(|e| e.1).sum();
-            let one = each
-                .iter()
-                .map(|e| stars * chance(e.0, 1.0, e.1))
-                .fold(1.0, f64::min);
-            let all = chance(sum / stars, stars, around);
-            // both are tried, and the top between grid points
-            let p = 4.0 * bins as f64 * one.min(all);
-            let excess = power.iter().zip(&each).map(|(p, e)| p[k] - p[k] / e.0);
-            let squares = if one < all {
-                excess.fold(0.0, f64::max)
-            } else {
-                excess.sum()
-            };
-            (k, p, squares)
+/// Powers of every star at the frequencies that are looked at.
+struct Lines {
+    first: f64,
+    grid: f64,
+    bins: usize,
+    power: Vec<Vec<f64>>,
+}
+
+impl Lines {
+    fn of(series: &[Own], span: f64) -> Option<Self> {
+        let median = |s: &Own| median_step(&s.t_s).unwrap_or(f64::INFINITY);
+        let step = series.iter().map(median).fold(0.0, f64::max);
+        let grid = 1.0 / (USUAL.finer as f64 * span);
+        let first = MIN_CYCLES / span;
+        let bins = ((0.5 / step - first) / grid).floor();
+        // no series, or no time between points
+        if !bins.is_finite() || bins < (4 * USUAL.finer * (USUAL.count + USUAL.guard)) as f64 {
+            return None;
+        }
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a positive number of grid points, limited by the number of points"
+        )]
+        let bins = bins as usize;
+        let powers = series.par_iter().map(|s| s.powers(first, grid, bins));
+        Some(Self {
+            first,
+            grid,
+            bins,
+            power: powers.collect(),
         })
-        .min_by(|a, b| a.1.total_cmp(&b.1))?;
-    let (k, p, squares) = best;
-    (p < ALPHA).then(|| (first + k as f64 * grid, p, squares.max(0.0)))
+    }
+
+    /// Chance of what the stars have at grid point `k`, of one of them or of all, and the squares that it takes.
+    fn at(&self, k: usize) -> (f64, f64) {
+        // power over what is usual around, and how many it is the mean of
+        let relative = |p: &Vec<f64>| -> (f64, f64) {
+            let (sum, count) = USUAL.sum(p, k);
+            (p[k] * count / sum, count)
+        };
+        let chance = |mean: f64, of: f64, around: f64| -> f64 {
+            FisherSnedecor::new(4.0 * of, 4.0 * around).map_or(1.0, |law| law.sf(mean))
+        };
+        let stars = self.power.len() as f64;
+        let each: Vec<(f64, f64)> = self.power.iter().map(relative).collect();
+        let sum: f64 = each.iter().map(|e| e.0).sum();
+        let around: f64 = each.iter().map(|e| e.1).sum();
+        let one = each
+            .iter()
+            .map(|e| stars * chance(e.0, 1.0, e.1))
+            .fold(1.0, f64::min);
+        let all = chance(sum / stars, stars, around);
+        let excess = self.power.iter().zip(&each).map(|(p, e)| p[k] - p[k] / e.0);
+        let squares = if one < all {
+            excess.fold(0.0, f64::max)
+        } else {
+            excess.sum()
+        };
+        // both are tried
+        (2.0 * one.min(all), squares)
+    }
+
+    /// The line that is most certain: its grid point, chance, and the squares that it takes.
+    fn best(&self) -> Option<(usize, f64, f64)> {
+        let tried = (0..self.bins).into_par_iter().map(|k| {
+            let (p, squares) = self.at(k);
+            // the top between grid points
+            (k, 2.0 * self.bins as f64 * p, squares.max(0.0))
+        });
+        tried
+            .min_by(|a, b| a.1.total_cmp(&b.1))
+            .filter(|best| best.1 < ALPHA)
+    }
+
+    fn frequency_hz(&self, k: usize) -> f64 {
+        self.first + k as f64 * self.grid
+    }
 }
 
 /// The step that is most certain: its instant, chance, and the squares that it takes.
@@ -362,6 +391,58 @@ impl Own {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::star::harness::seen;
+    use focal_plane::{AttitudeSeries, Camera, StarFrames};
+    use nalgebra::UnitQuaternion;
+    use rand_core::SeedableRng;
+    use rand_distr::{Distribution, StandardNormal};
+    use rand_xoshiro::Xoshiro256PlusPlus;
+
+    const STARS: [[f64; 2]; 6] = [
+        [300.0, 90.0],
+        [-250.0, 330.0],
+        [-160.0, -320.0],
+        [190.0, -190.0],
+        [10.0, 60.0],
+        [-390.0, -40.0],
+    ];
+
+    /// What is found of six stars for 750 s where each swings at 0.05 Hz by half its noise, `apart` in phase.
+    fn swinging(apart: f64) -> OwnSeries {
+        let camera = Camera::from_fov_deg([1024, 1024], [20.0, 20.0]).unwrap();
+        let mut frames = StarFrames::new();
+        let t_s: Vec<f64> = (0..1500).map(|k| 0.5 * f64::from(k)).collect();
+        for &t in &t_s {
+            frames.begin(t);
+            for (id, [x, y]) in (0..).zip(STARS) {
+                frames.push(id, i64::from(id), x, y);
+            }
+        }
+        let q = vec![UnitQuaternion::identity(); t_s.len()];
+        let reference = AttitudeSeries::new(t_s, q, None).unwrap();
+        let data = seen(&camera, &frames, Some(&reference), &STARS);
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(8);
+        let rows = data.t_s.len();
+        let noise = [(); 2]
+            .map(|()| -> Vec<f64> { (0..rows).map(|_| StandardNormal.sample(&mut rng)).collect() });
+        let swing = |r: usize| {
+            0.5 * (std::f64::consts::TAU * 0.05 * data.t_s[r] + apart * data.star[r] as f64).sin()
+        };
+        let own = noise.each_ref().map(|axis| -> Vec<f64> {
+            axis.iter().enumerate().map(|(r, v)| v + swing(r)).collect()
+        });
+        // what all stars do alike turns the frame
+        let alone = if apart > 0.0 { &own } else { &noise };
+        search(&data, &own, alone, &vec![1.0; rows])
+    }
+
+    /// A line of 1500/16 nats an axis and star is beyond doubt, and the stars' own only where they differ.
+    #[test]
+    fn a_line_that_all_stars_share_is_not_their_own() {
+        let found = swinging(1.0);
+        assert!((found.line_hz.unwrap() - 0.05).abs() < found.bin_hz);
+        assert_eq!(swinging(0.0).line_hz, None);
+    }
 
     /// A line that is listed already is not listed again; that it is the stars' is told all the same.
     #[test]
