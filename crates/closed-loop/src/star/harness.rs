@@ -7,6 +7,16 @@ use focal_plane::{AttitudeSeries, Camera, Pixel, StarFrames};
 
 use crate::star::data::{Inputs, Star, StarData};
 
+/// Places of six stars in a detector of 1024 pixels, from its centre, px.
+pub(crate) const STARS: [[f64; 2]; 6] = [
+    [300.0, 90.0],
+    [-250.0, 330.0],
+    [-160.0, -320.0],
+    [190.0, -190.0],
+    [10.0, 60.0],
+    [-390.0, -40.0],
+];
+
 /// What `frames` saw of stars that an untilted `camera` has at `places`, px; the id of a star is its place
 /// among them.
 pub(crate) fn seen(

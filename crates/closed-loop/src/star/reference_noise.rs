@@ -58,7 +58,7 @@ pub(crate) fn precision(
 mod tests {
     use super::*;
     use crate::star::changes;
-    use crate::star::harness::seen;
+    use crate::star::harness::{STARS, seen};
     use focal_plane::{ARCSEC_PER_RAD, AttitudeSeries, Camera, StarFrames, rotation_from_vector};
     use nalgebra::{UnitQuaternion, Vector3};
     use rand_core::SeedableRng;
@@ -66,14 +66,6 @@ mod tests {
     use rand_xoshiro::Xoshiro256PlusPlus;
 
     const FRAMES: usize = 2000;
-    const STARS: [[f64; 2]; 6] = [
-        [300.0, 90.0],
-        [-250.0, 330.0],
-        [-160.0, -320.0],
-        [190.0, -190.0],
-        [10.0, 60.0],
-        [-390.0, -40.0],
-    ];
     /// Of a centroid, arcsec.
     const NOISE: f64 = 4.0;
 

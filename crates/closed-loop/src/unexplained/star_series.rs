@@ -391,21 +391,12 @@ impl Own {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::star::harness::seen;
+    use crate::star::harness::{STARS, seen};
     use focal_plane::{AttitudeSeries, Camera, StarFrames};
     use nalgebra::UnitQuaternion;
     use rand_core::SeedableRng;
     use rand_distr::{Distribution, StandardNormal};
     use rand_xoshiro::Xoshiro256PlusPlus;
-
-    const STARS: [[f64; 2]; 6] = [
-        [300.0, 90.0],
-        [-250.0, 330.0],
-        [-160.0, -320.0],
-        [190.0, -190.0],
-        [10.0, 60.0],
-        [-390.0, -40.0],
-    ];
 
     /// What is found of six stars for 750 s where each swings at 0.05 Hz by half its noise, `apart` in phase.
     fn swinging(apart: f64) -> OwnSeries {
