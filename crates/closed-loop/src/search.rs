@@ -17,7 +17,7 @@ use nalgebra::DVector;
 
 use crate::error::CloseError;
 use crate::evidence::{Amplitudes, Evidence};
-use selection::{Group, Selection, Trials, columns_of, select};
+use selection::{Group, Selection, Trials, columns_of, costs};
 
 pub(crate) mod empirical;
 pub(crate) mod instants;
@@ -295,7 +295,7 @@ fn chosen_from(
     candidates: &[Arc<dyn Candidate>],
     may: &[bool],
 ) -> Result<(Fitted, Selection), CloseError> {
-    let select = |f: &Fitted| select(&f.fits, &f.groups, may, f.scalars);
+    let select = |f: &Fitted| f.trials(&costs(&f.groups, may)).select(may);
     let selection = select(&fitted);
     let loud = fitted.variance;
     let fitted = fitted.beside(folds, &borrowed(candidates), &selection.chosen)?;

@@ -12,6 +12,7 @@
 //! Not physics: the contents of a folder.
 
 mod around;
+mod grid;
 pub(crate) mod leftover;
 pub(crate) mod pattern;
 pub(crate) mod star_series;

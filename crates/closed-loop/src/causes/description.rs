@@ -30,9 +30,6 @@ use telemetry::report::{Dependence, Unattributed};
 const MOST_STARS: usize = 64;
 /// Stars beyond which an effect is not tried with a size for each.
 const MOST_OF_OWN_SIZE: usize = 24;
-/// Rows beyond which blocks are this many times as long.
-const MANY_ROWS: usize = 300_000;
-const FEWER: usize = 3;
 /// Chance beyond which stars differ by more than a line through them.
 const BESIDE_A_LINE: f64 = 1e-4;
 /// Channels beyond which none is paired with another variable: all pairs are paid for.
@@ -95,11 +92,8 @@ impl Described {
         all.extend(changing.iter().map(|c| c as &dyn Candidate));
         all.extend(terms.iter().map(|t| t as &dyn Candidate));
         // products of hundreds of columns a block: in long runs, of fewer blocks
-        let fitted = if evidence.data.t_s.len() > MANY_ROWS {
-            fit(evidence, &folds.coarser(FEWER), &all)?
-        } else {
-            fit(evidence, folds, &all)?
-        };
+        let coarse = evidence.coarser(folds);
+        let fitted = fit(evidence, coarse.as_ref().unwrap_or(folds), &all)?;
         let n = chosen.len();
         let names = only.candidates.iter().map(|c| c.id()).collect();
         let turns = only.candidates.iter().map(|c| c.acts_on_attitude());

@@ -153,9 +153,10 @@ impl Variable {
         }
     }
 
-    /// Its values in all rows.
+    /// Its values in all rows; none where they are not one number.
     pub(crate) fn values(&self, rows: &StarRows<'_>) -> Vec<f64> {
         match self {
+            Self::Phase(_) | Self::Star(_) | Self::Slot(_) | Self::Window => Vec::new(),
             Self::Housekeeping(_, series) => {
                 let mut out = vec![0.0; rows.len()];
                 series.at_into(rows.t_s, &mut out);

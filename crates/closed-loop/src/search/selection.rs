@@ -114,37 +114,6 @@ pub(crate) fn columns_of(groups: &[Group], chosen: &[usize]) -> Vec<usize> {
         .collect()
 }
 
-/// Runs the search. `scalars` is the number of independent scalars in the data;
-/// only groups that `may` be chosen are, and only they are paid for.
-pub(crate) fn select(fits: &Fits, groups: &[Group], may: &[bool], scalars: f64) -> Selection {
-    let cost = &costs(groups, may);
-    let trials = Trials {
-        fits,
-        groups,
-        cost,
-        scalars,
-    };
-    let mut chosen: Vec<usize> = Vec::new();
-    // Each round adds one or stops; a group dropped by the backward check may
-    // not return, so the search ends.
-    let mut banned = vec![false; groups.len()];
-    loop {
-        let may: Vec<bool> = (0..groups.len()).map(|g| may[g] && !banned[g]).collect();
-        let tried = trials.tried(&may, &chosen);
-        let added = match tried.iter().find(|t| t.judgement.stands()) {
-            Some(best) => vec![best.group],
-            None => trials.hidden(&tried, &chosen),
-        };
-        if added.is_empty() {
-            break;
-        }
-        chosen.extend(added);
-        trials.prune(&mut chosen, &mut banned);
-    }
-    let judged = trials.judged(&chosen);
-    Selection { chosen, judged }
-}
-
 /// What the p-value of each group is multiplied by where those that `may` be chosen are tried.
 pub(crate) fn costs(groups: &[Group], may: &[bool]) -> Vec<f64> {
     let mut of_kind: BTreeMap<&str, f64> = BTreeMap::new();
@@ -189,6 +158,28 @@ pub(crate) struct Trials<'a> {
 }
 
 impl Trials<'_> {
+    /// Runs the search: groups that `may` be chosen are added while one stands, each at its `cost`.
+    pub(crate) fn select(&self, may: &[bool]) -> Selection {
+        let mut chosen: Vec<usize> = Vec::new();
+        // Each round adds one or stops; a group dropped by the backward check may
+        // not return, so the search ends.
+        let mut may = may.to_vec();
+        loop {
+            let tried = self.tried(&may, &chosen);
+            let added = match tried.iter().find(|t| t.judgement.stands()) {
+                Some(best) => vec![best.group],
+                None => self.hidden(&tried, &chosen),
+            };
+            if added.is_empty() {
+                break;
+            }
+            chosen.extend(added);
+            self.prune(&mut chosen, &mut may);
+        }
+        let judged = self.judged(&chosen);
+        Selection { chosen, judged }
+    }
+
     /// All groups that may be tried beside `chosen`, the largest gain out of fold after the price of their
     /// parameters and choices first.
     pub(crate) fn tried(&self, may: &[bool], chosen: &[usize]) -> Vec<Tried> {
@@ -257,13 +248,13 @@ impl Trials<'_> {
         all.map(|g| judge(g).unwrap_or(Judgement::UNSEEN)).collect()
     }
 
-    /// Drops chosen groups that no longer stand beside the others.
-    fn prune(&self, chosen: &mut Vec<usize>, banned: &mut [bool]) {
+    /// Drops chosen groups that no longer stand beside the others, and may not be chosen again.
+    fn prune(&self, chosen: &mut Vec<usize>, may: &mut [bool]) {
         loop {
             let falls = |&g: &usize| self.within(chosen, g).is_some_and(|j| !j.stands());
             let fallen = chosen.iter().copied().find(falls);
             let Some(g) = fallen else { return };
-            banned[g] = true;
+            may[g] = false;
             chosen.retain(|&c| c != g);
         }
     }
@@ -413,7 +404,7 @@ mod tests {
             };
             let alone = trials.judged(&[]);
             assert!(alone.iter().all(|j| !j.stands()), "{alone:?}");
-            select(&fits, &groups, &[true, true], 1000.0).chosen
+            trials.select(&[true, true]).chosen
         };
         assert_eq!(chosen(12.0 / (rows as f64).sqrt()).len(), 2);
         assert_eq!(chosen(0.0), Vec::<usize>::new());

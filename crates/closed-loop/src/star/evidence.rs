@@ -30,6 +30,10 @@ use crate::star::nuisance::StarNuisance;
 use crate::star::reference_noise;
 use crate::star::weights;
 
+/// Rows of a long run, whose products take long and much room.
+const LONG_ROWS: usize = 300_000;
+/// Blocks of which those of a long run are made where fewer do.
+const JOINED: usize = 3;
 /// Chunks of frames whose shifts are held at once.
 const SHIFTED: usize = 256;
 
@@ -89,6 +93,11 @@ impl<'a> StarEvidence<'a> {
             drawn,
             kept: Vec::new(),
         }
+    }
+
+    /// The folds in fewer blocks, where the run is long.
+    pub(crate) fn coarser(&self, folds: &Folds) -> Option<Folds> {
+        (self.data.t_s.len() > LONG_ROWS).then(|| folds.coarser(JOINED))
     }
 
     /// Whether the centroids were learned outside each fold.

@@ -215,7 +215,7 @@ fn explain(
     let level = own.as_ref().unwrap_or(&measured);
     let ways = description::ways(situation, data);
     let reference = situation.reference.as_ref();
-    let accelerates = reference.is_none_or(|r| motion::accelerates(r, arm));
+    let accelerates = || reference.is_none_or(|r| motion::accelerates(r, arm));
     let named = |line: Option<SharedLine>| {
         let candidates = || {
             let mut list = catalogue_candidates(&scene);
@@ -226,7 +226,7 @@ fn explain(
         };
         let quest = Quest {
             candidates: &candidates,
-            terms: &|wander| description::terms(situation, data, accelerates || !wander),
+            terms: &|wander| description::terms(situation, data, !wander || accelerates()),
             ways: &ways,
             surroundings: situation.surroundings(),
         };

@@ -60,11 +60,8 @@ const SLOW_PRICE: f64 = 4.0;
 const APART: f64 = std::f64::consts::LN_2;
 /// Most effects that are added.
 const MOST: usize = 8;
-/// Rows of a long run, which is searched in one of so many parts before the whole is.
-const LONG_ROWS: usize = 300_000;
+/// Parts of a long run of which one is searched before the whole is.
 const PARTS: usize = 8;
-/// And in blocks of so many of the whole.
-const FEWER_BLOCKS: usize = 3;
 
 /// The slow error of the reference as it was found.
 #[derive(Clone, Debug)]
@@ -150,10 +147,10 @@ fn prepared(
     may: &[bool],
     start: Option<CommonNoise>,
 ) -> Vec<Arc<dyn Candidate>> {
-    if white.data.t_s.len() <= LONG_ROWS {
+    let Some(coarse) = white.coarser(folds) else {
         return candidates;
-    }
-    let part = folds.coarser(FEWER_BLOCKS).thinned(PARTS);
+    };
+    let part = coarse.thinned(PARTS);
     let found = match start {
         Some(start) => {
             coloured(white, &part, candidates.clone(), may, start).map(|c| c.searched.found)

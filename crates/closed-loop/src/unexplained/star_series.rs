@@ -16,6 +16,8 @@
 //!
 //! Source: Scargle 1982 (periodogram); Wilks 1938.
 
+use std::cell::LazyCell;
+
 use rayon::prelude::*;
 use spectra::robust::median_step;
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
@@ -24,6 +26,7 @@ use telemetry::report::Unattributed;
 use crate::causes::commonness::{self, IN_TIME, MOSTLY, stars_first};
 use crate::star::data::StarData;
 use crate::unexplained::around::Around;
+use crate::unexplained::grid::Grid;
 
 /// Chance that either is told although there is none.
 const ALPHA: f64 = 0.001;
@@ -113,7 +116,7 @@ pub(crate) fn search(
     if data.frames_are_unrelated() || data.stars.len() > MOST_STARS {
         return OwnSeries::default();
     }
-    let by_itself = series(data, alone, weight);
+    let by_itself = LazyCell::new(|| series(data, alone, weight));
     let series = series(data, own, weight);
     let rows: f64 = series.iter().map(|s| s.count.iter().sum::<f64>()).sum();
     let mut out = OwnSeries {
@@ -127,10 +130,10 @@ pub(crate) fn search(
     if let Some(lines) = Lines::of(&series, last - first)
         && let Some((k, p, squares)) = lines.best()
         && let Some(apart) = Lines::of(&by_itself, last - first)
-        && k < apart.bins
+        && k < apart.grid.bins
         && apart.at(k).0 < ALPHA_ALONE
     {
-        out.line_hz = Some(lines.frequency_hz(k));
+        out.line_hz = Some(lines.grid.at(k));
         out.p_value = p;
         out.explained = squares / (2.0 * rows);
     }
@@ -204,9 +207,7 @@ fn series(data: &StarData, own: &[Vec<f64>], weight: &[f64]) -> Vec<Own> {
 
 /// Powers of every star at the frequencies that are looked at.
 struct Lines {
-    first: f64,
-    grid: f64,
-    bins: usize,
+    grid: Grid,
     power: Vec<Vec<f64>>,
 }
 
@@ -214,26 +215,11 @@ impl Lines {
     fn of(series: &[Own], span: f64) -> Option<Self> {
         let median = |s: &Own| median_step(&s.t_s).unwrap_or(f64::INFINITY);
         let step = series.iter().map(median).fold(0.0, f64::max);
-        let grid = 1.0 / (USUAL.finer as f64 * span);
-        let first = MIN_CYCLES / span;
-        let bins = ((0.5 / step - first) / grid).floor();
-        // no series, or no time between points
-        if !bins.is_finite() || bins < (4 * USUAL.finer * (USUAL.count + USUAL.guard)) as f64 {
-            return None;
-        }
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "a positive number of grid points, limited by the number of points"
-        )]
-        let bins = bins as usize;
-        let powers = series.par_iter().map(|s| s.powers(first, grid, bins));
-        Some(Self {
-            first,
-            grid,
-            bins,
-            power: powers.collect(),
-        })
+        let fewest = 4 * USUAL.finer * (USUAL.count + USUAL.guard);
+        let grid = Grid::of(span, step, MIN_CYCLES, USUAL.finer, fewest)?;
+        let powers = series.par_iter().map(|s| s.powers(&grid));
+        let power = powers.collect();
+        Some(Self { grid, power })
     }
 
     /// Chance of what the stars have at grid point `k`, of one of them or of all, and the squares that it takes.
@@ -267,18 +253,14 @@ impl Lines {
 
     /// The line that is most certain: its grid point, chance, and the squares that it takes.
     fn best(&self) -> Option<(usize, f64, f64)> {
-        let tried = (0..self.bins).into_par_iter().map(|k| {
+        let tried = (0..self.grid.bins).into_par_iter().map(|k| {
             let (p, squares) = self.at(k);
             // the top between grid points
-            (k, 2.0 * self.bins as f64 * p, squares.max(0.0))
+            (k, 2.0 * self.grid.bins as f64 * p, squares.max(0.0))
         });
         tried
             .min_by(|a, b| a.1.total_cmp(&b.1))
             .filter(|best| best.1 < ALPHA)
-    }
-
-    fn frequency_hz(&self, k: usize) -> f64 {
-        self.first + k as f64 * self.grid
     }
 }
 
@@ -348,15 +330,15 @@ impl Own {
         Some(self.running.iter().map(square).sum())
     }
 
-    /// Squares that a sinusoid takes of both axes, in units of the noise, at `bins` frequencies from
-    /// `first` on. Phasors of all points are turned from one frequency to the next.
-    fn powers(&self, first: f64, grid: f64, bins: usize) -> Vec<f64> {
+    /// Squares that a sinusoid takes of both axes, in units of the noise, at the frequencies of
+    /// `grid`. Phasors of all points are turned from one frequency to the next.
+    fn powers(&self, grid: &Grid) -> Vec<f64> {
         let phasor = |f: f64| -> Vec<[f64; 2]> {
             let omega = std::f64::consts::TAU * f;
             let each = self.t_s.iter().map(|t| omega * (t - self.t_s[0]));
             each.map(|phase| [phase.cos(), phase.sin()]).collect()
         };
-        let (mut at, by) = (phasor(first), phasor(grid));
+        let (mut at, by) = (phasor(grid.first_hz), phasor(grid.step_hz));
         let [x, y] = &self.value;
         let power = |at: &[[f64; 2]]| {
             let (mut cc, mut cs, mut ss) = (0.0, 0.0, 0.0);
@@ -376,7 +358,7 @@ impl Own {
                 |[c, s]: [f64; 2]| (ss * c * c - 2.0 * cs * c * s + cc * s * s) / determinant;
             score.into_iter().map(square).sum()
         };
-        (0..bins)
+        (0..grid.bins)
             .map(|_| {
                 let squares = power(&at);
                 for ([c, s], [bc, bs]) in at.iter_mut().zip(&by) {

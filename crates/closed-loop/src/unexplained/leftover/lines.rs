@@ -21,6 +21,7 @@ use spectra::{LombScargle, LombScargleSettings};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use crate::unexplained::around::Around;
+use crate::unexplained::grid::Grid;
 
 use super::{MOST, Series, Track, WORTH_A_SEARCH};
 
@@ -35,42 +36,14 @@ const MIN_CYCLES: f64 = 3.0;
 /// Grids whose points lie nearer than this share of their step are the same.
 const ALIKE: f64 = 0.1;
 
-/// Frequencies at which lines are looked for.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Grid {
-    first_hz: f64,
-    step_hz: f64,
-    bins: usize,
+/// Frequencies by the span and the sampling of `track`; `None` where the span is too short for any.
+fn grid_of(track: &Track) -> Option<Grid> {
+    let step_s = median_step(&track.t_s)?;
+    let fewest = 4 * USUAL.finer * USUAL.count;
+    Grid::of(track.span(), step_s, MIN_CYCLES, USUAL.finer, fewest)
 }
 
 impl Grid {
-    /// Of the span and the sampling of `track`; `None` where the span is too short for any.
-    fn of(track: &Track) -> Option<Self> {
-        let span = track.span();
-        let highest = 0.5 / median_step(&track.t_s)?;
-        let step_hz = 1.0 / (USUAL.finer as f64 * span);
-        let first_hz = MIN_CYCLES / span;
-        let bins = ((highest - first_hz) / step_hz).floor();
-        if bins.is_nan() || bins < (4 * USUAL.finer * USUAL.count) as f64 {
-            return None;
-        }
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "a positive number of grid points, limited by the number of samples"
-        )]
-        let bins = bins as usize;
-        Some(Self {
-            first_hz,
-            step_hz,
-            bins,
-        })
-    }
-
-    fn at(&self, k: usize) -> f64 {
-        self.first_hz + k as f64 * self.step_hz
-    }
-
     fn plan(&self, t_s: &[f64]) -> Option<LombScargle> {
         let settings = LombScargleSettings {
             first_hz: self.first_hz,
@@ -138,7 +111,7 @@ pub(super) fn spectra(tracks: &[Track]) -> Vec<Option<Spectrum>> {
         .into_par_iter()
         .map(|k| {
             first(k).is_none().then(|| {
-                let grid = Grid::of(&tracks[k])?;
+                let grid = grid_of(&tracks[k])?;
                 Some((grid, Arc::new(grid.plan(&tracks[k].t_s)?)))
             })?
         })

@@ -1,0 +1,46 @@
+//! The frequencies at which lines are looked for.
+//!
+//! Not physics: bookkeeping of frequencies.
+
+/// Evenly spaced frequencies.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Grid {
+    pub(crate) first_hz: f64,
+    pub(crate) step_hz: f64,
+    pub(crate) bins: usize,
+}
+
+impl Grid {
+    /// From `cycles` in the `span_s` to half the rate of samples `step_s` apart, `finer` points in 1/span; `None`
+    /// where these are fewer than `fewest`.
+    pub(crate) fn of(
+        span_s: f64,
+        step_s: f64,
+        cycles: f64,
+        finer: usize,
+        fewest: usize,
+    ) -> Option<Self> {
+        let step_hz = 1.0 / (finer as f64 * span_s);
+        let first_hz = cycles / span_s;
+        let bins = ((0.5 / step_s - first_hz) / step_hz).floor();
+        // no samples, or no time between them
+        if !bins.is_finite() || bins < fewest as f64 {
+            return None;
+        }
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a positive number of grid points, limited by the number of samples"
+        )]
+        let bins = bins as usize;
+        Some(Self {
+            first_hz,
+            step_hz,
+            bins,
+        })
+    }
+
+    pub(crate) fn at(&self, k: usize) -> f64 {
+        self.first_hz + k as f64 * self.step_hz
+    }
+}
