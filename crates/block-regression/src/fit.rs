@@ -93,8 +93,8 @@ const MOST_BLOCKS: f64 = 2.0;
 /// The columns of a Gram matrix, in their order: nuisance, candidates, residuals.
 #[derive(Clone, Debug, Default)]
 pub struct Layout {
-    /// Prior precision of each nuisance column, 1/variance of the column's amplitude; zero leaves it free.
-    pub nuisance_precision: Vec<f64>,
+    /// Prior precision of the nuisance columns' amplitudes, the inverse of their covariance; zero leaves them free.
+    pub nuisance_precision: DMatrix<f64>,
     /// How many candidate columns follow the nuisance.
     pub candidates: usize,
     /// Residual columns: one, or one per fold and a last one for all data, where
@@ -105,7 +105,7 @@ pub struct Layout {
 impl Layout {
     /// Candidate columns and the residual of `fold`.
     fn picked(&self, fold: Option<usize>) -> Vec<usize> {
-        let n = self.nuisance_precision.len();
+        let n = self.nuisance_precision.nrows();
         (n..n + self.candidates)
             .chain([self.residual(fold)])
             .collect()
@@ -113,13 +113,13 @@ impl Layout {
 
     /// Squared length of each candidate column.
     fn raw(&self, gram: &DMatrix<f64>) -> Vec<f64> {
-        let n = self.nuisance_precision.len();
+        let n = self.nuisance_precision.nrows();
         (n..n + self.candidates).map(|c| gram[(c, c)]).collect()
     }
 
     /// The residual column that belongs to `fold` (`None`: all data).
     pub fn residual(&self, fold: Option<usize>) -> usize {
-        let first = self.nuisance_precision.len() + self.candidates;
+        let first = self.nuisance_precision.nrows() + self.candidates;
         match fold {
             _ if self.residuals == 1 => first,
             Some(f) => first + f,
@@ -181,7 +181,7 @@ impl Fits {
         layout: &Layout,
         variance: f64,
     ) -> Option<Self> {
-        let n = layout.nuisance_precision.len();
+        let n = layout.nuisance_precision.nrows();
         let by_fold = (0..folds.count)
             .into_par_iter()
             .map(|f| {
@@ -239,7 +239,7 @@ impl Fits {
     /// Noise variance of a scalar where no candidate is in the model, from a first guess.
     pub fn noise_alone(sums: &FoldSums, layout: &Layout, guess: f64) -> Option<f64> {
         let (gram, scalars) = &sums.all;
-        let n = layout.nuisance_precision.len();
+        let n = layout.nuisance_precision.nrows();
         let kept: Vec<usize> = (0..n).chain(n + layout.candidates..gram.ncols()).collect();
         let alone = gram.select_columns(&kept).select_rows(&kept);
         let layout = Layout {
@@ -317,7 +317,7 @@ impl Fits {
 
     /// As [`out_of_fold`](Self::out_of_fold), block by block.
     pub fn out_of_fold_by_block(&self, set: &[usize]) -> Option<OutOfFold> {
-        let n = self.layout.nuisance_precision.len();
+        let n = self.layout.nuisance_precision.nrows();
         let (ridge, unit) = (self.ridge(set)?, self.unit(set));
         let trained: Vec<(DVector<f64>, f64)> = (0..self.folds.len())
             .map(|f| {
@@ -442,7 +442,7 @@ impl Fits {
 
     fn scatter(&self, set: &[usize]) -> Option<Scatter> {
         let (value, factor) = self.all.amplitudes(set)?;
-        let n = self.layout.nuisance_precision.len();
+        let n = self.layout.nuisance_precision.nrows();
         let residual = self.layout.residual(None);
         let p = set.len();
         // M = T^T G T of a block: M_ij = G_ij + (W_i inner_j + inner_i W_j) / 2
@@ -477,14 +477,8 @@ impl Fits {
         spread *= blocks / (blocks - 1.0).max(1.0);
         let variance = self.variance(set)?;
         // S less the sum of M is what the prior adds
-        for i in 0..p {
-            for j in 0..p {
-                let prior: f64 = (0..n)
-                    .map(|k| self.all.prior[k] * w[(k, set[i])] * w[(k, set[j])])
-                    .sum();
-                spread[(i, j)] += variance * prior;
-            }
-        }
+        let of_set = w.select_columns(set);
+        spread += of_set.tr_mul(&(&self.all.prior * &of_set)) * variance;
         let inverse = factor.inverse();
         Some(Scatter {
             robust: &inverse * spread * &inverse,

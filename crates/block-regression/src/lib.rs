@@ -52,7 +52,7 @@
 //!     [1.0, sine, (0.31 * t).sin(), 3.0 + 0.2 * sine + noise][column]
 //! }));
 //! let layout = Layout {
-//!     nuisance_precision: vec![0.0],
+//!     nuisance_precision: DMatrix::zeros(1, 1),
 //!     candidates: 2,
 //!     residuals: 1,
 //! };

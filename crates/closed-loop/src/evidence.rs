@@ -8,7 +8,7 @@
 
 use block_regression::{BlockGrams, Folds};
 use effects::Candidate;
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 
 /// Amplitudes to predict with: of each fold from the others.
 #[derive(Clone, Debug)]
@@ -30,8 +30,8 @@ pub(crate) struct Residuals {
 
 /// A kind of measurement.
 pub(crate) trait Evidence: Sync {
-    /// Prior precision of each nuisance column, 1/arcsec^2 (or free: 0).
-    fn precision(&self) -> Vec<f64>;
+    /// Prior precision of the nuisance columns, 1/arcsec^2 (or free: 0).
+    fn precision(&self) -> DMatrix<f64>;
     /// Residual columns (see [`block_regression::Layout`]).
     fn residual_columns(&self) -> usize;
     /// First guess of the noise variance of a scalar of the design.

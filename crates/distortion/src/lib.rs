@@ -37,6 +37,7 @@ mod legendre;
 mod moments;
 mod pixel;
 mod polynomial;
+mod prior;
 mod sigma;
 
 pub use error::DistortionError;
@@ -44,6 +45,7 @@ pub use field::DistortionField;
 pub use fit::FieldFit;
 pub use moments::monomial_moment;
 pub use pixel::PixelDistortion;
+pub use prior::coefficient_precision;
 pub use sigma::LsfSigma;
 
 /// Highest order of the polynomials in each variable.

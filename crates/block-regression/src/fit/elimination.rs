@@ -20,8 +20,8 @@ pub(super) struct Eliminated {
     pub(super) nuisance: DMatrix<f64>,
     /// Training Gram of the candidates and the residual (last), nuisance removed.
     pub(super) train: DMatrix<f64>,
-    /// What the prior adds to the diagonal of the nuisance's normal matrix.
-    pub(super) prior: Vec<f64>,
+    /// What the prior adds to the nuisance's normal matrix.
+    pub(super) prior: DMatrix<f64>,
     /// ln det of the nuisance's normal matrix.
     pub(super) log_det: f64,
     /// Training scalars.
@@ -37,16 +37,16 @@ impl Eliminated {
         variance: f64,
         pick: &[usize],
     ) -> Option<Self> {
-        let n = layout.nuisance_precision.len();
+        let n = layout.nuisance_precision.nrows();
         let mut normal = gram.view((0, 0), (n, n)).into_owned();
         // A column that nothing constrains (a gauge freedom, a star never seen in
         // training) gets a precision far below what one scalar of data brings.
         let floor = 1e-10 * normal.diagonal().max().max(f64::MIN_POSITIVE);
-        let priors = layout.nuisance_precision.iter();
-        let prior: Vec<f64> = priors.map(|p| p * variance + floor).collect();
-        for (k, prior) in prior.iter().enumerate() {
-            normal[(k, k)] += prior;
+        let mut prior = &layout.nuisance_precision * variance;
+        for k in 0..n {
+            prior[(k, k)] += floor;
         }
+        normal += &prior;
         let cross = picked(gram, 0..n, pick);
         let (nuisance, log_det) = if n == 0 {
             (cross.clone(), 0.0)
@@ -77,12 +77,11 @@ impl Eliminated {
         gram: &DMatrix<f64>,
         pick: &[usize],
     ) -> Option<()> {
-        let n = self.prior.len();
-        let rows = gram.select_rows(alone);
-        let mut normal = rows.select_columns(alone);
-        for (i, &k) in alone.iter().enumerate() {
-            normal[(i, i)] += self.prior[k];
-        }
+        let n = self.prior.nrows();
+        let mut rows = gram.select_rows(alone);
+        let mut own = rows.columns_mut(0, n);
+        own += self.prior.select_rows(alone);
+        let normal = rows.select_columns(alone);
         for &k in alone {
             self.nuisance.row_mut(k).fill(0.0);
         }

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::gram::Design;
-use nalgebra::Cholesky;
+use nalgebra::{Cholesky, Matrix2};
 use rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -42,11 +42,11 @@ fn table(frames: usize, rho: f64, size: f64, seed: u64) -> Table {
     Table(out)
 }
 
-fn fits(table: &Table, precision: [f64; 2]) -> (Fits, Folds) {
+fn fits(table: &Table, precision: Matrix2<f64>) -> (Fits, Folds) {
     let folds = Folds::cut(table.0.nrows());
     let grams = BlockGrams::accumulate(table, &folds);
     let layout = Layout {
-        nuisance_precision: precision.to_vec(),
+        nuisance_precision: DMatrix::from_fn(2, 2, |i, j| precision[(i, j)]),
         candidates: 3,
         residuals: 1,
     };
@@ -61,11 +61,10 @@ struct Dense {
 }
 
 impl Dense {
-    fn new(table: &Table, precision: [f64; 2]) -> Self {
+    fn new(table: &Table, precision: Matrix2<f64>) -> Self {
         let rows = table.0.nrows();
         let mut prior = DMatrix::zeros(4, 4);
-        prior[(0, 0)] = precision[0];
-        prior[(1, 1)] = precision[1];
+        prior.fixed_view_mut::<2, 2>(0, 0).copy_from(&precision);
         Self {
             columns: DMatrix::from_fn(rows, 4, |i, j| table.0[(i, [0, 1, 2, 4][j])]),
             residual: table.0.column(5).into_owned(),
@@ -115,7 +114,8 @@ impl Dense {
 #[test]
 fn what_is_predicted_out_of_fold_equals_a_direct_fit() {
     let table = table(400, 0.0, 1.0, 1);
-    let precision = [4.0, 25.0];
+    // of amplitudes that are not drawn by themselves
+    let precision = Matrix2::new(4.0, 6.0, 6.0, 25.0);
     let (fits, folds) = fits(&table, precision);
     let dense = Dense::new(&table, precision);
     let fold = folds.fold_of_frame();
@@ -184,7 +184,7 @@ fn what_acts_in_one_fold_alone_counts() {
             table.0[(k, 2)] = own * if k % 2 == 0 { 1.0 } else { -1.0 };
             table.0[(k, 5)] += size / length * table.0[(k, 2)];
         }
-        let (fits, _) = fits(&table, [0.0; 2]);
+        let (fits, _) = fits(&table, Matrix2::zeros());
         let (with, without) = (
             fits.out_of_fold(&[0]).unwrap(),
             fits.out_of_fold(&[]).unwrap(),
@@ -213,7 +213,7 @@ fn what_acts_in_one_fold_alone_counts() {
 fn p_values_hold_under_coloured_noise() {
     let alarms = (0..400)
         .filter(|&seed| {
-            let (fits, _) = fits(&table(2000, 0.88, 0.0, seed), [0.0; 2]);
+            let (fits, _) = fits(&table(2000, 0.88, 0.0, seed), Matrix2::zeros());
             fits.estimate(&[0, 1]).unwrap().p_value(&[0]) < 0.05
         })
         .count();
@@ -228,7 +228,7 @@ fn p_values_of_several_parameters_hold() {
     let all = [0, 1, 2];
     let alarms = (0..400)
         .filter(|&seed| {
-            let (fits, _) = fits(&table(2000, 0.5, 0.0, seed), [0.0; 2]);
+            let (fits, _) = fits(&table(2000, 0.5, 0.0, seed), Matrix2::zeros());
             fits.estimate(&all).unwrap().p_value(&all) < 0.05
         })
         .count();
@@ -293,7 +293,7 @@ fn unequal_variances_raise_no_false_alarms() {
 fn sigmas_are_honest_under_coloured_noise() {
     let mut sum = 0.0;
     for seed in 0..300 {
-        let (fits, _) = fits(&table(2000, 0.88, 2.0, 1000 + seed), [0.0; 2]);
+        let (fits, _) = fits(&table(2000, 0.88, 2.0, 1000 + seed), Matrix2::zeros());
         let estimate = fits.estimate(&[0]).unwrap();
         sum += ((estimate.value[0] - 2.0) / estimate.sigma(0)).powi(2);
     }
@@ -306,7 +306,7 @@ fn a_set_that_cannot_be_told_apart_is_refused() {
     let mut table = table(400, 0.0, 1.0, 1);
     let copy = table.0.column(2).into_owned();
     table.0.set_column(3, &(2.0 * copy));
-    let (fits, _) = fits(&table, [0.0; 2]);
+    let (fits, _) = fits(&table, Matrix2::zeros());
     assert!(fits.estimate(&[0]).is_some());
     assert!(fits.estimate(&[0, 1]).is_none());
 }
@@ -315,7 +315,7 @@ fn a_set_that_cannot_be_told_apart_is_refused() {
 #[test]
 fn all_data_alone_tells_no_scatter() {
     let table = table(400, 0.0, 1.0, 1);
-    let (fits, folds) = fits(&table, [0.0; 2]);
+    let (fits, folds) = fits(&table, Matrix2::zeros());
     let layout = fits.layout.clone();
     let alone = Fits::whole(&BlockGrams::accumulate(&table, &folds), &layout, 1.0).unwrap();
     let (a, b) = (
@@ -335,7 +335,7 @@ fn products_of_few_columns_are_those_of_all() {
     let folds = Folds::cut(600);
     let whole = BlockGrams::accumulate(&table, &folds);
     let layout = Layout {
-        nuisance_precision: vec![0.0, 25.0],
+        nuisance_precision: DMatrix::from_diagonal(&DVector::from_vec(vec![0.0, 25.0])),
         candidates: 3,
         residuals: 1,
     };
@@ -441,7 +441,7 @@ fn windowed(rho: f64, size: f64, seed: u64) -> (Fits, Folds) {
     let folds = Folds::cut(frames);
     let grams = BlockGrams::accumulate(&table, &folds);
     let layout = Layout {
-        nuisance_precision: vec![0.0],
+        nuisance_precision: DMatrix::zeros(1, 1),
         candidates,
         residuals: 1,
     };
@@ -499,7 +499,7 @@ fn what_lives_in_a_fold_alone_is_fitted_there() {
         // as large as it is, nobody else can know of it
         table.0[(k, 5)] += 30.0 * table.0[(k, 1)];
     }
-    let (fits, folds) = fits(&table, [0.0, 1e-4]);
+    let (fits, folds) = fits(&table, Matrix2::new(0.0, 0.0, 0.0, 1e-4));
     let fold = folds.count - 1;
     let beta = fits.amplitudes_without(fold, &[0]).unwrap();
     let nuisance = fits.nuisance(Some(fold), &[0], &beta);

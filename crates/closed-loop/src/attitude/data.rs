@@ -268,11 +268,9 @@ impl Design for WhitenedDesign<'_> {
 }
 
 impl Evidence for AttitudeEvidence<'_> {
-    fn precision(&self) -> Vec<f64> {
-        self.constant_sigma
-            .iter()
-            .map(|s| if s.is_finite() { 1.0 / (s * s) } else { 0.0 })
-            .collect()
+    fn precision(&self) -> DMatrix<f64> {
+        let own = self.constant_sigma.iter().map(|s| s.powi(-2));
+        DMatrix::from_diagonal(&DVector::from_iterator(self.constant_sigma.len(), own))
     }
 
     fn residual_columns(&self) -> usize {

@@ -326,7 +326,7 @@ pub(crate) fn information(
 ) -> Option<DMatrix<f64>> {
     let precision = evidence.precision();
     let (n, p) = (
-        precision.len(),
+        precision.nrows(),
         candidates
             .iter()
             .map(|c| c.coefficients().len())
@@ -340,9 +340,7 @@ pub(crate) fn information(
     let mut normal = gram.view((0, 0), (n, n)).into_owned();
     // what nothing constrains gets a precision far below that of one scalar
     let floor = 1e-10 * normal.diagonal().max().max(f64::MIN_POSITIVE);
-    for (k, &precision) in precision.iter().enumerate() {
-        normal[(k, k)] += precision * variance + floor;
-    }
+    normal += precision * variance + DMatrix::from_diagonal_element(n, n, floor);
     let cross = gram.view((0, n), (n, p)).into_owned();
     let taken = cross.transpose() * Cholesky::new(normal)?.solve(&cross);
     Some((own - taken) / variance)

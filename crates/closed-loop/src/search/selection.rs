@@ -384,7 +384,7 @@ mod tests {
         let rows = folds.blocks.iter().enumerate().filter(|(b, _)| b % 6 == 3);
         let rows: usize = rows.map(|(_, block)| block.len()).sum();
         let layout = Layout {
-            nuisance_precision: Vec::new(),
+            nuisance_precision: DMatrix::zeros(0, 0),
             candidates: 2,
             residuals: 1,
         };

@@ -14,7 +14,7 @@ use block_regression::{BlockGrams, Folds};
 use coloured_noise::CommonNoise;
 use effects::Candidate;
 use focal_plane::AttitudeSource;
-use nalgebra::{DVector, Vector3};
+use nalgebra::{DMatrix, DVector, Vector3};
 use rayon::prelude::*;
 
 use crate::bins::Bins;
@@ -153,11 +153,11 @@ impl<'a> StarEvidence<'a> {
 }
 
 impl Evidence for StarEvidence<'_> {
-    fn precision(&self) -> Vec<f64> {
-        let mut all = self.nuisance.precision();
+    fn precision(&self) -> DMatrix<f64> {
+        let own = self.nuisance.precision();
         let kept: usize = self.kept.iter().map(|c| c.coefficients().len()).sum();
-        all.extend(std::iter::repeat_n(0.0, kept));
-        all
+        let all = own.nrows() + kept;
+        own.resize(all, all, 0.0)
     }
 
     fn residual_columns(&self) -> usize {

@@ -4,31 +4,27 @@
 //! misalignment   dx = J(P) theta                    three angles, prior: declared bias, or free;
 //!                                                   P is projected through theta itself
 //! distortion     dx = sum_jk a_jk (x^j y^k - m_jk)  (j,k) != (0,0), m_jk the mean over the field,
-//!                                                   the same for y; prior N(0, s^2) each
+//!                                                   the same for y; prior: that of a draw
 //! zeros          dx = e, dy = n                     two numbers a star, of centroids formed anew
 //! directions     dx = f/Z-projection of q (e a + n b)   two angles a star, prior: a pixel
 //! ```
 //!
 //! The distortion's draw is N(0,1) scaled to `sigma_LSF`, so the spread of its
-//! coefficients differs from draw to draw by 0.58 to 2.2 times (1 to 99 %): the
-//! prior is widened by that 2.2, or everything constant per star raises alarms
-//! when the stars hardly move.
+//! coefficients differs from draw to draw by 0.58 to 2.2 times (1 to 99 %): each of
+//! its modes has a prior that covers this ([`coefficient_precision`]), or everything constant per
+//! star raises alarms when the stars hardly move.
 //!
 //! Source: [M23] Eq. 5-8 and Section 2.3.
 
 use std::ops::Range;
 
-use distortion::{DistortionField, monomial_moment};
-use focal_plane::Pixel;
-use nalgebra::{DVector, Vector3};
+use distortion::{DistortionField, LsfSigma, coefficient_precision, monomial_moment};
+use focal_plane::{Angle, Pixel};
+use nalgebra::{DMatrix, DVector, Vector3};
 use telemetry::Model;
 
 use crate::star::columns::Filled;
 use crate::star::data::StarData;
-
-/// 99 % point of the ratio between the spread of one draw's coefficients and
-/// the spread over all draws.
-const PRIOR_WIDENING: f64 = 2.2;
 
 /// The unknowns of the declared model at star level.
 #[derive(Clone, Debug)]
@@ -36,8 +32,8 @@ pub(crate) struct StarNuisance {
     /// 1 sigma of each misalignment angle, arcsec; infinite = free. `None`:
     /// absorbed by the free attitude of each frame.
     misalignment: Option<[f64; 3]>,
-    /// Order of the distortion polynomials and 1 sigma of a coefficient, arcsec.
-    distortion: Option<(usize, f64)>,
+    /// Order of the distortion polynomials, and the prior precision of the coefficients of an axis, 1/arcsec^2.
+    distortion: Option<(usize, DMatrix<f64>)>,
     /// Stars whose direction is unknown: all or none.
     directions: usize,
     /// 1 sigma of what the solved directions are off by, arcsec: a pixel. With free
@@ -57,10 +53,11 @@ impl StarNuisance {
     pub(crate) fn declared(model: &Model, data: &StarData) -> Self {
         let noise = &model.noise;
         let order = noise.distortion_order.unwrap_or(7) as usize;
-        let circular = noise.distortion_arcsec.unwrap_or(0.0);
+        let declared = Angle::from_arcsec(noise.distortion_arcsec.unwrap_or(0.0));
+        let per_axis = LsfSigma::Circular(declared).per_axis().arcsec();
         let moments = moments(order);
-        let distortion = (circular > 0.0 && order > 0)
-            .then(|| (order, PRIOR_WIDENING * coefficient_sigma(order, circular)));
+        let distortion = (per_axis > 0.0 && order > 0)
+            .then(|| (order, coefficient_precision(order) / per_axis.powi(2)));
         Self {
             misalignment: (!data.free_attitude).then(|| {
                 noise.bias_arcsec.map_or([f64::INFINITY; 3], |b| {
@@ -90,29 +87,36 @@ impl StarNuisance {
         self
     }
 
-    /// Prior precision of each column's amplitude, 1/arcsec^2.
-    pub(crate) fn precision(&self) -> Vec<f64> {
-        let mut precision = Vec::new();
-        if let Some(sigma) = self.misalignment {
-            precision.extend(sigma.map(|s| if s.is_finite() { 1.0 / (s * s) } else { 0.0 }));
+    /// Prior precision of the columns' amplitudes, 1/arcsec^2.
+    pub(crate) fn precision(&self) -> DMatrix<f64> {
+        let (misaligned, polynomials, stars) = self.parts();
+        let columns = misaligned + 2 * polynomials + stars;
+        let mut out = DMatrix::zeros(columns, columns);
+        for (k, sigma) in self.misalignment.iter().flatten().enumerate() {
+            out[(k, k)] = sigma.powi(-2);
         }
-        if let Some((_, sigma)) = self.distortion {
-            precision.extend(std::iter::repeat_n(
-                1.0 / (sigma * sigma),
-                2 * (self.moments.len() - 1),
-            ));
+        if let Some((_, precision)) = &self.distortion {
+            for axis in 0..2 {
+                let first = misaligned + axis * polynomials;
+                out.view_mut((first, first), precision.shape())
+                    .copy_from(precision);
+            }
         }
-        let direction = 1.0 / (self.direction_sigma * self.direction_sigma);
-        precision.extend(std::iter::repeat_n(direction, 2 * self.directions));
-        precision.extend(self.zeros.as_flattened().iter().map(|s| 1.0 / (s * s)));
-        precision
+        let directions = std::iter::repeat_n(self.direction_sigma, 2 * self.directions);
+        let of_stars = directions.chain(self.zeros.as_flattened().iter().copied());
+        for (k, sigma) in (misaligned + 2 * polynomials..).zip(of_stars) {
+            out[(k, k)] = sigma.powi(-2);
+        }
+        out
     }
 
     /// Columns of the misalignment, polynomials of an axis, columns of the directions or zeros.
     pub(crate) fn parts(&self) -> (usize, usize, usize) {
         (
             3 * usize::from(self.misalignment.is_some()),
-            self.distortion.map_or(0, |_| self.moments.len() - 1),
+            self.distortion
+                .as_ref()
+                .map_or(0, |_| self.moments.len() - 1),
             2 * self.directions + 2 * self.zeros.len(),
         )
     }
@@ -145,8 +149,8 @@ impl StarNuisance {
                         }
                     }
                 }
-                if let Some((order, _)) = self.distortion {
-                    DistortionField::basis_into(order, data.camera.normalised(at), &mut basis);
+                if let Some((order, _)) = &self.distortion {
+                    DistortionField::basis_into(*order, data.camera.normalised(at), &mut basis);
                     let count = basis.len() - 1;
                     let polynomials = &mut out.shared.as_mut_slice()[i * count..(i + 1) * count];
                     let basis = basis[1..].iter().zip(&self.moments[1..]);
@@ -197,17 +201,4 @@ fn moments(order: usize) -> Vec<f64> {
         }
     }
     out
-}
-
-/// 1 sigma of a coefficient such that the expected per-axis variance over the
-/// field is `sigma_LSF^2 / 2`: `sum_jk s^2 (m_2j,2k - m_jk^2) = sigma_LSF^2 / 2`.
-fn coefficient_sigma(order: usize, circular_arcsec: f64) -> f64 {
-    let mut variance = 0.0;
-    for k in 0..=order {
-        for j in 0..=order {
-            let mean = monomial_moment(j, k);
-            variance += monomial_moment(2 * j, 2 * k) - mean * mean;
-        }
-    }
-    circular_arcsec / (2.0 * variance).sqrt()
 }

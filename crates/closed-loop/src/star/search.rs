@@ -34,6 +34,7 @@ use std::sync::Arc;
 use block_regression::{Estimate, Fits, Folds, Layout};
 use coloured_noise::{CommonNoise, Rotations};
 use effects::Candidate;
+use nalgebra::DMatrix;
 use rayon::prelude::*;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
@@ -284,7 +285,7 @@ struct Trial<'a> {
     moments: &'a StarMoments,
     folds: &'a Folds,
     /// Of the nuisance.
-    precision: Vec<f64>,
+    precision: DMatrix<f64>,
     /// Of a scalar of white evidence.
     variance: f64,
     groups: &'a [Group],
@@ -297,7 +298,7 @@ struct Trial<'a> {
 impl Trial<'_> {
     /// Nuisance, the columns of `chosen`, and the residual.
     fn columns(&self, chosen: &[usize]) -> Vec<usize> {
-        let n = self.precision.len();
+        let n = self.precision.nrows();
         (0..n)
             .chain(columns_of(self.groups, chosen).into_iter().map(|c| n + c))
             .chain([self.moments.width() - 1])
@@ -307,7 +308,7 @@ impl Trial<'_> {
     fn layout(&self, columns: &[usize]) -> Layout {
         Layout {
             nuisance_precision: self.precision.clone(),
-            candidates: columns.len() - self.precision.len() - 1,
+            candidates: columns.len() - self.precision.nrows() - 1,
             residuals: 1,
         }
     }
