@@ -28,7 +28,7 @@ use focal_plane::{AttitudeSeries, AttitudeSource, Camera, rotation_vector};
 use nalgebra::{UnitQuaternion, Vector3};
 
 use crate::gaps::longest_step;
-use stencil::Stencil;
+use stencil::{Stencil, rates_tell_more};
 
 /// Largest ratio of prediction error to step at which the motion is resolved.
 const RESOLVED: f64 = 0.3;
@@ -39,11 +39,11 @@ fn resolved(t_s: &[f64], q: &[UnitQuaternion<f64>], arm: f64) -> bool {
 }
 
 /// Whether it tells how that motion changed: the same against second differences, of which a walk of variance
-/// s^2 a step has 2 s^2 and the error 20/36 s^2. What such a walk seems to accelerate by goes with itself, though
-/// rates are given: a path through attitudes holds it.
+/// s^2 a step has 2 s^2 and the error 20/36 s^2. What such a walk seems to accelerate by goes with itself, where
+/// the path is one through attitudes.
 pub(crate) fn accelerates(series: &AttitudeSeries, arm: f64) -> bool {
     let change = |last: &Vector3<f64>, next: &Vector3<f64>| last + next;
-    predicts(series.t_s(), series.quaternions(), arm, change)
+    rates_tell_more(series) || predicts(series.t_s(), series.quaternions(), arm, change)
 }
 
 /// Whether samples are predicted by their neighbours within a share of `size`, of the turns to those before and

@@ -6,7 +6,8 @@
 //! around a frame the path is the polynomial through the neighbours alone, three
 //! on each side that lie at least one step away, or two with their measured rates;
 //! beside a hole, and at the ends, through those of one side. Of noisy samples it is
-//! the polynomial of that degree nearest to more neighbours ([`super::stencil`]):
+//! the polynomial of that degree nearest to more neighbours ([`super::stencil`]), or where measured rates tell
+//! more than such samples, what the polynomial through the rates of three on each side integrates to:
 //!
 //! ```text
 //! q(t_k + s) = exp( p_k(s) ) q_k      p_k(s_i) = log(q_i q_k^-1) = phi_i,  |s_i| >= 0.9 h
@@ -28,7 +29,7 @@ use focal_plane::{AttitudeSeries, AttitudeSource, rotation_from_vector, rotation
 use nalgebra::{UnitQuaternion, Vector3};
 use spectra::robust::median_step;
 
-use super::stencil::{SIDE, Stencil};
+use super::stencil::{Place, SIDE, Stencil, integrated};
 use crate::gaps::GAP_STEPS;
 
 /// Neighbours on each side with rates.
@@ -51,6 +52,8 @@ pub(crate) struct Around {
     step_s: f64,
     /// Whether there are paths, not attitudes alone.
     resolved: bool,
+    /// Whether these come from measured rates alone.
+    by_rates: bool,
 }
 
 #[derive(Clone, Debug)]
@@ -63,7 +66,7 @@ struct Piece {
     nodes: [f64; MOST],
     newton: [Vector3<f64>; MOST],
     count: usize,
-    /// Of samples with white noise, how far the neighbours that it comes from reach on both sides, s.
+    /// Of noisy samples, how far the neighbours that it comes from reach on both sides, s.
     own_s: f64,
 }
 
@@ -82,6 +85,7 @@ impl Around {
             pieces,
             step_s: step,
             resolved,
+            by_rates: stencil.is_some_and(|s| s.by_rates),
         };
         let paths = around.pieces.iter().flatten().filter(|p| p.count > 0);
         if resolved && 2 * paths.count() < t_s.len() {
@@ -106,9 +110,9 @@ impl Around {
         self.resolved
     }
 
-    /// Whether what acts around a frame's time follows the path of that frame: of samples with white noise.
+    /// Whether what acts around a frame's time follows the path of that frame, which is that of many samples.
     pub(crate) fn has_own_paths(&self) -> bool {
-        self.pieces.iter().flatten().any(|p| p.own_s > 0.0)
+        !self.by_rates && self.pieces.iter().flatten().any(|p| p.own_s > 0.0)
     }
 
     /// Whether it is not known how the tracker moved around a frame, where it is around others.
@@ -167,10 +171,10 @@ impl Piece {
         let before = times.partition_point(|&t| t <= t_s - NEAR * step);
         let after = times.partition_point(|&t| t < t_s + NEAR * step);
         let rates = series.given_rates_rad_s();
-        let (side, most) = if rates.is_some() {
-            (SIDE_WITH_RATES, SIDE_WITH_RATES)
-        } else {
-            (SIDE, stencil.most)
+        let (side, most) = match rates {
+            _ if stencil.by_rates => (SIDE, SIDE),
+            Some(_) => (SIDE_WITH_RATES, SIDE_WITH_RATES),
+            None => (SIDE, stencil.most),
         };
         // outward on each side, as far as no hole is crossed
         let within = |last: &mut f64, i: usize| {
@@ -195,6 +199,24 @@ impl Piece {
         let [left, right] = [&left, &right].map(|s| &s[..s.len().min(side)]);
         let used = [left, right].concat();
         let rates = rates.filter(|r| used.iter().all(|&i| r[i].iter().all(|w| w.is_finite())));
+        let both_sides = match (left.last(), right.last()) {
+            (Some(&first), Some(&last)) => (times[last] - t_s).min(t_s - times[first]),
+            _ => 0.0,
+        };
+        if let Some(rates) = rates
+            && stencil.by_rates
+        {
+            let slopes: Vec<Place> = used
+                .iter()
+                .map(|i| (place(i).0, -unrolled(&place(i).1, &rates[*i])))
+                .collect();
+            if slopes.len() + 1 >= FEWEST {
+                self.newton[1..=slopes.len()].copy_from_slice(&integrated(&slopes));
+                self.count = slopes.len() + 1;
+                self.own_s = both_sides;
+            }
+            return self;
+        }
         let repeats = if rates.is_some() { 2 } else { 1 };
         let count = repeats * used.len();
         if count < FEWEST {
@@ -222,10 +244,8 @@ impl Piece {
             }
         }
         self.count = count;
-        if stencil.most > SIDE
-            && let (Some(&first), Some(&last)) = (left.last(), right.last())
-        {
-            self.own_s = (times[last] - t_s).min(t_s - times[first]);
+        if stencil.most > SIDE {
+            self.own_s = both_sides;
         }
         self
     }
@@ -528,6 +548,44 @@ mod tests {
             }
         }
         assert!((2400..2403).all(|k| around.lost(k)));
+    }
+
+    /// A swing of 36 samples a period, whose samples hold noise of 1e-3 of it or a wander, with its rates: the polynomial
+    /// through six is off by (2 pi/36)^6 / 20 = 1.4e-6 of the largest, and what the samples err by is not in the
+    /// path, but for turning the rates of neighbours by it: by 5e-6 of half of them. Rates whose noise over a step is that of the samples tell no more than they do.
+    #[test]
+    fn a_path_by_rates_holds_no_noise_of_the_samples() {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(7);
+        let mut normal =
+            || -> Vector3<f64> { Vector3::from_fn(|_, _| StandardNormal.sample(&mut rng)) };
+        let omega = std::f64::consts::TAU / 36.0 / STEP;
+        let path = |t: f64| Vector3::x() * 1e-3 * (omega * t).sin();
+        let t_s: Vec<f64> = (0..400).map(|k| STEP * f64::from(k)).collect();
+        let mut swing = |white: f64, walk: f64, of_rates: f64| {
+            let mut off = Vector3::zeros();
+            let mut q = Vec::new();
+            let mut rates = Vec::new();
+            for &t in &t_s {
+                off += normal() * walk;
+                q.push(rotation_from_vector(&(path(t) + off + normal() * white)));
+                rates.push(-Vector3::x() * 1e-3 * omega * (omega * t).cos() + normal() * of_rates);
+            }
+            AttitudeSeries::new(t_s.clone(), q, Some(rates)).unwrap()
+        };
+        for motion in [swing(1e-6, 0.0, 0.0), swing(0.0, 1e-6, 0.0)] {
+            let around = of(&motion, &t_s);
+            assert!(around.by_rates && !around.has_own_paths());
+            for &t in &t_s[3..397] {
+                let turn = around.turn(t, 0.3, &mut 0).unwrap();
+                let off = turn.scaled_axis() - (path(t + 0.3) - path(t));
+                assert!(
+                    off.norm() < (1.4e-6 + 2.5e-6) * 1e-3 * omega * 0.3,
+                    "{t}: {off}"
+                );
+            }
+        }
+        assert!(!of(&swing(1e-6, 0.0, 1e-6 / STEP), &t_s).by_rates);
+        assert!(!of(&swing(0.0, 0.0, 0.0), &t_s).by_rates);
     }
 
     /// Where most frames are lost, or the motion is not resolved, none has a path; all have attitudes.
