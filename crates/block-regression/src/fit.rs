@@ -429,6 +429,14 @@ impl Fits {
         self.usual = OnceLock::from(*all.usual.get_or_init(|| all.usual()));
     }
 
+    /// Asks all columns what they say of the noise, which [`estimate`](Self::estimate) needs: before several threads
+    /// estimate at once, so that none waits for one that waits for it.
+    pub fn ask_all(&self) {
+        if self.prior <= 0.0 && !self.inner.is_empty() {
+            self.usual.get_or_init(|| self.usual());
+        }
+    }
+
     /// What all columns, each alone, say of the noise.
     fn usual(&self) -> Usual {
         let columns: Vec<(f64, f64)> = (0..self.layout.candidates)

@@ -34,8 +34,10 @@
 //! for weights of p-values.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 use block_regression::{Fits, OutOfFold};
+use rayon::prelude::*;
 
 /// Chance that a bundle which follows its model gets any effect at all.
 pub(crate) const FAMILY_ALPHA: f64 = 0.01;
@@ -180,18 +182,22 @@ impl Trials<'_> {
         Selection { chosen, judged }
     }
 
-    /// All groups that may be tried beside `chosen`, the largest gain out of fold after the price of their
-    /// parameters and choices first.
+    /// All groups that may be tried beside `chosen` and gain out of fold, the largest gain after the price of
+    /// their parameters and choices first.
     pub(crate) fn tried(&self, may: &[bool], chosen: &[usize]) -> Vec<Tried> {
         let Some(base) = self.out_of_fold(chosen) else {
             return Vec::new();
         };
         let groups = self.groups;
+        self.fits.ask_all();
         let mut tried: Vec<Tried> = (0..groups.len())
+            .into_par_iter()
             .filter(|&g| may[g] && !chosen.contains(&g))
             .filter(|&g| chosen.iter().all(|&c| groups[c].family != groups[g].family))
             .filter_map(|g| {
-                let (judgement, white) = self.standing(chosen, g, &base)?;
+                // what gains nothing cannot stand, whatever its errors
+                let gain = self.gain(chosen, g, &base).filter(|gain| *gain > 0.0)?;
+                let (judgement, white) = self.standing(chosen, g, gain)?;
                 Some(Tried {
                     group: g,
                     rank: judgement.delta_loglik - price(&groups[g], self.scalars),
@@ -207,9 +213,7 @@ impl Trials<'_> {
     /// The two groups that gain most together where each stands beside the other, though of those `tried` none
     /// does alone; or none.
     fn hidden(&self, tried: &[Tried], chosen: &[usize]) -> Vec<usize> {
-        let alone = tried
-            .iter()
-            .filter(|t| t.judgement.delta_loglik > 0.0 && t.white < FAMILY_ALPHA);
+        let alone = tried.iter().filter(|t| t.white < FAMILY_ALPHA);
         let alone: Vec<&Tried> = alone.take(HIDDEN).collect();
         let mut best = (0.0, Vec::new());
         for (i, a) in alone.iter().enumerate() {
@@ -236,7 +240,11 @@ impl Trials<'_> {
     /// Standing of every group beside (for a chosen one: within) `chosen`.
     pub(crate) fn judged(&self, chosen: &[usize]) -> Vec<Judgement> {
         let base = self.out_of_fold(chosen);
-        let beside = |g| Some(self.standing(chosen, g, base.as_ref()?)?.0);
+        let beside = |g| {
+            let gain = self.gain(chosen, g, base.as_ref()?)?;
+            Some(self.standing(chosen, g, gain)?.0)
+        };
+        self.fits.ask_all();
         let judge = |g| {
             if chosen.contains(&g) {
                 self.within(chosen, g)
@@ -244,7 +252,7 @@ impl Trials<'_> {
                 beside(g)
             }
         };
-        let all = 0..self.groups.len();
+        let all = (0..self.groups.len()).into_par_iter();
         all.map(|g| judge(g).unwrap_or(Judgement::UNSEEN)).collect()
     }
 
@@ -267,24 +275,26 @@ impl Trials<'_> {
     pub(crate) fn within(&self, set: &[usize], g: usize) -> Option<Judgement> {
         let others: Vec<usize> = set.iter().copied().filter(|&c| c != g).collect();
         let base = self.out_of_fold(&others)?;
-        let standing = self.standing(&others, g, &base);
+        let gain = self.gain(&others, g, &base);
+        let standing = gain.and_then(|gain| self.standing(&others, g, gain));
         Some(standing.map_or(Judgement::UNSEEN, |(judgement, _)| judgement))
     }
 
-    /// Standing of a group beside `others`, and its p-value if the noise were white; `None` if it cannot be told
-    /// from them.
-    fn standing(&self, others: &[usize], g: usize, base: &OutOfFold) -> Option<(Judgement, f64)> {
-        let mut set = columns_of(self.groups, others);
-        let first = set.len();
-        set.extend(&self.groups[g].columns);
-        let which: Vec<usize> = (first..set.len()).collect();
-        if which.is_empty() {
-            return None;
-        }
-        let (with, estimate) = (self.fits.out_of_fold(&set)?, self.fits.estimate(&set)?);
+    /// What a group adds to the log-likelihood out of fold of `others`, which is `base`.
+    fn gain(&self, others: &[usize], g: usize, base: &OutOfFold) -> Option<f64> {
+        let (set, _) = self.beside(others, g)?;
+        Some(self.fits.out_of_fold(&set)?.total_loglik() - base.total_loglik())
+    }
+
+    /// Standing of a group with this `gain` beside `others`, and its p-value if the noise were white; `None` if it
+    /// cannot be told from them.
+    fn standing(&self, others: &[usize], g: usize, gain: f64) -> Option<(Judgement, f64)> {
+        let (set, which) = self.beside(others, g)?;
+        let which: Vec<usize> = which.collect();
+        let estimate = self.fits.estimate(&set)?;
         let bounds = self.groups[g].bounds.iter().zip(&which);
         let judgement = Judgement {
-            delta_loglik: with.total_loglik() - base.total_loglik(),
+            delta_loglik: gain,
             credible: bounds
                 .into_iter()
                 .all(|([low, high], &i)| (*low..=*high).contains(&estimate.value[i])),
@@ -293,6 +303,15 @@ impl Trials<'_> {
         };
         let white = estimate.white_p_value(&which) * self.cost[g];
         Some((judgement, white))
+    }
+
+    /// Columns of `others` and of a group, and which of these are its own; `None` if it has none.
+    fn beside(&self, others: &[usize], g: usize) -> Option<(Vec<usize>, Range<usize>)> {
+        let mut set = columns_of(self.groups, others);
+        let first = set.len();
+        set.extend(&self.groups[g].columns);
+        let own = first..set.len();
+        (!own.is_empty()).then_some((set, own))
     }
 }
 
