@@ -125,6 +125,28 @@ mod tests {
         }
     }
 
+    /// In every order the coefficients have a covariance, positive and finite, and no mode a variance below half of
+    /// that over all draws: a prior is never the tighter for what is known of a draw's size.
+    #[test]
+    fn every_order_has_a_prior() {
+        for order in 1..=crate::MAX_ORDER {
+            let precision = coefficient_precision(order);
+            let values = precision.symmetric_eigenvalues();
+            let total: f64 = (0..precision.nrows())
+                .map(|k| {
+                    let (j, l) = ((k + 1) % (order + 1), (k + 1) / (order + 1));
+                    monomial_moment(2 * j, 2 * l) - monomial_moment(j, l).powi(2)
+                })
+                .sum();
+            assert!(
+                values
+                    .iter()
+                    .all(|v| v.is_finite() && *v > 0.0 && *v < 2.0 * total),
+                "{order}: {values}"
+            );
+        }
+    }
+
     /// Draws in units of their prior: a number that a Gaussian of that prior would have with a deviation of 1, for the
     /// coefficients that a scale error, a line that is exposed later, a radial distortion, a decentring and the
     /// finest term of all resemble. 20 000 draws of two axes.
