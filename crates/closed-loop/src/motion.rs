@@ -20,6 +20,7 @@
 //! Source: Lagrange interpolation; the errors-in-variables trap of regression.
 
 mod around;
+pub(crate) mod gyro;
 mod stencil;
 
 pub(crate) use around::Around;

@@ -9,6 +9,7 @@ use focal_plane::{AttitudeSeries, Camera, Series};
 use telemetry::{Bundle, Model};
 
 use crate::error::CloseError;
+use crate::motion::gyro::with_rates;
 use crate::questions::hypothesis::Questions;
 use crate::star::data::Star;
 
@@ -133,10 +134,10 @@ pub(crate) fn channels_of_interest(
         .map(|(name, series)| (name.clone(), series))
 }
 
-/// The better estimate as a series; rates given with it, or the gyro's where its
-/// samples fall on the same instants, shape the path between samples.
+/// The better estimate as a series, with its rates or the gyro's.
 fn reference(bundle: &Bundle) -> Option<AttitudeSeries> {
-    bundle.reference.as_ref()?.series_with_gaps().ok()
+    let series = bundle.reference.as_ref()?.series_with_gaps().ok()?;
+    Some(with_rates(series, bundle.rates.as_ref()))
 }
 
 fn camera(model: &Model, bundle: &Bundle) -> Result<Camera, CloseError> {

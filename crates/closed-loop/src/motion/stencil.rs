@@ -165,8 +165,11 @@ fn errors(
             .map(|i| (times[i] - times[k], from(i, k)));
         let places: Vec<Place> = places.collect();
         if let Some([error, ..]) = nearest(places.iter()) {
-            for (squares, e) in squares.iter_mut().zip(error.iter()) {
-                squares.push(e * e);
+            // a row may lack its rates
+            if error.iter().all(|e| e.is_finite()) {
+                for (squares, e) in squares.iter_mut().zip(error.iter()) {
+                    squares.push(e * e);
+                }
             }
         }
     }

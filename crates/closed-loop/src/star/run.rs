@@ -25,7 +25,7 @@ use crate::error::CloseError;
 use crate::evidence::{Evidence, Residuals};
 use crate::figures;
 use crate::image_level::{self, ImageLevel, Side};
-use crate::motion::{self, source};
+use crate::motion::{self, gyro::with_rates, source};
 use crate::noise_effects;
 use crate::questions::confusion;
 use crate::questions::hypothesis::{self, Grounds};
@@ -151,7 +151,9 @@ fn explain(
 ) -> Result<Explained, CloseError> {
     let own = match &situation.reference {
         Some(_) => None,
-        None => data.own_motion(),
+        None => data
+            .own_motion()
+            .map(|own| with_rates(own, situation.bundle.rates.as_ref())),
     };
     let known = situation.reference.as_ref().or(own.as_ref());
     let arm = motion::roll_arm(&data.camera);

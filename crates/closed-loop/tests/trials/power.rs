@@ -104,6 +104,25 @@ fn beside_a_large_effect_the_declared_distortion_is_what_it_was() {
     }
 }
 
+/// Samples of 1 arcsec twice a second do not tell how a swing of nine seconds accelerates, a gyro does. Without
+/// it nothing is named, and the acceleration is told as what is left.
+#[test]
+fn a_smear_is_found_by_the_gyro() {
+    let without = "rates = false\nwhite_arcsec = [1.0, 1.0, 1.0]\n";
+    let gyro = "[rates]\nwhite_arcsec_s = [0.3, 0.3, 0.3]\nbias_arcsec_s = [1.0, -2.0, 0.5]\n";
+    let effects = |reference: &str| {
+        let case = Case::new(Path::Turns, 1).with("exposure_smear", "exposure_s = 0.7");
+        case.reference(reference).close().report.effects
+    };
+    let found = effects(&format!("{without}{gyro}"));
+    assert_eq!(found.len(), 1, "{found:?}");
+    assert_eq!(found[0].id, "exposure_smear");
+    let exposure = &found[0].parameters["exposure_s"];
+    let z = (exposure.value - 0.7) / exposure.sigma.unwrap();
+    assert!(z.abs() < 4.0, "{} off by {z} sigma", exposure.value);
+    assert!(effects(without).is_empty());
+}
+
 #[test]
 fn focal_length_with_a_temperature() {
     let lines = "channel = \"optics_c\"\nppm_per_c = {}";

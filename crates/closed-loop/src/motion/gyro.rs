@@ -1,0 +1,143 @@
+//! A gyro's rates at the samples of attitudes that have none of their own.
+//!
+//! Between two of the gyro's samples the rate changes evenly; where one of them is missing, and outside the
+//! record, there is none. A gyro that is read out less often than the attitudes would make them smoother than
+//! they are, and one that knows less of the motion than they do is of no use.
+//!
+//! Not physics: linear interpolation.
+
+use focal_plane::AttitudeSeries;
+use nalgebra::Vector3;
+use spectra::robust::median_step;
+use telemetry::RateTable;
+
+use super::stencil::rates_tell_more;
+use crate::gaps::longest_step;
+
+/// Steps of the attitudes that one of the gyro may take: rounded times are no slower gyro.
+const DENSE: f64 = 1.05;
+
+/// The same attitudes with the rates of `gyro`, where these tell more of the motion.
+pub(crate) fn with_rates(series: AttitudeSeries, gyro: Option<&RateTable>) -> AttitudeSeries {
+    let Some(gyro) = gyro.filter(|_| series.given_rates_rad_s().is_none()) else {
+        return series;
+    };
+    let dense = match (median_step(&gyro.t_s), median_step(series.t_s())) {
+        (Some(own), Some(step)) => own <= DENSE * step,
+        _ => false,
+    };
+    if !dense {
+        return series;
+    }
+    let rates = at(gyro, series.t_s());
+    AttitudeSeries::new(
+        series.t_s().to_vec(),
+        series.quaternions().to_vec(),
+        Some(rates),
+    )
+    .map(|with| with.with_max_gap_s(series.max_gap_s()))
+    .ok()
+    .filter(rates_tell_more)
+    .unwrap_or(series)
+}
+
+/// Its rates at times in ascending order; NaN where there are none.
+fn at(gyro: &RateTable, t_s: &[f64]) -> Vec<Vector3<f64>> {
+    let longest = longest_step(&gyro.t_s);
+    let rate = |&t: &f64| {
+        let after = gyro.t_s.partition_point(|&g| g < t);
+        if gyro.t_s.get(after) == Some(&t) {
+            return Some(gyro.w[after]);
+        }
+        let before = after.checked_sub(1)?;
+        let (from, to) = (gyro.t_s[before], *gyro.t_s.get(after)?);
+        let share = (t - from) / (to - from);
+        (to - from <= longest).then(|| gyro.w[before].lerp(&gyro.w[after], share))
+    };
+    let none = Vector3::repeat(f64::NAN);
+    t_s.iter().map(|t| rate(t).unwrap_or(none)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use focal_plane::rotation_from_vector;
+    use rand_core::SeedableRng;
+    use rand_distr::{Distribution, StandardNormal};
+    use rand_xoshiro::Xoshiro256PlusPlus;
+
+    fn gyro(t_s: Vec<f64>) -> RateTable {
+        let w = t_s.iter().map(|t| Vector3::x() * (1.0 + 2.0 * t)).collect();
+        RateTable { t_s, w }
+    }
+
+    /// A rate that grows evenly, with a sample missing at 4 s.
+    #[test]
+    fn rates_change_evenly_and_holes_have_none() {
+        let table = gyro(vec![0.0, 1.0, 2.0, 3.0, 5.0, 6.0]);
+        let got = at(
+            &table,
+            &[-0.5, 0.0, 0.25, 2.0, 3.0, 3.5, 5.0, 5.5, 6.0, 6.5],
+        );
+        let want = [
+            None,
+            Some(1.0),
+            Some(1.5),
+            Some(5.0),
+            Some(7.0),
+            None,
+            Some(11.0),
+            Some(12.0),
+            Some(13.0),
+            None,
+        ];
+        for (got, want) in got.iter().zip(want) {
+            match want {
+                Some(rate) => assert!((got - Vector3::x() * rate).norm() < 1e-12, "{got}"),
+                None => assert!(got.iter().all(|c| c.is_nan()), "{got}"),
+            }
+        }
+    }
+
+    /// Samples with noise of 1e-6 every 0.5 s, of a turn at (1 + 2 t) 1e-4: a gyro as often or oftener tells the
+    /// motion better, one that is slower or noisier is left out, and rates of the samples' own are kept.
+    #[test]
+    fn a_gyro_serves_where_it_knows_more() {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(3);
+        let mut normal =
+            || -> Vector3<f64> { Vector3::from_fn(|_, _| StandardNormal.sample(&mut rng)) };
+        let times = |step: f64| -> Vec<f64> {
+            (0..)
+                .map(|k| step * f64::from(k))
+                .take_while(|t| *t <= 100.0)
+                .collect()
+        };
+        let path = |t: f64| -Vector3::x() * 1e-4 * (t + t * t) * 1e-2;
+        let rate = |t: f64| Vector3::x() * 1e-4 * (1.0 + 2.0 * t) * 1e-2;
+        let t_s = times(0.5);
+        let q: Vec<_> = t_s
+            .iter()
+            .map(|&t| rotation_from_vector(&(path(t) + normal() * 1e-6)))
+            .collect();
+        let mut gyro = |step: f64, noise: f64| {
+            let t_s = times(step);
+            let w = t_s.iter().map(|&t| rate(t) + normal() * noise).collect();
+            RateTable { t_s, w }
+        };
+        let tables = [
+            (gyro(0.5, 1e-8), true),
+            (gyro(0.2, 1e-8), true),
+            (gyro(1.0, 1e-8), false),
+            (gyro(0.5, 1e-5), false),
+        ];
+        let series = AttitudeSeries::new(t_s.clone(), q.clone(), None).unwrap();
+        for (table, serves) in &tables {
+            let with = with_rates(series.clone(), Some(table));
+            assert_eq!(with.given_rates_rad_s().is_some(), *serves);
+        }
+        let own = vec![Vector3::y(); t_s.len()];
+        let series = AttitudeSeries::new(t_s, q, Some(own)).unwrap();
+        let with = with_rates(series, Some(&tables[0].0));
+        assert_eq!(with.given_rates_rad_s().unwrap()[3], Vector3::y());
+    }
+}
