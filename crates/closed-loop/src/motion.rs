@@ -21,6 +21,7 @@
 
 mod around;
 pub(crate) mod gyro;
+mod rates;
 mod stencil;
 
 pub(crate) use around::Around;
@@ -29,7 +30,7 @@ use focal_plane::{AttitudeSeries, AttitudeSource, Camera, rotation_vector};
 use nalgebra::{UnitQuaternion, Vector3};
 
 use crate::gaps::longest_step;
-use stencil::{Stencil, rates_tell_more};
+use stencil::Stencil;
 
 /// Largest ratio of prediction error to step at which the motion is resolved.
 const RESOLVED: f64 = 0.3;
@@ -44,7 +45,8 @@ fn resolved(t_s: &[f64], q: &[UnitQuaternion<f64>], arm: f64) -> bool {
 /// the path is one through attitudes.
 pub(crate) fn accelerates(series: &AttitudeSeries, arm: f64) -> bool {
     let change = |last: &Vector3<f64>, next: &Vector3<f64>| last + next;
-    rates_tell_more(series) || predicts(series.t_s(), series.quaternions(), arm, change)
+    rates::that_tell_more(series).is_some()
+        || predicts(series.t_s(), series.quaternions(), arm, change)
 }
 
 /// Whether samples are predicted by their neighbours within a share of `size`, of the turns to those before and

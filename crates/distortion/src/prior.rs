@@ -11,8 +11,8 @@
 //!
 //! A mode that holds much of the field is bounded, c^2 < sigma^2 / l: where one coefficient is large, the
 //! scale is small. A mode that holds little follows the scale, which differs from draw to draw by 0.58 to
-//! 2.2 times (order 7, 1 to 99 %). The second line takes the square of the other modes for a chi-squared of v,
-//! by its mean inverse. The Gaussian that stands for a mode is the widest of those with its mean square and with
+//! 2.2 times (order 7, 1 to 99 %). The second line takes the square of the other modes for a chi-squared, with
+//! the v that gives the mean inverse of all. The Gaussian that stands for a mode is the widest of those with its mean square and with
 //! its 99.99 % point, so that tails are covered where effects are judged, which pay for all that were tried: 0.9 to
 //! 1.1 of the spread over all draws in the modes that matter, 2 in those that hold nothing.
 //!

@@ -1,8 +1,10 @@
 //! A gyro's rates at the samples of attitudes that have none of their own.
 //!
 //! Between two of the gyro's samples the rate changes evenly; where one of them is missing, and outside the
-//! record, there is none. A gyro that is read out less often than the attitudes would make them smoother than
-//! they are, and one that knows less of the motion than they do is of no use.
+//! record, there is none. It is sampled, not averaged: what vibrates faster than the attitudes' steps is not
+//! taken out. A gyro that is read out less often than the attitudes would make them smoother than they are, and one
+//! that knows less of the motion than they do, or of another motion, is of no use ([`super::rates`]). Its bias is
+//! the attitudes' to tell.
 //!
 //! Not physics: linear interpolation.
 
@@ -11,7 +13,7 @@ use nalgebra::Vector3;
 use spectra::robust::median_step;
 use telemetry::RateTable;
 
-use super::stencil::rates_tell_more;
+use super::rates::{is_finite, that_tell_more};
 use crate::gaps::longest_step;
 
 /// Steps of the attitudes that one of the gyro may take: rounded times are no slower gyro.
@@ -19,7 +21,10 @@ const DENSE: f64 = 1.05;
 
 /// The same attitudes with the rates of `gyro`, where these tell more of the motion.
 pub(crate) fn with_rates(series: AttitudeSeries, gyro: Option<&RateTable>) -> AttitudeSeries {
-    let Some(gyro) = gyro.filter(|_| series.given_rates_rad_s().is_none()) else {
+    let own = series
+        .given_rates_rad_s()
+        .is_some_and(|rates| rates.iter().any(is_finite));
+    let Some(gyro) = gyro.filter(|_| !own) else {
         return series;
     };
     let dense = match (median_step(&gyro.t_s), median_step(series.t_s())) {
@@ -29,16 +34,17 @@ pub(crate) fn with_rates(series: AttitudeSeries, gyro: Option<&RateTable>) -> At
     if !dense {
         return series;
     }
-    let rates = at(gyro, series.t_s());
-    AttitudeSeries::new(
-        series.t_s().to_vec(),
-        series.quaternions().to_vec(),
-        Some(rates),
-    )
-    .map(|with| with.with_max_gap_s(series.max_gap_s()))
-    .ok()
-    .filter(rates_tell_more)
-    .unwrap_or(series)
+    let measured = at(gyro, series.t_s());
+    let with = |bias: Vector3<f64>| {
+        let (t_s, q) = (series.t_s().to_vec(), series.quaternions().to_vec());
+        let rates = measured.iter().map(|w| w - bias).collect();
+        let with = AttitudeSeries::new(t_s, q, Some(rates)).ok()?;
+        Some(with.with_max_gap_s(series.max_gap_s()))
+    };
+    with(Vector3::zeros())
+        .and_then(|raw| that_tell_more(&raw))
+        .and_then(with)
+        .unwrap_or(series)
 }
 
 /// Its rates at times in ascending order; NaN where there are none.
@@ -99,8 +105,9 @@ mod tests {
         }
     }
 
-    /// Samples with noise of 1e-6 every 0.5 s, of a turn at (1 + 2 t) 1e-4: a gyro as often or oftener tells the
-    /// motion better, one that is slower or noisier is left out, and rates of the samples' own are kept.
+    /// Samples with noise of 1e-6 every 0.5 s, of a turn at (1 + 2 t) 1e-6: a gyro as often or oftener tells the
+    /// motion better, whatever its bias, one that is slower or noisier is left out, and rates of the samples' own are
+    /// kept if there are any.
     #[test]
     fn a_gyro_serves_where_it_knows_more() {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(3);
@@ -112,8 +119,8 @@ mod tests {
                 .take_while(|t| *t <= 100.0)
                 .collect()
         };
-        let path = |t: f64| -Vector3::x() * 1e-4 * (t + t * t) * 1e-2;
-        let rate = |t: f64| Vector3::x() * 1e-4 * (1.0 + 2.0 * t) * 1e-2;
+        let path = |t: f64| -Vector3::x() * 1e-6 * (t + t * t);
+        let rate = |t: f64| Vector3::x() * 1e-6 * (1.0 + 2.0 * t);
         let t_s = times(0.5);
         let q: Vec<_> = t_s
             .iter()
@@ -121,7 +128,8 @@ mod tests {
             .collect();
         let mut gyro = |step: f64, noise: f64| {
             let t_s = times(step);
-            let w = t_s.iter().map(|&t| rate(t) + normal() * noise).collect();
+            let off = |t| rate(t) + Vector3::y() * 1e-4 + normal() * noise;
+            let w = t_s.iter().copied().map(off).collect();
             RateTable { t_s, w }
         };
         let tables = [
@@ -134,7 +142,16 @@ mod tests {
         for (table, serves) in &tables {
             let with = with_rates(series.clone(), Some(table));
             assert_eq!(with.given_rates_rad_s().is_some(), *serves);
+            if let Some(rates) = with.given_rates_rad_s() {
+                // of two samples over 100 s, and of the gyro's own: four or five of both
+                let off = rates[3] - rate(t_s[3]);
+                assert!(off.norm() < 5.0 * 1.4e-8 + 5.0 * 1e-8, "{off}");
+            }
         }
+        let none = vec![Vector3::repeat(f64::NAN); t_s.len()];
+        let lacking = AttitudeSeries::new(t_s.clone(), q.clone(), Some(none)).unwrap();
+        let with = with_rates(lacking, Some(&tables[0].0));
+        assert!(with.given_rates_rad_s().unwrap()[3].x > 0.0);
         let own = vec![Vector3::y(); t_s.len()];
         let series = AttitudeSeries::new(t_s, q, Some(own)).unwrap();
         let with = with_rates(series, Some(&tables[0].0));

@@ -21,21 +21,14 @@
 //! acceleration goes with the error itself. Where motion is what a prediction misses, s is too large, but the
 //! wider fit misses more yet.
 //!
-//! Measured rates tell more than that where their noise over a step is well below that of the samples,
-//!
-//! ```text
-//! mean over axes of ln( w^2 h^2 / s^2 ) < ln 0.1
-//! ```
-//!
-//! of noise w and s, both by how well neighbours predict: what samples are too few to follow is missed in both alike.
-//!
 //! Source: Savitzky & Golay 1964; Stone 1974 (choice by prediction of what was left out); Katkovnik 1999
 //! (windows that grow while noise explains the misfit).
 
 use focal_plane::{AttitudeSeries, rotation_vector};
 use nalgebra::{SMatrix, Vector3};
-use spectra::robust::{self, median_step};
+use spectra::robust;
 
+use super::rates;
 use crate::gaps::longest_step;
 
 /// Neighbours on each side whose polynomial goes through all.
@@ -50,10 +43,8 @@ const BEYOND: f64 = 5.0;
 const LEAST: f64 = 1e-20;
 /// Most samples that are predicted, evenly among all.
 const PREDICTIONS: usize = 2000;
-/// Share of the samples' variance below which that of a step of the rates is well below.
-const BETTER: f64 = 0.1;
 /// Median of chi-squared of one degree.
-const MEDIAN: f64 = 0.4549;
+pub(crate) const MEDIAN: f64 = 0.4549;
 
 /// A neighbour: its time from the frame's, and its turn from it, or its slope.
 pub(crate) type Place = (f64, Vector3<f64>);
@@ -65,8 +56,8 @@ pub(crate) struct Stencil {
     variance: Vector3<f64>,
     /// Neighbours on each side that may be taken.
     pub(crate) most: usize,
-    /// Whether the path comes from measured rates alone.
-    pub(crate) by_rates: bool,
+    /// Where the path comes from measured rates alone, their bias, rad/s.
+    pub(crate) by_rates: Option<Vector3<f64>>,
 }
 
 impl Stencil {
@@ -74,7 +65,7 @@ impl Stencil {
     pub(crate) const PLAIN: Self = Self {
         variance: Vector3::new(0.0, 0.0, 0.0),
         most: SIDE,
-        by_rates: false,
+        by_rates: None,
     };
 
     pub(crate) fn of(series: &AttitudeSeries) -> Self {
@@ -97,7 +88,7 @@ impl Stencil {
         Self {
             variance: first / predicted(SIDE),
             most,
-            by_rates: rates_tell_more(series),
+            by_rates: rates::that_tell_more(series),
         }
     }
 
@@ -130,22 +121,9 @@ impl Stencil {
     }
 }
 
-/// Whether measured rates tell the motion better than the attitudes beside them.
-pub(crate) fn rates_tell_more(series: &AttitudeSeries) -> bool {
-    let (Some(rates), Some(step)) = (series.given_rates_rad_s(), median_step(series.t_s())) else {
-        return false;
-    };
-    let samples = series.quaternions();
-    let own = errors(series, SIDE, |i, k| {
-        rotation_vector(&samples[i], &samples[k])
-    });
-    let measured = errors(series, SIDE, |i, k| (rates[i] - rates[k]) * step);
-    measured.component_div(&own).map(f64::ln).mean() < BETTER.ln()
-}
-
 /// Median squared error of samples predicted from `m` neighbours on each side, of each axis. A sample is given as
 /// it is from another.
-fn errors(
+pub(crate) fn errors(
     series: &AttitudeSeries,
     m: usize,
     from: impl Fn(usize, usize) -> Vector3<f64>,
@@ -180,30 +158,8 @@ fn errors(
     Vector3::new(x, y, z)
 }
 
-/// What the polynomial through slopes integrates to from 0 on: coefficients of its powers, from the first.
-pub(crate) fn integrated(slopes: &[Place]) -> Vec<Vector3<f64>> {
-    let mut newton: Vec<Vector3<f64>> = slopes.iter().map(|(_, slope)| *slope).collect();
-    for order in 1..slopes.len() {
-        for j in (order..slopes.len()).rev() {
-            let apart = slopes[j].0 - slopes[j - order].0;
-            newton[j] = (newton[j] - newton[j - 1]) / apart;
-        }
-    }
-    // Horner's scheme on the powers
-    let mut powers = vec![Vector3::zeros(); slopes.len()];
-    for j in (0..slopes.len()).rev() {
-        for k in (0..slopes.len() - 1).rev() {
-            let lower = powers[k];
-            powers[k + 1] = lower - powers[k + 1] * slopes[j].0;
-        }
-        powers[0] = newton[j] - powers[0] * slopes[j].0;
-    }
-    let of = |(k, c): (usize, Vector3<f64>)| c / (k + 1) as f64;
-    powers.into_iter().enumerate().map(of).collect()
-}
-
 /// Variance of a sample less its prediction from `m` neighbours on each side, over that of white noise.
-fn predicted(m: usize) -> f64 {
+pub(crate) fn predicted(m: usize) -> f64 {
     let places = (1..=m).flat_map(|k| [k as f64, -(k as f64)].map(|s| (s, Vector3::zeros())));
     let places: Vec<Place> = places.collect();
     let (normal, _) = products(places.iter(), m as f64);
@@ -273,7 +229,7 @@ mod tests {
         Stencil {
             variance: Vector3::repeat(variance),
             most: MOST,
-            by_rates: false,
+            by_rates: None,
         }
     }
 
@@ -285,17 +241,6 @@ mod tests {
         assert!((predicted(SIDE) - through).abs() < 1e-9);
         let many = (1.0 + 1.25 + 9.0 * 9.0 / 64.0) / (2.0 * MOST as f64);
         assert!(((predicted(MOST) - 1.0) / many - 1.0).abs() < 2.0 / MOST as f64);
-    }
-
-    /// 2 s - 3 s^3 + s^6, by its slopes at six places that are not evenly spaced.
-    #[test]
-    fn slopes_integrate_to_their_polynomial() {
-        let slope = |s: f64| Vector3::x() * (2.0 - 9.0 * s.powi(2) + 6.0 * s.powi(5));
-        let places = [-1.1, -0.6, -0.25, 0.3, 0.5, 1.2].map(|s| (s, slope(s)));
-        let powers: Vec<f64> = integrated(&places).iter().map(|c| c.x).collect();
-        for (got, want) in powers.iter().zip([2.0, 0.0, -3.0, 0.0, 0.0, 1.0]) {
-            assert!((got - want).abs() < 1e-12, "{powers:?}");
-        }
     }
 
     /// Of white noise all neighbours may be taken, of noise that wanders the nearest alone: a random walk is
