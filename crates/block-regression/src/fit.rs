@@ -117,6 +117,18 @@ impl Layout {
         (n..n + self.candidates).map(|c| gram[(c, c)]).collect()
     }
 
+    /// Gram of the candidates in a `total` of these columns, and its scalars, once the nuisance is out; `variance` as
+    /// of [`Fits::new`]. `None` if the nuisance itself is singular.
+    pub fn without_nuisance(
+        &self,
+        total: &(DMatrix<f64>, f64),
+        variance: f64,
+    ) -> Option<DMatrix<f64>> {
+        let n = self.nuisance_precision.nrows();
+        let pick: Vec<usize> = (n..n + self.candidates).collect();
+        Some(Eliminated::new(total, self, variance, &pick)?.train)
+    }
+
     /// The residual column that belongs to `fold` (`None`: all data).
     pub fn residual(&self, fold: Option<usize>) -> usize {
         let first = self.nuisance_precision.nrows() + self.candidates;
@@ -408,7 +420,7 @@ impl Fits {
                 blocks: self.prior,
             }
         } else {
-            *self.usual.get_or_init(|| self.usual())
+            *self.asked()
         };
         let freedom = (own.blocks - 1.0).max(0.0);
         let covariance = if d > 0.0 {
@@ -426,15 +438,19 @@ impl Fits {
 
     /// Takes what `all` says of the noise for its own: more columns say more.
     pub fn scatter_as(&mut self, all: &Self) {
-        self.usual = OnceLock::from(*all.usual.get_or_init(|| all.usual()));
+        self.usual = OnceLock::from(*all.asked());
     }
 
     /// Asks all columns what they say of the noise, which [`estimate`](Self::estimate) needs: before several threads
     /// estimate at once, so that none waits for one that waits for it.
     pub fn ask_all(&self) {
         if self.prior <= 0.0 && !self.inner.is_empty() {
-            self.usual.get_or_init(|| self.usual());
+            self.asked();
         }
+    }
+
+    fn asked(&self) -> &Usual {
+        self.usual.get_or_init(|| self.usual())
     }
 
     /// What all columns, each alone, say of the noise.

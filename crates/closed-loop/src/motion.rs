@@ -42,11 +42,10 @@ fn resolved(t_s: &[f64], q: &[UnitQuaternion<f64>], arm: f64) -> bool {
 
 /// Whether it tells how that motion changed: the same against second differences, of which a walk of variance
 /// s^2 a step has 2 s^2 and the error 20/36 s^2. What such a walk seems to accelerate by goes with itself, where
-/// the path is one through attitudes.
+/// the path is one through attitudes ([`Around::by_rates`]).
 pub(crate) fn accelerates(series: &AttitudeSeries, arm: f64) -> bool {
     let change = |last: &Vector3<f64>, next: &Vector3<f64>| last + next;
-    rates::that_tell_more(series).is_some()
-        || predicts(series.t_s(), series.quaternions(), arm, change)
+    predicts(series.t_s(), series.quaternions(), arm, change)
 }
 
 /// Whether samples are predicted by their neighbours within a share of `size`, of the turns to those before and

@@ -29,8 +29,8 @@ use focal_plane::{AttitudeSeries, AttitudeSource, rotation_from_vector, rotation
 use nalgebra::{UnitQuaternion, Vector3};
 use spectra::robust::median_step;
 
-use super::rates::{integrated, is_finite, slope};
-use super::stencil::{Place, SIDE, Stencil};
+use super::rates::{divide, integrated, is_finite, slope};
+use super::stencil::{COEFFICIENTS, Place, SIDE, Stencil};
 use crate::gaps::GAP_STEPS;
 
 /// Neighbours on each side with rates.
@@ -53,6 +53,8 @@ pub(crate) struct Around {
     step_s: f64,
     /// Whether there are paths, not attitudes alone.
     resolved: bool,
+    /// Whether these come from measured rates.
+    by_rates: bool,
 }
 
 #[derive(Clone, Debug)]
@@ -86,6 +88,7 @@ impl Around {
             pieces,
             step_s: step,
             resolved,
+            by_rates: stencil.is_some_and(|s| s.by_rates.is_some()),
         };
         let paths = around.pieces.iter().flatten().filter(|p| p.count > 0);
         if resolved && 2 * paths.count() < t_s.len() {
@@ -108,6 +111,11 @@ impl Around {
     /// Whether the samples tell how the tracker moved between them.
     pub(crate) fn resolved(&self) -> bool {
         self.resolved
+    }
+
+    /// Whether the paths come from measured rates, which hold nothing of the samples' errors.
+    pub(crate) fn by_rates(&self) -> bool {
+        self.by_rates
     }
 
     /// Whether what acts around a frame's time follows the path of that frame, which is that of many samples.
@@ -200,7 +208,7 @@ impl Piece {
                 .map(|i| (place(i).0, slope(&place(i).1, &(rates[*i] - bias))))
                 .collect();
             if slopes.len() + 1 >= FEWEST {
-                self.newton[1..=slopes.len()].copy_from_slice(&integrated(&slopes));
+                self.newton[1..=COEFFICIENTS].copy_from_slice(&integrated(&slopes));
                 self.count = slopes.len() + 1;
                 self.own_s = both_sides;
             }
@@ -231,17 +239,7 @@ impl Piece {
                 slopes[at] = rates.map_or_else(Vector3::zeros, |rates| slope(&phi, &rates[i]));
             }
         }
-        for order in 1..count {
-            for j in (order..count).rev() {
-                let apart = nodes[j] - nodes[j - order];
-                // a node that is there twice: the difference quotient is the slope
-                newton[j] = if order == 1 && j % repeats == 1 {
-                    slopes[j]
-                } else {
-                    (newton[j] - newton[j - 1]) / apart
-                };
-            }
-        }
+        divide(&nodes[..count], newton, &slopes);
         self.count = count;
         if stencil.most > SIDE {
             (self.own_s, self.of_many) = (both_sides, both_sides > 0.0);
@@ -570,7 +568,7 @@ mod tests {
         let cases = [(swing(1e-6, 0.0, 0.0), 7e-9), (swing(0.0, 1e-6, 0.0), 1e-7)];
         for (motion, bias) in cases {
             let around = of(&motion, &t_s);
-            assert!(Stencil::of(&motion).by_rates.is_some() && !around.has_own_paths());
+            assert!(around.by_rates() && !around.has_own_paths());
             for &t in &t_s[3..397] {
                 let turn = around.turn(t, 0.3, &mut 0).unwrap();
                 let off = turn.scaled_axis() - (path(t + 0.3) - path(t));
@@ -581,7 +579,7 @@ mod tests {
             }
         }
         let noisy = swing(1e-6, 0.0, 1e-6 / STEP);
-        assert!(Stencil::of(&noisy).by_rates.is_none());
+        assert!(!of(&noisy, &t_s).by_rates());
     }
 
     /// Where most frames are lost, or the motion is not resolved, none has a path; all have attitudes.

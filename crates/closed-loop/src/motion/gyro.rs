@@ -8,12 +8,13 @@
 //!
 //! Not physics: linear interpolation.
 
-use focal_plane::AttitudeSeries;
+use focal_plane::{AttitudeSeries, Series};
 use nalgebra::Vector3;
 use spectra::robust::median_step;
 use telemetry::RateTable;
 
 use super::rates::{is_finite, that_tell_more};
+use super::stencil::{SIDE, of_samples};
 use crate::gaps::longest_step;
 
 /// Steps of the attitudes that one of the gyro may take: rounded times are no slower gyro.
@@ -34,7 +35,9 @@ pub(crate) fn with_rates(series: AttitudeSeries, gyro: Option<&RateTable>) -> At
     if !dense {
         return series;
     }
-    let measured = at(gyro, series.t_s());
+    let Some(measured) = at(gyro, series.t_s()) else {
+        return series;
+    };
     let with = |bias: Vector3<f64>| {
         let (t_s, q) = (series.t_s().to_vec(), series.quaternions().to_vec());
         let rates = measured.iter().map(|w| w - bias).collect();
@@ -42,26 +45,28 @@ pub(crate) fn with_rates(series: AttitudeSeries, gyro: Option<&RateTable>) -> At
         Some(with.with_max_gap_s(series.max_gap_s()))
     };
     with(Vector3::zeros())
-        .and_then(|raw| that_tell_more(&raw))
+        .and_then(|raw| that_tell_more(&raw, &of_samples(&raw, SIDE)))
         .and_then(with)
         .unwrap_or(series)
 }
 
 /// Its rates at times in ascending order; NaN where there are none.
-fn at(gyro: &RateTable, t_s: &[f64]) -> Vec<Vector3<f64>> {
-    let longest = longest_step(&gyro.t_s);
-    let rate = |&t: &f64| {
-        let after = gyro.t_s.partition_point(|&g| g < t);
-        if gyro.t_s.get(after) == Some(&t) {
-            return Some(gyro.w[after]);
-        }
-        let before = after.checked_sub(1)?;
-        let (from, to) = (gyro.t_s[before], *gyro.t_s.get(after)?);
-        let share = (t - from) / (to - from);
-        (to - from <= longest).then(|| gyro.w[before].lerp(&gyro.w[after], share))
+fn at(gyro: &RateTable, t_s: &[f64]) -> Option<Vec<Vector3<f64>>> {
+    let axis = |axis: usize| {
+        let values = gyro.w.iter().map(|w| w[axis]).collect();
+        let series = Series::new(gyro.t_s.clone(), values).ok()?;
+        let mut out = vec![0.0; t_s.len()];
+        series
+            .with_max_gap_s(longest_step(&gyro.t_s))
+            .at_into(t_s, &mut out);
+        Some(out)
     };
-    let none = Vector3::repeat(f64::NAN);
-    t_s.iter().map(|t| rate(t).unwrap_or(none)).collect()
+    let [x, y, z] = [axis(0)?, axis(1)?, axis(2)?];
+    Some(
+        (0..t_s.len())
+            .map(|k| Vector3::new(x[k], y[k], z[k]))
+            .collect(),
+    )
 }
 
 #[cfg(test)]
@@ -84,7 +89,8 @@ mod tests {
         let got = at(
             &table,
             &[-0.5, 0.0, 0.25, 2.0, 3.0, 3.5, 5.0, 5.5, 6.0, 6.5],
-        );
+        )
+        .unwrap();
         let want = [
             None,
             Some(1.0),

@@ -7,8 +7,9 @@
 //! d = phi + int omega = h b + noise      b = sum d / sum h      median of (d - h b)^2 ~ 0.455 * 2 s^2
 //! ```
 //!
-//! The sum holds the noise of the first and the last sample alone. Rates tell more where, by how well three neighbours on each side predict a sample, their noise w over a step is
-//! well below that of the attitudes, and no axis is worse,
+//! The sum holds the noise of the first and the last sample alone. Rates tell more where, by how well three
+//! neighbours on each side predict a sample, their noise w over a step is well below that of the attitudes, and no
+//! axis is worse,
 //!
 //! ```text
 //! mean over axes of ln( w^2 h^2 / s^2 ) < ln 0.1      w h < s
@@ -24,7 +25,7 @@ use focal_plane::{AttitudeSeries, rotation_vector};
 use nalgebra::Vector3;
 use spectra::robust::{self, median_step};
 
-use super::stencil::{MEDIAN, Place, SIDE, errors, predicted};
+use super::stencil::{COEFFICIENTS, MEDIAN, Place, SIDE, errors, predicted};
 use crate::gaps::longest_step;
 
 /// Share of the attitudes' variance below which that of a step of the rates is well below.
@@ -34,20 +35,17 @@ const KNOWN: f64 = 0.9;
 /// Variance of d over that of the attitudes' noise.
 const AGREES: f64 = 6.0;
 
-/// The bias of the measured rates of a series, rad/s, where they tell more than its attitudes.
-pub(crate) fn that_tell_more(series: &AttitudeSeries) -> Option<Vector3<f64>> {
+/// The bias of the measured rates of a series, rad/s, where they tell more than its attitudes, which are predicted
+/// with these squared errors ([`super::stencil::of_samples`]).
+pub(crate) fn that_tell_more(series: &AttitudeSeries, own: &Vector3<f64>) -> Option<Vector3<f64>> {
     let rates = series.given_rates_rad_s()?;
     let step = median_step(series.t_s())?;
     let known = rates.iter().filter(|w| is_finite(w)).count();
     if (known as f64) < KNOWN * rates.len() as f64 {
         return None;
     }
-    let samples = series.quaternions();
-    let own = errors(series, SIDE, |i, k| {
-        rotation_vector(&samples[i], &samples[k])
-    });
     let measured = errors(series, SIDE, |i, k| (rates[i] - rates[k]) * step);
-    let share = measured.component_div(&own);
+    let share = measured.component_div(own);
     if !(share.max() < 1.0 && share.map(f64::ln).mean() < BETTER.ln()) {
         return None;
     }
@@ -75,14 +73,10 @@ fn disagreement(
         if hole || !rates[around.clone()].iter().all(is_finite) {
             continue;
         }
-        let slopes: Vec<Place> = around
-            .map(|i| {
-                (
-                    t_s[i] - t_s[k],
-                    slope(&rotation_vector(&q[i], &q[k]), &rates[i]),
-                )
-            })
-            .collect();
+        let slopes = [k - 1, k, k + 1, k + 2].map(|i| {
+            let phi = rotation_vector(&q[i], &q[k]);
+            (t_s[i] - t_s[k], slope(&phi, &rates[i]))
+        });
         let step = t_s[k + 1] - t_s[k];
         let turned = integrated(&slopes)
             .iter()
@@ -113,31 +107,49 @@ pub(crate) fn slope(phi: &Vector3<f64>, rate: &Vector3<f64>) -> Vector3<f64> {
     turned * 0.5 - rate - phi.cross(&turned) / 12.0
 }
 
-/// What the polynomial through slopes integrates to from 0 on: coefficients of its powers, from the first.
-pub(crate) fn integrated(slopes: &[Place]) -> Vec<Vector3<f64>> {
-    let mut newton: Vec<Vector3<f64>> = slopes.iter().map(|(_, slope)| *slope).collect();
-    for order in 1..slopes.len() {
-        for j in (order..slopes.len()).rev() {
-            let apart = slopes[j].0 - slopes[j - order].0;
-            newton[j] = (newton[j] - newton[j - 1]) / apart;
-        }
+/// What the polynomial through slopes, no more than [`COEFFICIENTS`], integrates to from 0 on: coefficients of its
+/// powers, from the first; as many as there are slopes, and zeros.
+pub(crate) fn integrated(slopes: &[Place]) -> [Vector3<f64>; COEFFICIENTS] {
+    let mut nodes = [0.0; COEFFICIENTS];
+    let mut newton = [Vector3::zeros(); COEFFICIENTS];
+    for (j, (s, slope)) in slopes.iter().enumerate() {
+        (nodes[j], newton[j]) = (*s, *slope);
     }
+    divide(&nodes[..slopes.len()], &mut newton, &[]);
     // Horner's scheme on the powers
-    let mut powers = vec![Vector3::zeros(); slopes.len()];
+    let mut powers = [Vector3::zeros(); COEFFICIENTS];
     for j in (0..slopes.len()).rev() {
         for k in (0..slopes.len() - 1).rev() {
             let lower = powers[k];
-            powers[k + 1] = lower - powers[k + 1] * slopes[j].0;
+            powers[k + 1] = lower - powers[k + 1] * nodes[j];
         }
-        powers[0] = newton[j] - powers[0] * slopes[j].0;
+        powers[0] = newton[j] - powers[0] * nodes[j];
     }
-    let of = |(k, c): (usize, Vector3<f64>)| c / (k + 1) as f64;
-    powers.into_iter().enumerate().map(of).collect()
+    for (k, c) in powers.iter_mut().enumerate() {
+        *c /= (k + 1) as f64;
+    }
+    powers
+}
+
+/// Newton's coefficients from the values at `nodes`, in place. Of a node that is there twice the difference
+/// quotient is its slope.
+pub(crate) fn divide(nodes: &[f64], values: &mut [Vector3<f64>], slopes: &[Vector3<f64>]) {
+    for order in 1..nodes.len() {
+        for j in (order..nodes.len()).rev() {
+            let apart = nodes[j] - nodes[j - order];
+            values[j] = if apart == 0.0 {
+                slopes[j]
+            } else {
+                (values[j] - values[j - 1]) / apart
+            };
+        }
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::motion::stencil::of_samples;
     use focal_plane::rotation_from_vector;
     use rand_core::SeedableRng;
     use rand_distr::{Distribution, StandardNormal};
@@ -180,7 +192,8 @@ mod tests {
             q.push(rotation_from_vector(&phi));
             rates.push(change(k, rate));
         }
-        that_tell_more(&AttitudeSeries::new(t_s, q, Some(rates)).unwrap())
+        let series = AttitudeSeries::new(t_s, q, Some(rates)).unwrap();
+        that_tell_more(&series, &of_samples(&series, SIDE))
     }
 
     /// What they are off by is known within the noise of two samples over 400 s, 3.5e-9 and that of 800 rates, 3.5e-10,

@@ -34,7 +34,7 @@ use crate::gaps::longest_step;
 /// Neighbours on each side whose polynomial goes through all.
 pub(crate) const SIDE: usize = 3;
 /// Coefficients of the polynomial.
-const COEFFICIENTS: usize = 2 * SIDE;
+pub(crate) const COEFFICIENTS: usize = 2 * SIDE;
 /// More neighbours on each side that are tried.
 const WIDER: [usize; 5] = [6, 8, 12, 16, 24];
 /// Standard deviations beyond which a misfit is not noise.
@@ -70,12 +70,10 @@ impl Stencil {
 
     pub(crate) fn of(series: &AttitudeSeries) -> Self {
         let mut most = SIDE;
-        let samples = series.quaternions();
-        let errors = |m| errors(series, m, |i, k| rotation_vector(&samples[i], &samples[k]));
-        let first = errors(SIDE);
+        let first = of_samples(series, SIDE);
         let mut last = first;
         for m in WIDER {
-            let errors = errors(m);
+            let errors = of_samples(series, m);
             let noisy = (0..3).filter(|&axis| last[axis] > LEAST);
             let falls: Vec<f64> = noisy.map(|a| (errors[a] / last[a]).ln()).collect();
             // nearer to what white noise does than to a tie
@@ -88,7 +86,7 @@ impl Stencil {
         Self {
             variance: first / predicted(SIDE),
             most,
-            by_rates: rates::that_tell_more(series),
+            by_rates: rates::that_tell_more(series, &first),
         }
     }
 
@@ -119,6 +117,12 @@ impl Stencil {
         }
         best
     }
+}
+
+/// Median squared error of the attitudes, rad^2, predicted from `m` neighbours on each side, of each axis.
+pub(crate) fn of_samples(series: &AttitudeSeries, m: usize) -> Vector3<f64> {
+    let samples = series.quaternions();
+    errors(series, m, |i, k| rotation_vector(&samples[i], &samples[k]))
 }
 
 /// Median squared error of samples predicted from `m` neighbours on each side, of each axis. A sample is given as

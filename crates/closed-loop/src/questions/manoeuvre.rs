@@ -27,10 +27,10 @@
 pub(crate) mod attitudes;
 pub(crate) mod stars;
 
-use block_regression::Folds;
+use block_regression::{Folds, Layout};
 use effects::Candidate;
 use focal_plane::{ARCSEC_PER_RAD, AttitudeSeries, AttitudeSource, rotation_from_vector};
-use nalgebra::{Cholesky, DMatrix, DVector, SymmetricEigen, UnitQuaternion, Vector3};
+use nalgebra::{DMatrix, DVector, SymmetricEigen, UnitQuaternion, Vector3};
 use rayon::prelude::*;
 use telemetry::report::Manoeuvre;
 
@@ -324,26 +324,13 @@ pub(crate) fn information(
     folds: &Folds,
     variance: f64,
 ) -> Option<DMatrix<f64>> {
-    let precision = evidence.precision();
-    let (n, p) = (
-        precision.nrows(),
-        candidates
-            .iter()
-            .map(|c| c.coefficients().len())
-            .sum::<usize>(),
-    );
-    let (gram, _) = evidence.grams(folds, candidates).total();
-    let own = gram.view((n, n), (p, p)).into_owned();
-    if n == 0 {
-        return Some(own / variance);
-    }
-    let mut normal = gram.view((0, 0), (n, n)).into_owned();
-    // what nothing constrains gets a precision far below that of one scalar
-    let floor = 1e-10 * normal.diagonal().max().max(f64::MIN_POSITIVE);
-    normal += precision * variance + DMatrix::from_diagonal_element(n, n, floor);
-    let cross = gram.view((0, n), (n, p)).into_owned();
-    let taken = cross.transpose() * Cholesky::new(normal)?.solve(&cross);
-    Some((own - taken) / variance)
+    let layout = Layout {
+        nuisance_precision: evidence.precision(),
+        candidates: candidates.iter().map(|c| c.coefficients().len()).sum(),
+        residuals: evidence.residual_columns(),
+    };
+    let total = evidence.grams(folds, candidates).total();
+    Some(layout.without_nuisance(&total, variance)? / variance)
 }
 
 /// The smallest manoeuvre of the library for each pair, or the best of them. `fly` gives the

@@ -25,7 +25,7 @@ use crate::error::CloseError;
 use crate::evidence::{Evidence, Residuals};
 use crate::figures;
 use crate::image_level::{self, ImageLevel, Side};
-use crate::motion::{self, gyro::with_rates, source};
+use crate::motion::{self, Around, gyro::with_rates, source};
 use crate::noise_effects;
 use crate::questions::confusion;
 use crate::questions::hypothesis::{self, Grounds};
@@ -217,7 +217,8 @@ fn explain(
     let level = own.as_ref().unwrap_or(&measured);
     let ways = description::ways(situation, data);
     let reference = situation.reference.as_ref();
-    let accelerates = || reference.is_none_or(|r| motion::accelerates(r, arm));
+    let by_rates = motion.is_some_and(Around::by_rates);
+    let accelerates = || by_rates || reference.is_none_or(|r| motion::accelerates(r, arm));
     let named = |line: Option<SharedLine>| {
         let candidates = || {
             let mut list = catalogue_candidates(&scene);
