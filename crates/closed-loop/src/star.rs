@@ -27,6 +27,7 @@ pub(crate) mod columns;
 pub(crate) mod data;
 mod directions;
 pub(crate) mod evidence;
+mod finish;
 pub(crate) mod frame_rotation;
 #[cfg(test)]
 pub(crate) mod harness;
@@ -41,6 +42,7 @@ mod reference_wander;
 mod run;
 pub(crate) mod search;
 mod settling;
+mod steadied;
 pub(crate) mod weights;
 
 pub(crate) use run::run;

@@ -15,10 +15,12 @@
 //!
 //! Source: Brown & Hwang 2012, ch. 4 (Gauss-Markov process).
 
-use nalgebra::{DMatrix, Matrix3};
+use nalgebra::{DMatrix, Matrix3, Vector3};
 
 use crate::coloured::{Coloured, fit_alike};
+use crate::filter::Filter;
 use crate::joint::Joint;
+use crate::smoother::slow_part;
 
 /// Half the relative difference of two noises that serve a fit alike.
 const ALIKE: f64 = 0.02;
@@ -173,6 +175,13 @@ impl Rotations {
             across: (with - neither).max(0.0),
             alike: (alike - neither).max(0.0),
         }
+    }
+
+    /// The slow error of each bin under `noise` as the rotations of all bins tell it, in their unit: the mean
+    /// of its law given them.
+    pub fn slow_part(&self, noise: &CommonNoise) -> Vec<Vector3<f64>> {
+        let filter = Filter::new(noise, &self.t_s, &self.frames, &self.inverse);
+        slow_part(noise, &filter, &self.theta)
     }
 
     /// Log-likelihood of an axis's rotations under white noise.

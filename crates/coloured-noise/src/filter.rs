@@ -22,8 +22,8 @@ use crate::common_noise::CommonNoise;
 /// One bin of the filter.
 #[derive(Clone, Debug)]
 pub(crate) struct Step {
-    decay: Vector3<f64>,
-    gain: Matrix3<f64>,
+    pub(crate) decay: Vector3<f64>,
+    pub(crate) gain: Matrix3<f64>,
     /// L^-1 with F = L L^T; `None`: the bin has no attitude.
     pub(crate) whitening: Option<Matrix3<f64>>,
 }

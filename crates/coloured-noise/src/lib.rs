@@ -27,6 +27,7 @@
 //! | likelihoods of rival noises | [`Coloured::log_likelihood`], [`LogProduct`] |
 //! | rotations of frames, and whether their error is slow | [`Rotations`], [`SlowGains`] |
 //! | the noise taken out of their columns | [`Filter`] |
+//! | the slow error itself, as all rotations tell it | [`Rotations::slow_part`] |
 //!
 //! Series and sigmas are in one unit, whatever it is; times are seconds.
 //!
@@ -68,6 +69,7 @@ mod coloured;
 mod common_noise;
 mod filter;
 mod joint;
+mod smoother;
 
 pub use coloured::{Coloured, LogProduct};
 pub use common_noise::{CommonNoise, Rotations, SlowGains};

@@ -16,7 +16,7 @@ use crate::causes::invariance::{Changing, Inner, Way};
 use crate::error::CloseError;
 use crate::figures::{self, Followed};
 use crate::search::empirical::{Empirical, Variable, flux_of, range};
-use crate::search::selection::{Judgement, columns_of, costs, each};
+use crate::search::selection::{FAMILY_ALPHA, Judgement, columns_of, costs, each};
 use crate::search::{Fitted, Found, borrowed, fit};
 use crate::situation::Situation;
 use crate::situation::channels_of_interest;
@@ -169,6 +169,13 @@ impl Described {
         let mut told = figures::follows(&self.fitted.fits, &set, &terms, tried, each, left);
         self.stars_before_their_constants(&set, &mut told.depends_on);
         told
+    }
+
+    /// Whether what is left follows the acceleration.
+    pub(crate) fn follows_acceleration(&self) -> bool {
+        let name = Variable::Acceleration.name();
+        let follows = |d: &Dependence| d.p_value < FAMILY_ALPHA && d.variable.contains(&name);
+        self.follows(1.0).depends_on.iter().any(follows)
     }
 
     /// A dozen stars lie on some bent line of any number that they have: magnitude, colour and

@@ -163,6 +163,7 @@ impl StarData {
         data.place(motion.map(|m| m as &dyn AttitudeSource), inputs.effects);
         data.update_phase(inputs.phase);
         data.log_flux = data.fluxes();
+        data.frames.flux = None;
         data
     }
 
@@ -331,7 +332,7 @@ impl StarData {
         frames.star_id = rows.iter().map(|&r| from.star_id[r]).collect();
         frames.x_px = pick(&from.x_px);
         frames.y_px = pick(&from.y_px);
-        frames.mag = from.mag.as_ref().map(|m| pick(m));
+        // only the usual flux of each star is asked for, see `fluxes`
         frames.flux = from.flux.as_ref().map(|m| pick(m));
         let star: Vec<usize> = rows.iter().map(|&r| star[r]).collect();
         let n = rows.len();

@@ -9,43 +9,27 @@
 
 use block_regression::Folds;
 use effects::{Scene, StarFacts, WarmPixels};
-use focal_plane::Points;
-use nalgebra::DVector;
+use focal_plane::{AttitudeSeries, Points};
 use spectra::robust::median_step;
-use star_images::Formed;
-use telemetry::report::{ConsideredEffect, Errors, FoundEffect, Report, Rows};
-use telemetry::{DarkMap, Model, StarResiduals};
 
-use crate::causes::commonness::Slow;
-use crate::causes::description::{self, Described};
+use crate::causes::description;
 use crate::causes::{self, Named, Quest};
 use crate::close::{Closed, catalogue_candidates};
 use crate::declared;
 use crate::error::CloseError;
-use crate::evidence::{Evidence, Residuals};
-use crate::figures;
-use crate::image_level::{self, ImageLevel, Side};
+use crate::image_level::{self, Side};
 use crate::motion::{self, Around, gyro::with_rates, source};
 use crate::noise_effects;
-use crate::questions::confusion;
-use crate::questions::hypothesis::{self, Grounds};
-use crate::questions::manoeuvre::stars::Sky;
-use crate::search::instants;
-use crate::search::refusal::Refused;
-use crate::search::selection::columns_of;
-use crate::search::{Found, amplitudes_as, fit};
 use crate::situation::Situation;
 use crate::star::data::{Inputs, Star, StarData};
 use crate::star::evidence::StarEvidence;
-use crate::star::own_attitude;
+use crate::star::finish::{Finish, finish};
 use crate::star::pointed::Pointed;
-use crate::star::reference_wander::{self, REFERENCE_ERROR};
-use crate::star::search::{Searched, Wander};
+use crate::star::search::Searched;
 use crate::star::settling::{Settled, settle};
+use crate::star::steadied::steadied;
 use crate::unexplained::leftover::lines::SharedLine;
 use crate::unexplained::leftover::{self, Series};
-use crate::unexplained::pattern::{self, Turned};
-use crate::unexplained::star_series;
 
 /// Fewest frames: every fold needs data to be predicted from.
 const MIN_FRAMES: usize = 2;
@@ -117,10 +101,17 @@ fn trace(
     data.lands_as_modelled();
     let mut settled = settle(data, situation, phase, folds)?;
     let mut landings = LANDINGS;
+    let mut steady = None;
     loop {
         let last = landings == 0;
-        let [fitted, whole] = match explain(data, situation, folds, &settled, last, progress)? {
+        let path = steady.as_ref();
+        let [fitted, whole] = match explain(data, situation, folds, &settled, path, last, progress)?
+        {
             Explained::Closed(closed) => return Ok(*closed),
+            Explained::Steadier(path) => {
+                steady = Some(path);
+                continue;
+            }
             Explained::Elsewhere(moved) => moved,
         };
         landings -= 1;
@@ -138,14 +129,18 @@ enum Explained {
     /// What was found shifts the light to another pixel phase than the fits assumed: what the
     /// nuisance shifts rows by, and with it all, arcsec.
     Elsewhere([Vec<Vec<f64>>; 2]),
+    /// Something is left that follows the motion of a reference that errs slowly: its path without that error.
+    Steadier(AttitudeSeries),
 }
 
-/// From the declared model at its best to the report, or to where the light falls.
+/// From the declared model at its best to the report, or to where the light falls. `path`: the reference's
+/// motion without its slow error, where that is known.
 fn explain(
     data: &mut StarData,
     situation: &Situation<'_>,
     folds: &Folds,
     settled: &Settled,
+    path: Option<&AttitudeSeries>,
     last: bool,
     progress: &dyn Fn(&str),
 ) -> Result<Explained, CloseError> {
@@ -155,7 +150,7 @@ fn explain(
             .own_motion()
             .map(|own| with_rates(own, situation.bundle.rates.as_ref())),
     };
-    let known = situation.reference.as_ref().or(own.as_ref());
+    let known = path.or(situation.reference.as_ref()).or(own.as_ref());
     let arm = motion::roll_arm(&data.camera);
     let around =
         known.map(|series| motion::around(series, &data.frames.t_s, arm).turned(&data.turn()));
@@ -216,7 +211,7 @@ fn explain(
     let own = own.map(|(variants, zero_px)| anew(variants, &zero_px));
     let level = own.as_ref().unwrap_or(&measured);
     let ways = description::ways(situation, data);
-    let reference = situation.reference.as_ref();
+    let reference = path.or(situation.reference.as_ref());
     let by_rates = motion.is_some_and(Around::by_rates);
     let accelerates = || by_rates || reference.is_none_or(|r| motion::accelerates(r, arm));
     let named = |line: Option<SharedLine>| {
@@ -250,6 +245,17 @@ fn explain(
         if again.searched.found.names_one_of_the_last(1) {
             inside = left(&again.searched);
             outcome = again;
+        }
+    }
+    if let (None, false, Some(reference)) = (path, by_rates, reference)
+        && let Some(wander) = &outcome.searched.wander
+        && let Some((residual, _)) = &inside
+        && outcome.described.follows_acceleration()
+    {
+        let residual = [residual[0].as_slice(), &residual[1]];
+        if let Some(path) = steadied(data, reference, wander, residual, &level.weight) {
+            progress("searching again along the path less the reference's slow error");
+            return Ok(Explained::Steadier(path));
         }
     }
     let Named {
@@ -309,367 +315,4 @@ fn scene<'a>(
         step_s: median_step(&data.frames.t_s).unwrap_or(f64::INFINITY),
         warm: Some(warm),
     }
-}
-
-/// What the report is made of.
-struct Finish<'a> {
-    situation: &'a Situation<'a>,
-    data: &'a StarData,
-    folds: &'a Folds,
-    measured: &'a StarEvidence<'a>,
-    level: &'a StarEvidence<'a>,
-    found: &'a Found,
-    described: &'a Described,
-    refused: &'a Refused,
-    slow: Option<Slow>,
-    oversize: Vec<ConsideredEffect>,
-    wander: Option<&'a Wander>,
-    settled: &'a Settled,
-    image: Option<(&'a ImageLevel, &'a Formed)>,
-}
-
-impl Finish<'_> {
-    fn residuals(&self, chosen: &[usize]) -> Result<Residuals, CloseError> {
-        let only = self.found.only(chosen);
-        let amplitudes = amplitudes_as(&self.found.fitted, self.folds, chosen, |beta| {
-            only.spread(beta)
-        })
-        .ok_or(CloseError::Singular)?;
-        Ok(self
-            .level
-            .residuals(self.folds, &only.candidates, &amplitudes))
-    }
-
-    /// What the nuisance shifts each row by beside the chosen effects, arcsec.
-    fn fitted(&self) -> Result<Vec<Vec<f64>>, CloseError> {
-        let chosen = &self.found.selection.chosen;
-        let none = |_: &_| DVector::zeros(0);
-        let amplitudes = amplitudes_as(&self.found.fitted, self.folds, chosen, none)
-            .ok_or(CloseError::Singular)?;
-        Ok(self.level.residuals(self.folds, &[], &amplitudes).modelled)
-    }
-
-    fn power(&self, residual: &Residuals) -> f64 {
-        figures::star_rms(residual, self.data)
-            .iter()
-            .map(|v| v * v)
-            .sum()
-    }
-
-    /// `model` is the declared one, or that with what was added.
-    fn errors(
-        &self,
-        model: &Model,
-        residual: &Residuals,
-        loglik: Option<f64>,
-        attitude: Option<[f64; 3]>,
-    ) -> Errors {
-        let declared = self
-            .situation
-            .model
-            .noise
-            .temporal_arcsec
-            .filter(|s| *s > 0.0);
-        let rms = figures::star_rms(residual, self.data);
-        Errors {
-            star_rms_arcsec: Some(rms),
-            attitude_rms_arcsec: attitude,
-            log_psd_cost: None,
-            // with free attitudes three of each frame's numbers are spent
-            chi2_per_dof: declared.and_then(|_| {
-                let situation = self.situation.believing(model);
-                let square = noise_effects::in_declared_sigmas(&situation, self.data, residual)?;
-                Some(square / self.found.fitted.scalars)
-            }),
-            loglik_per_frame: loglik.map(|l| l / self.data.frames.frames() as f64),
-        }
-    }
-}
-
-/// `plain`: what the chosen effects leave out of fold; `inside`: in sample, where that is known, with its
-/// series.
-fn finish(
-    f: &Finish<'_>,
-    plain: Residuals,
-    inside: Option<(Vec<Vec<f64>>, Series)>,
-) -> Result<Closed, CloseError> {
-    let chosen = &f.found.selection.chosen;
-    let whole = f.power(&f.settled.before);
-    let mut explained = Vec::new();
-    let mut last = f.power(&f.residuals(&[])?);
-    for k in 1..=chosen.len() {
-        let now = if k == chosen.len() {
-            f.power(&plain)
-        } else {
-            f.power(&f.residuals(&chosen[..k])?)
-        };
-        explained.push((last - now) / whole);
-        last = now;
-    }
-    let surroundings = f.situation.surroundings();
-    // what is left is judged before a term without a cause is added
-    let mut unattributed = f.described.follows(last / whole);
-
-    let questions = f.situation.questions;
-    let mut added = chosen.clone();
-    let mut after = None;
-    if questions.empirical
-        && let Some(g) = figures::best_empirical(f.found, &unattributed, &surroundings)
-    {
-        added.push(g);
-        let with_term = f.residuals(&added)?;
-        explained.push((last - f.power(&with_term)) / whole);
-        after = Some(with_term);
-    }
-    let (mut effects, mut entries) =
-        figures::effects_found(f.found, &added, &explained, &surroundings, questions)?;
-    tell_apart(f, &mut effects);
-    instants::complete(
-        f.level,
-        f.folds,
-        f.found,
-        &surroundings,
-        median_step(&f.data.frames.t_s).unwrap_or(1.0),
-        &mut effects,
-    )?;
-    if let Some((level, formed)) = f.image {
-        for (at, (effect, entry)) in image_level::effects(level, formed).into_iter().enumerate() {
-            effects.insert(at, effect);
-            entries.insert(at, entry);
-        }
-    }
-    let mut model = f.situation.model.clone();
-    let declared = model.effects.iter().any(|e| e.id == REFERENCE_ERROR);
-    let wander = f
-        .wander
-        .filter(|_| !declared)
-        .and_then(reference_wander::effect);
-    if let Some((effect, entry)) = wander {
-        effects.push(effect);
-        entries.push(entry);
-    }
-    let weight = &f.level.weight;
-    let (inside, series) = inside.unzip();
-    let residual = inside.as_deref().unwrap_or(&plain.axes);
-    let series =
-        series.unwrap_or_else(|| Series::of(&leftover::star_tracks(f.data, residual, weight)));
-    let learned = f.level.learned();
-    let turned = Turned::of(f.data, [&residual[0], &residual[1]], weight);
-    let (noise, ((leftover, own), pattern)) = rayon::join(
-        || noise_effects::claim(f.situation, f.level, residual, f.folds),
-        || {
-            let order = f.situation.model.noise.distortion_order;
-            rayon::join(
-                || {
-                    // frames whose attitudes are free have turned already
-                    let [own, alone]: [&[Vec<f64>]; 2] = if f.data.free_attitude {
-                        [residual, residual]
-                    } else {
-                        [&turned.known, &turned.whole]
-                    };
-                    // a learned spot errs by where the star lies, and so slowly
-                    let own = if learned {
-                        star_series::OwnSeries::default()
-                    } else {
-                        star_series::search(f.data, own, alone, weight)
-                    };
-                    (series.describe(), own)
-                },
-                || pattern::search(f.data, residual, &turned, weight, f.folds, order, learned),
-            )
-        },
-    );
-    let mut noise = noise?;
-    let mut noise_left = noise_effects::NoiseFollows::default();
-    if f.image.is_some_and(|(level, _)| level.new_noise()) {
-        noise = noise.without_magnitude();
-    }
-    if f.image.is_none() && !f.data.frames_are_unrelated() {
-        let of = description::of_noise(f.situation, f.data);
-        let claimed = &noise;
-        noise_left =
-            noise_effects::noise_follows(f.situation, f.level, residual, f.folds, claimed, &of)?;
-    }
-    effects.extend(noise.effects.iter().cloned());
-    entries.extend(noise.entries.iter().cloned());
-    model.effects.extend(entries);
-
-    leftover.tell(&mut unattributed);
-    if let Some(pattern) = pattern {
-        pattern.tell(&mut unattributed, last / whole);
-    }
-    if let Some(slow) = f.slow {
-        slow.tell(&mut unattributed, last / whole);
-    }
-    own.tell(&mut unattributed, last / whole);
-    noise_left.tell(&mut unattributed);
-    let excess = excess(f, last);
-    let mut considered = figures::considered(f.found, excess, f.refused, &surroundings);
-    for entry in &mut considered {
-        if let Some(size) = f.oversize.iter().find(|c| c.id == entry.id) {
-            entry.clone_from(size);
-        }
-    }
-    considered.retain(|c| !effects.iter().any(|e| e.id == c.id));
-    let unit = f.level.noise.map_or(1.0, |n| n.centroid);
-    let squares = excess * unit * unit;
-    noise.need(f.situation, f.data, squares)?;
-    noise.tell(&mut considered);
-    if let Some(wander) = reference_wander::consider(f.data, &plain.axes, squares) {
-        considered
-            .iter_mut()
-            .filter(|c| c.id == wander.id)
-            .for_each(|c| c.clone_from(&wander));
-    }
-    if let Some((level, _)) = f.image {
-        for (id, step) in [
-            (image_level::DARK_MAP, &level.dark_map),
-            (image_level::EFFECTIVE_PSF, &level.effective_psf),
-        ] {
-            considered.retain(|c| !(step.stands && c.id == id));
-            for entry in considered.iter_mut().filter(|c| c.id == id) {
-                entry.delta_loglik = Some(step.delta_loglik);
-                entry.p_value = Some(step.p_value);
-                entry.observable = true;
-            }
-        }
-    }
-
-    let fits = &f.found.fitted.fits;
-    let hypotheses = hypothesis::answer(
-        f.situation.questions,
-        &Grounds {
-            found: f.found,
-            surroundings,
-            information: &|c| fits.information(c),
-            alone: remarkable(f, whole),
-            left: remarkable(f, last),
-            resolved: f.level.resolved,
-            effects: &effects,
-            considered: &considered,
-        },
-    );
-
-    let after = after.unwrap_or(plain);
-    let attitude = own_attitude::residuals(f.situation, f.data, f.folds, f.settled, &after);
-    let attitude_rms = |series: &[Vec<f64>; 3], outlier: &[bool]| {
-        std::array::from_fn(|a| figures::rms(&series[a], outlier).unwrap_or(f64::NAN))
-    };
-    let before_loglik = match f.settled.loglik {
-        Some(known) => Some(known),
-        None => {
-            let fitted = fit(f.measured, f.folds, &[])?;
-            fitted.fits.out_of_fold(&[]).map(|o| o.data_loglik())
-        }
-    };
-    let set = columns_of(&f.found.fitted.groups, &added);
-    let after_loglik = f
-        .found
-        .fitted
-        .fits
-        .out_of_fold(&set)
-        .map(|o| o.data_loglik() + f.found.fitted.log_scale);
-    let outliers = f.data.outlier.iter().filter(|o| **o).count();
-    let report = Report {
-        format: telemetry::report::REPORT_FORMAT.to_owned(),
-        verdict: figures::verdict(&effects, unattributed.present),
-        folds: f.folds.count,
-        rows: Rows {
-            used: f.data.t_s.len() - outliers,
-            outliers,
-            outside_reference: f.data.outside_reference,
-        },
-        before: f.errors(
-            f.situation.model,
-            &f.settled.before,
-            before_loglik,
-            attitude
-                .as_ref()
-                .map(|a| attitude_rms(&a.before_arcsec, &a.outlier)),
-        ),
-        after: f.errors(
-            &model,
-            &after,
-            after_loglik,
-            attitude
-                .as_ref()
-                .map(|a| attitude_rms(&a.after_arcsec, &a.outlier)),
-        ),
-        effects,
-        considered,
-        hypotheses,
-        unattributed,
-    };
-    let [ax, ay]: [Vec<f64>; 2] = after.axes.try_into().unwrap_or_default();
-    let [bx, by]: [Vec<f64>; 2] = f.settled.before.axes.clone().try_into().unwrap_or_default();
-    let fold_of_frame = f.folds.column();
-    let frames = &f.data.frames;
-    let fold = (0..frames.frames())
-        .flat_map(|k| std::iter::repeat_n(fold_of_frame[k], frames.rows_of(k).len()))
-        .collect();
-    Ok(Closed {
-        report,
-        model,
-        stars: Some(StarResiduals {
-            t_s: f.data.t_s.clone(),
-            slot: frames.slot.clone(),
-            star_id: frames.star_id.clone(),
-            x_px: frames.x_px.clone(),
-            y_px: frames.y_px.clone(),
-            before_arcsec: [bx, by],
-            after_arcsec: [ax, ay],
-            fold,
-            outlier: f.data.outlier.clone(),
-        }),
-        attitude,
-        dark_map: f
-            .image
-            .filter(|(level, _)| level.dark_map.stands)
-            .map(|(_, formed)| DarkMap {
-                x_px: formed.map.pixels.iter().map(|p| p.x_px).collect(),
-                y_px: formed.map.pixels.iter().map(|p| p.y_px).collect(),
-                dn: formed.map.pixels.iter().map(|p| p.dn).collect(),
-                sigma_dn: formed.map.pixels.iter().map(|p| p.sigma_dn).collect(),
-            }),
-        rivals: f
-            .image
-            .map(|(level, _)| level.rivals.clone())
-            .unwrap_or_default(),
-    })
-}
-
-/// What else each effect could have been, and the motion that would tell.
-fn tell_apart(f: &Finish<'_>, effects: &mut [FoundEffect]) {
-    let confusion = confusion::compare(f.found, effects);
-    let set = columns_of(&f.found.fitted.groups, &f.found.selection.chosen);
-    let sky = f.found.fitted.fits.variance(&set).and_then(|variance| {
-        let noise = f.wander.filter(|_| f.level.noise.is_some());
-        let sky = Sky::of(f.data, f.situation.model, variance, noise.map(|w| w.noise))?;
-        Some(sky.drawn(f.level.drawn))
-    });
-    if let (Some(sky), Some(&start)) = (sky, f.data.frames.t_s.first())
-        && !confusion.is_empty()
-    {
-        confusion.tell(effects, start, sky.attitude(), &|flown| {
-            sky.fly(flown, &confusion.candidates)
-        });
-    }
-}
-
-/// Squared residual over what the declared noise accounts for, in the unit of the
-/// fit's scalars (arcsec, or the centroids' noise where they are whitened); 0 where no noise is declared.
-fn excess(f: &Finish<'_>, power: f64) -> f64 {
-    let rows = f.data.outlier.iter().filter(|o| !**o).count() as f64;
-    f.situation.model.noise.temporal_arcsec.map_or(0.0, |s| {
-        let unit = f.level.noise.map_or(1.0, |n| n.centroid);
-        (rows * power - 0.5 * s * s * f.found.fitted.scalars).max(0.0) / (unit * unit)
-    })
-}
-
-/// [`excess`] where it stands out of the noise.
-fn remarkable(f: &Finish<'_>, power: f64) -> Option<f64> {
-    let sigma = f.situation.model.noise.temporal_arcsec?;
-    let unit = f.level.noise.map_or(1.0, |n| n.centroid);
-    let variance = 0.5 * sigma * sigma / (unit * unit);
-    hypothesis::beyond(excess(f, power), variance, f.found.fitted.scalars)
 }

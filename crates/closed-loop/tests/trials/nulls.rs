@@ -1,6 +1,7 @@
 //! Bundles that follow their model get no effect. Twelve at a family rate of 1 % raise one alarm in
 //! nine such sets: these seeds raise none.
 
+use scenarios::simulate;
 use telemetry::report::Report;
 
 use crate::kit::{Case, Path, VELOCITY, closed};
@@ -81,6 +82,34 @@ fn a_wandering_reference_under_slews_is_no_effect() {
     }
     assert!(others.len() <= 1, "{others:?}");
     assert!(wanders >= 8, "{wanders} of 10");
+}
+
+/// Quiet stars (0.08 arcsec a frame, all together) on swings of 350 arcsec: second differences of the reference are
+/// 1 arcsec of swing and 0.09 arcsec of its wander, and these go with the wander itself. Along the path as the
+/// reference has it something follows the acceleration in most of these runs.
+#[test]
+fn what_a_wander_seems_to_accelerate_by_is_not_left() {
+    let mut left = Vec::new();
+    for seed in 0..6 {
+        let mut scenario = Case::new(Path::Nods, 3000 + seed)
+            .reference(WANDER)
+            .scenario();
+        scenario.model.noise.temporal_arcsec = Some(0.4);
+        scenario.model.noise.centroid_arcsec = None;
+        scenario.model.noise.distortion_arcsec = None;
+        let mut bundle = simulate(&scenario).expect("a bundle");
+        let reference = bundle.reference.as_mut().expect("it has one");
+        reference.rates_rad_s = None;
+        let report = closed(&scenario.model_without_effects(), &bundle)
+            .expect("the loop closes")
+            .report;
+        let ids: Vec<&str> = report.effects.iter().map(|e| e.id.as_str()).collect();
+        assert_eq!(ids, ["reference_error"], "seed {seed}");
+        if report.unattributed.present {
+            left.push((seed, report.unattributed));
+        }
+    }
+    assert!(left.is_empty(), "{left:?}");
 }
 
 /// Attitudes alone: a tracker that drifts changes its stars, and jumps. Without counting them, 14 of

@@ -8,99 +8,150 @@
 //! With spots of their own the stars err with the pixel phase each by itself, and along both axes at once: then
 //! every star has amplitudes of its own, and waves of (1, 1) and (1, -1) too.
 //!
-//! Rows are taken star by star, twice: a design of millions of rows would not fit.
+//! Rows are taken a piece of a star at a time, twice: a design of millions of rows would not fit. The means come
+//! off the sums, `sum (a - m)(a - m)' = sum a a' - n m m'`: what a wave loses to them in rounding is far below the
+//! least that is solved for.
 //!
 //! Source: least squares by normal equations.
 
 use std::ops::Range;
 
-use nalgebra::{SMatrix, SVector};
+use block_regression::add_products;
+use nalgebra::{DMatrix, MatrixXx2, RowDVector};
 use rayon::prelude::*;
 
-use super::Field;
+use super::{Field, pieces, wave};
 use crate::search::empirical::HARMONICS;
 
 /// Waves along one axis, and all.
 const SINGLE: usize = 2 * HARMONICS;
 const WAVES: usize = SINGLE + 2;
-type Normal = SMatrix<f64, { 2 * WAVES }, { 2 * WAVES }>;
-type Score = SMatrix<f64, { 2 * WAVES }, 2>;
+
+/// Cycles per pixel along x and y.
+fn waves() -> [[f64; 2]; WAVES] {
+    std::array::from_fn(|h| {
+        let k = (h / 2 + 1) as f64;
+        match (h < SINGLE, h % 2 == 0) {
+            (true, true) => [k, 0.0],
+            (true, false) => [0.0, k],
+            (false, same) => [1.0, if same { 1.0 } else { -1.0 }],
+        }
+    })
+}
+
+/// Normal equations of the waves' cosines and sines for both axes.
+struct Equations {
+    normal: DMatrix<f64>,
+    score: MatrixXx2<f64>,
+}
+
+impl Equations {
+    fn solve(self, rows: usize) -> Option<MatrixXx2<f64>> {
+        // where stars stand still there is nothing to take out
+        let least = 1e-6 * rows as f64;
+        let svd = self.normal.svd(true, true);
+        svd.solve(&self.score, least).ok()
+    }
+}
 
 impl Field {
     /// Takes it out.
     pub(super) fn take_out_pixel_phase(&mut self) -> Option<()> {
-        let waves: [[f64; 2]; WAVES] = std::array::from_fn(|h| {
-            let k = (h / 2 + 1) as f64;
-            match (h < SINGLE, h % 2 == 0) {
-                (true, true) => [k, 0.0],
-                (true, false) => [0.0, k],
-                (false, same) => [1.0, if same { 1.0 } else { -1.0 }],
-            }
-        });
-        let own = self.own_spots;
-        let taken = if own { WAVES } else { SINGLE };
-        let design = |star: usize, rows: &Range<usize>| {
-            let mut out = vec![[0.0; 2 * WAVES]; rows.len()];
-            let mut columns = Vec::new();
-            for (h, k) in waves[..taken].iter().enumerate() {
-                self.columns(star, *k, &mut columns);
-                for (row, c) in out.iter_mut().zip(&columns) {
-                    row[2 * h..2 * h + 2].copy_from_slice(c);
-                }
-            }
-            out
-        };
-        let sums: Vec<(Normal, Score)> = self
-            .stars
-            .par_iter()
-            .enumerate()
-            .map(|(star, rows)| {
-                let (mut normal, mut score) = (Normal::zeros(), Score::zeros());
-                for (row, a) in rows.clone().zip(design(star, rows)) {
-                    let a = SVector::from(a);
-                    normal.ger(1.0, &a, &a, 1.0);
-                    let of = SVector::from([self.residual[0][row], self.residual[1][row]]);
-                    score.ger(1.0, &a, &of, 1.0);
-                }
-                (normal, score)
-            })
-            .collect();
-        let solve = |(normal, score): (Normal, Score), rows: usize| {
-            // where stars stand still there is nothing to take out
-            let least = 1e-6 * rows as f64;
-            normal.svd(true, true).solve(&score, least).ok()
-        };
-        let beta: Vec<Score> = if own {
-            let each = sums.into_iter().zip(&self.stars);
-            each.map(|(sums, rows)| solve(sums, rows.len()))
+        let waves = &waves()[..if self.own_spots { WAVES } else { SINGLE }];
+        let (each, mean): (Vec<Equations>, Vec<RowDVector<f64>>) =
+            self.equations(waves).into_iter().unzip();
+        let beta: Vec<MatrixXx2<f64>> = if self.own_spots {
+            let of_star = each.into_iter().zip(&self.stars);
+            of_star
+                .map(|(own, rows)| own.solve(rows.len()))
                 .collect::<Option<_>>()?
         } else {
-            let all = sums
-                .into_iter()
-                .fold((Normal::zeros(), Score::zeros()), |all, own| {
-                    (all.0 + own.0, all.1 + own.1)
-                });
-            vec![solve(all, self.rows())?; self.stars.len()]
+            let all = each.into_iter().reduce(|all, own| Equations {
+                normal: all.normal + own.normal,
+                score: all.score + own.score,
+            })?;
+            vec![all.solve(self.rows())?; self.stars.len()]
         };
-        let left: Vec<[Vec<f64>; 2]> = self
-            .stars
-            .par_iter()
-            .zip(&beta)
-            .enumerate()
-            .map(|(star, (rows, beta))| {
-                let design = design(star, rows);
-                [0, 1].map(|axis| {
-                    let beta = beta.column(axis);
-                    let own = self.residual[axis][rows.clone()].iter().zip(&design);
-                    own.map(|(r, a)| r - SVector::from(*a).dot(&beta)).collect()
-                })
+        let [mut x, mut y] = std::mem::take(&mut self.residual);
+        let mut rest = [x.as_mut_slice(), &mut y];
+        let pieces = self.pieces_of_stars().into_iter().map(|(star, rows)| {
+            let own = rest.each_mut().map(|r| {
+                r.split_off_mut(..rows.len())
+                    .expect("the rows of the stars follow one another")
+            });
+            (star, rows, own)
+        });
+        let pieces: Vec<_> = pieces.collect();
+        pieces.into_par_iter().for_each(|(star, rows, own)| {
+            let taken = self.waves_at(waves, &rows, 0) * &beta[star];
+            let level = &mean[star] * &beta[star];
+            for (axis, residual) in own.into_iter().enumerate() {
+                let taken = taken.column(axis);
+                for (r, taken) in residual.iter_mut().zip(&taken) {
+                    *r -= self.weight[star] * (taken - level[axis]);
+                }
+            }
+        });
+        self.residual = [x, y];
+        Some(())
+    }
+
+    /// A star and some of its rows, each.
+    fn pieces_of_stars(&self) -> Vec<(usize, Range<usize>)> {
+        let stars = self.stars.iter().enumerate();
+        stars
+            .flat_map(|(star, rows)| pieces(rows).map(move |piece| (star, piece)))
+            .collect()
+    }
+
+    /// Of every star, and its columns' means.
+    fn equations(&self, waves: &[[f64; 2]]) -> Vec<(Equations, RowDVector<f64>)> {
+        let n = 2 * waves.len();
+        let pieces = self.pieces_of_stars();
+        // beside the waves the residuals of both axes and a one
+        let products = |(_, rows): &(usize, Range<usize>)| {
+            let mut columns = self.waves_at(waves, rows, 3);
+            for axis in 0..2 {
+                let own = &self.residual[axis][rows.clone()];
+                columns.column_mut(n + axis).copy_from_slice(own);
+            }
+            columns.column_mut(n + 2).fill(1.0);
+            let mut sum = DMatrix::zeros(n + 3, n + 3);
+            add_products(1.0, &columns, &mut sum);
+            sum
+        };
+        let each: Vec<DMatrix<f64>> = pieces.par_iter().map(products).collect();
+        let mut sums = vec![DMatrix::zeros(n + 3, n + 3); self.stars.len()];
+        for ((star, _), own) in pieces.iter().zip(&each) {
+            sums[*star] += own;
+        }
+        let stars = sums.into_iter().zip(&self.stars).zip(&self.weight);
+        stars
+            .map(|((mut sum, rows), weight)| {
+                sum.fill_upper_triangle_with_lower_triangle();
+                let mean = sum.row(n + 2).columns(0, n) / rows.len() as f64;
+                let normal = sum.view((0, 0), (n, n)) - mean.tr_mul(&mean) * rows.len() as f64;
+                let of_axes = sum.row(n + 2).columns(n, 2).into_owned();
+                let score = sum.view((0, n), (n, 2)) - mean.tr_mul(&of_axes);
+                let equations = Equations {
+                    normal: normal * (weight * weight),
+                    score: score.fixed_columns::<2>(0) * *weight,
+                };
+                (equations, mean)
             })
-            .collect();
-        for (rows, left) in self.stars.iter().zip(left) {
-            for (residual, left) in self.residual.iter_mut().zip(left) {
-                residual[rows.clone()].copy_from_slice(&left);
+            .collect()
+    }
+
+    /// Cosines and sines at some rows, not less their means, and room for more columns.
+    fn waves_at(&self, waves: &[[f64; 2]], rows: &Range<usize>, more: usize) -> DMatrix<f64> {
+        let mut out = DMatrix::zeros(rows.len(), 2 * waves.len() + more);
+        for (h, k) in waves.iter().enumerate() {
+            for (j, row) in rows.clone().enumerate() {
+                let [cos, sin] = wave(k[0] * self.x_px[row] + k[1] * self.y_px[row]);
+                out[(j, 2 * h)] = cos;
+                out[(j, 2 * h + 1)] = sin;
             }
         }
-        Some(())
+        out
     }
 }
