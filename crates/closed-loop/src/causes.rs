@@ -83,6 +83,15 @@ pub(crate) struct Named<'a> {
     pub(crate) refused: Refused,
 }
 
+impl Named<'_> {
+    /// Whether something seems to follow a path that holds the error which it would explain: what is left, or an
+    /// effect that was refused for it.
+    pub(crate) fn follows_own_path(&self) -> bool {
+        let refused = self.refused.values().any(|why| *why == Refusal::OwnPath);
+        refused || self.described.follows_acceleration()
+    }
+}
+
 /// The slow error that was found, if it is not the reference's.
 fn slow_of_stars(level: &StarEvidence<'_>, searched: &Searched<'_>) -> Option<Slow> {
     let wander = searched.wander.as_ref()?;
@@ -278,7 +287,7 @@ fn suffice(
     Ok(!described.chosen.is_empty() && stand_ins(&described).is_none())
 }
 
-/// Families of the chosen effects that see the acceleration, where it comes from many samples of a reference
+/// Families of the chosen effects that see the acceleration, where it comes from the samples of a reference
 /// that errs slowly: such a path follows the error, and what it makes of it goes with the error itself.
 fn of_own_path(level: &StarEvidence<'_>, searched: &Searched<'_>) -> Vec<String> {
     if searched.wander.is_none() || !level.own_paths {

@@ -55,6 +55,8 @@ pub(crate) struct Around {
     resolved: bool,
     /// Whether these come from measured rates.
     by_rates: bool,
+    /// Whether they come from samples, with the error of these.
+    of_samples: bool,
 }
 
 #[derive(Clone, Debug)]
@@ -67,10 +69,8 @@ struct Piece {
     nodes: [f64; MOST],
     newton: [Vector3<f64>; MOST],
     count: usize,
-    /// Of noisy samples, how far the neighbours that it comes from reach on both sides, s.
+    /// How far the neighbours that it comes from reach on both sides, s.
     own_s: f64,
-    /// Whether these are samples, and more than a polynomial needs.
-    of_many: bool,
 }
 
 impl Around {
@@ -89,6 +89,7 @@ impl Around {
             step_s: step,
             resolved,
             by_rates: stencil.is_some_and(|s| s.by_rates.is_some()),
+            of_samples: stencil.is_some_and(|s| s.by_rates.is_none()),
         };
         let paths = around.pieces.iter().flatten().filter(|p| p.count > 0);
         if resolved && 2 * paths.count() < t_s.len() {
@@ -108,6 +109,14 @@ impl Around {
         self
     }
 
+    /// The same of samples whose error is out: its paths follow none.
+    pub(crate) fn without_error(self) -> Self {
+        Self {
+            of_samples: false,
+            ..self
+        }
+    }
+
     /// Whether the samples tell how the tracker moved between them.
     pub(crate) fn resolved(&self) -> bool {
         self.resolved
@@ -118,9 +127,9 @@ impl Around {
         self.by_rates
     }
 
-    /// Whether what acts around a frame's time follows the path of that frame, which is that of many samples.
+    /// Whether what acts around a frame's time follows the samples around it, with their error.
     pub(crate) fn has_own_paths(&self) -> bool {
-        self.pieces.iter().flatten().any(|p| p.of_many)
+        self.resolved && self.of_samples
     }
 
     /// Whether it is not known how the tracker moved around a frame, where it is around others.
@@ -164,7 +173,6 @@ impl Piece {
             newton: [Vector3::zeros(); MOST],
             count: 0,
             own_s: 0.0,
-            of_many: false,
         };
         Some(match stencil {
             Some(stencil) => held.beside(series, step, t_s, stencil).ready(),
@@ -220,7 +228,6 @@ impl Piece {
                 self.newton[..powers.len()].copy_from_slice(&powers);
                 self.count = powers.len();
                 self.own_s = right[m - 1].0.min(-left[m - 1].0);
-                self.of_many = true;
                 return self;
             }
         }
@@ -241,9 +248,7 @@ impl Piece {
         }
         divide(&nodes[..count], newton, &slopes);
         self.count = count;
-        if stencil.most > SIDE {
-            (self.own_s, self.of_many) = (both_sides, both_sides > 0.0);
-        }
+        self.own_s = both_sides;
         self
     }
 
@@ -254,7 +259,7 @@ impl Piece {
 
     /// Leaves the attitude alone.
     fn forget(&mut self) {
-        (self.count, self.own_s, self.of_many) = (0, 0.0, false);
+        (self.count, self.own_s) = (0, 0.0);
         self.back = UnitQuaternion::identity();
     }
 
@@ -293,8 +298,8 @@ impl AttitudeSource for Around {
         Some(rotation_from_vector(&piece.value(s)) * piece.q)
     }
 
-    /// Of samples with white noise as the frame at `t_s` knows it: another frame's path holds the error of
-    /// this one.
+    /// As the frame at `t_s` knows it, as far as its neighbours reach: another frame's path holds the error of this
+    /// one. Between its neighbours a polynomial is off by no more than where the frame itself is.
     fn turn(&self, t_s: f64, d_s: f64, hint: &mut usize) -> Option<UnitQuaternion<f64>> {
         let (piece, s) = self.piece(t_s, hint)?;
         let back = if s == 0.0 {

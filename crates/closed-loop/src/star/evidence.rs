@@ -47,7 +47,7 @@ pub(crate) struct StarEvidence<'a> {
     pub(crate) motion: Option<&'a dyn AttitudeSource>,
     /// Whether the motion is known between the samples, not attitudes alone.
     pub(crate) resolved: bool,
-    /// Whether what acts around a frame's time follows that frame's own path.
+    /// Whether what acts around a frame's time follows the samples around it, with their error.
     pub(crate) own_paths: bool,
     /// First guess of the noise of a centroid, per axis, arcsec.
     pub(crate) sigma_guess_arcsec: f64,

@@ -154,6 +154,10 @@ fn explain(
     let arm = motion::roll_arm(&data.camera);
     let around =
         known.map(|series| motion::around(series, &data.frames.t_s, arm).turned(&data.turn()));
+    let around = match path {
+        Some(_) => around.map(Around::without_error),
+        None => around,
+    };
     let motion = around.as_ref();
     data.follow(source(motion));
     let data = &*data;
@@ -250,7 +254,7 @@ fn explain(
     if let (None, false, Some(reference)) = (path, by_rates, reference)
         && let Some(wander) = &outcome.searched.wander
         && let Some((residual, _)) = &inside
-        && outcome.described.follows_acceleration()
+        && outcome.follows_own_path()
     {
         let residual = [residual[0].as_slice(), &residual[1]];
         if let Some(path) = steadied(data, reference, wander, residual, &level.weight) {

@@ -19,6 +19,8 @@ pub(crate) enum Path {
     Slews,
     /// To and fro every 8 s: the image reverses again and again.
     Turns,
+    /// The same every five seconds, by half a pixel.
+    Sways,
     /// About two axes at two frequencies, over the same pixels again and again: a hundred under each star.
     Nods,
 }
@@ -36,6 +38,13 @@ impl Path {
         let slew = |axis: &str, angle: f64, duration: f64, hold: f64| {
             format!(
                 "[[motion.slew]]\naxis = {axis}\nangle_deg = {angle:?}\nduration_s = {duration:?}\nhold_s = {hold:?}\n"
+            )
+        };
+        let to_and_fro = |[a, f]: [f64; 2], [b, g]: [f64; 2]| {
+            format!(
+                "[motion]\nkind = \"hold\"\n{start}\ndrift_arcsec_s = [1.5, -2.5, 0.5]\n\
+                 [[motion.sinusoid]]\naxis = [1.0, 0.4, 0.0]\namplitude_arcsec = {a:?}\nfrequency_hz = {f:?}\n\
+                 [[motion.sinusoid]]\naxis = [0.0, 0.6, 1.0]\namplitude_arcsec = {b:?}\nfrequency_hz = {g:?}\n"
             )
         };
         match self {
@@ -71,11 +80,8 @@ impl Path {
                  [[motion.sinusoid]]\naxis = [1.0, 0.0, 0.0]\namplitude_arcsec = 350.0\nfrequency_hz = 0.017\n\
                  [[motion.sinusoid]]\naxis = [0.0, 1.0, 0.0]\namplitude_arcsec = 350.0\nfrequency_hz = 0.0123\n"
             ),
-            Self::Turns => format!(
-                "[motion]\nkind = \"hold\"\n{start}\ndrift_arcsec_s = [1.5, -2.5, 0.5]\n\
-                 [[motion.sinusoid]]\naxis = [1.0, 0.4, 0.0]\namplitude_arcsec = 400.0\nfrequency_hz = 0.11\n\
-                 [[motion.sinusoid]]\naxis = [0.0, 0.6, 1.0]\namplitude_arcsec = 600.0\nfrequency_hz = 0.083\n"
-            ),
+            Self::Turns => to_and_fro([400.0, 0.11], [600.0, 0.083]),
+            Self::Sways => to_and_fro([20.0, 0.22], [30.0, 0.166]),
         }
     }
 }

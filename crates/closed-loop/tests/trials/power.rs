@@ -4,9 +4,10 @@
 //! Sizes are ten standard errors of these very runs. An honest estimate is off by more than 4 sigma
 //! once in 16 000 runs.
 
+use scenarios::simulate;
 use telemetry::report::{Report, Verdict};
 
-use crate::kit::{Case, Path, VELOCITY, power};
+use crate::kit::{Case, Path, VELOCITY, closed, power};
 
 /// Closes the loop where `id` acts with `lines` (`{}`: its size) and checks what is said of `parameter`.
 fn finds(path: Path, id: &str, lines: &str, parameter: &str, size: f64) -> Report {
@@ -104,23 +105,69 @@ fn beside_a_large_effect_the_declared_distortion_is_what_it_was() {
     }
 }
 
-/// Samples of 1 arcsec twice a second do not tell how a swing of nine seconds accelerates, a gyro does. Without
-/// it nothing is named, and the acceleration is told as what is left.
+/// Closes the loop where quiet stars are exposed for `exposure_s`.
+fn exposed(path: Path, exposure_s: f64, reference: &str) -> Report {
+    let mut scenario = Case::new(path, 1)
+        .with("exposure_smear", &format!("exposure_s = {exposure_s:?}"))
+        .reference(reference)
+        .scenario();
+    scenario.model.noise.temporal_arcsec = Some(1.0);
+    scenario.model.noise.centroid_arcsec = None;
+    scenario.model.noise.distortion_arcsec = None;
+    let bundle = simulate(&scenario).expect("a bundle");
+    closed(&scenario.model_without_effects(), &bundle)
+        .expect("the loop closes")
+        .report
+}
+
+/// Whether a smear is found first, with its size.
+fn is_exposed_for(report: &Report, exposure_s: f64) {
+    let first = report.effects.first().expect("something is found");
+    assert_eq!(first.id, "exposure_smear");
+    let exposure = &first.parameters["exposure_s"];
+    let z = (exposure.value - exposure_s) / exposure.sigma.expect("a sigma");
+    assert!(z.abs() < 4.0, "{} off by {z} sigma", exposure.value);
+}
+
+/// Samples of 1 arcsec twice a second do not tell how a sway of five seconds and 30 arcsec accelerates, a gyro
+/// does. Without it nothing is named, and the acceleration is told as what is left.
 #[test]
 fn a_smear_is_found_by_the_gyro() {
     let without = "rates = false\nwhite_arcsec = [1.0, 1.0, 1.0]\n";
     let gyro = "[rates]\nwhite_arcsec_s = [0.3, 0.3, 0.3]\nbias_arcsec_s = [1.0, -2.0, 0.5]\n";
-    let effects = |reference: &str| {
-        let case = Case::new(Path::Turns, 1).with("exposure_smear", "exposure_s = 0.7");
-        case.reference(reference).close().report.effects
-    };
-    let found = effects(&format!("{without}{gyro}"));
-    assert_eq!(found.len(), 1, "{found:?}");
-    assert_eq!(found[0].id, "exposure_smear");
-    let exposure = &found[0].parameters["exposure_s"];
-    let z = (exposure.value - 0.7) / exposure.sigma.unwrap();
-    assert!(z.abs() < 4.0, "{} off by {z} sigma", exposure.value);
-    assert!(effects(without).is_empty());
+    let report = exposed(Path::Sways, 1.5, &format!("{without}{gyro}"));
+    is_exposed_for(&report, 1.5);
+    assert_eq!(report.verdict, Verdict::Explained);
+    let report = exposed(Path::Sways, 1.5, without);
+    assert!(report.effects.is_empty());
+    assert_eq!(report.unattributed.depends_on[0].variable, "acceleration");
+}
+
+/// An exposure longer than a step, against samples of 0.3 arcsec: the path of the frame itself tells the smear. That of the
+/// next frame holds the error of this one, and the smear lost to a description by the acceleration.
+#[test]
+fn a_smear_longer_than_a_step_follows_the_path_of_its_frame() {
+    let reference = "rates = false\nwhite_arcsec = [0.3, 0.3, 0.3]\n";
+    let report = exposed(Path::Turns, 0.7, reference);
+    is_exposed_for(&report, 0.7);
+    assert_eq!(report.verdict, Verdict::Explained);
+}
+
+/// A reference that wanders by 0.5 arcsec over a minute, with white noise of its own or without. Along a path through its
+/// attitudes the wander's own changes are among the accelerations, and a smear by these is not believed; along that
+/// less the wander that the stars tell it is, with its size, and nothing is left.
+#[test]
+fn a_smear_is_found_beside_a_wander() {
+    for white in [0.0, 0.1] {
+        let reference = format!(
+            "rates = false\nwhite_arcsec = [{white:?}, {white:?}, {white:?}]\nwander_arcsec = [0.5, 0.5, 0.5]\n"
+        );
+        let report = exposed(Path::Turns, 0.6, &reference);
+        is_exposed_for(&report, 0.6);
+        let ids: Vec<&str> = report.effects.iter().map(|e| e.id.as_str()).collect();
+        assert_eq!(ids, ["exposure_smear", "reference_error"], "{white}");
+        assert_eq!(report.verdict, Verdict::Explained, "{white}");
+    }
 }
 
 #[test]
@@ -224,9 +271,7 @@ fn undeclared(exposure_s: f64) -> Report {
     let (mut model, mut bundle) = case.make();
     model.tracker.exposure_s = None;
     bundle.meta.tracker.exposure_s = None;
-    crate::kit::closed(&model, &bundle)
-        .expect("the loop closes")
-        .report
+    closed(&model, &bundle).expect("the loop closes").report
 }
 
 /// An exposure that nobody declared may be of any length up to 2 s: its square is not held against that of
