@@ -76,6 +76,15 @@ impl Coloured {
 
     /// Log-likelihood of `y`, nats.
     pub fn log_likelihood(&self, t_s: &[f64], y: &[f64], count: &[f64]) -> f64 {
+        let Sums {
+            squares,
+            determinant,
+            kept,
+        } = self.sums(t_s, y, count);
+        -0.5 * (squares + determinant + kept * std::f64::consts::TAU.ln())
+    }
+
+    fn sums(&self, t_s: &[f64], y: &[f64], count: &[f64]) -> Sums {
         let (r, s) = (self.white * self.white, self.slow * self.slow);
         let (mut variance, mut mean, mut last_s) = (s, 0.0, f64::NEG_INFINITY);
         let (mut squares, mut kept) = (0.0, 0.0);
@@ -100,7 +109,11 @@ impl Coloured {
             determinant.times(innovation);
             kept += 1.0;
         }
-        -0.5 * (squares + determinant.ln() + kept * std::f64::consts::TAU.ln())
+        Sums {
+            squares,
+            determinant: determinant.ln(),
+            kept,
+        }
     }
 
     /// Noise of greatest likelihood for a series about zero. With fewer than 30 rows, too
@@ -272,6 +285,16 @@ impl Coloured {
     }
 }
 
+/// What a likelihood is made of.
+struct Sums {
+    /// Of squared innovations over their variances.
+    squares: f64,
+    /// Of the logarithms of these variances.
+    determinant: f64,
+    /// How many rows count.
+    kept: f64,
+}
+
 /// Steps repeat: one exponential serves them all.
 #[derive(Clone, Copy, Debug)]
 struct Known {
@@ -429,29 +452,44 @@ impl Likelihood<'_> {
         Coloured {
             white: (self.rms * p[0].clamp(-20.0, 20.0).exp()).hypot(self.least),
             slow: self.rms * p[1].clamp(-20.0, 20.0).exp(),
-            tau_s: p[2].exp().clamp(self.bounds[0], self.bounds[1]),
+            tau_s: self.tau(p[2]),
         }
     }
-}
 
-impl Likelihood<'_> {
+    fn tau(&self, ln_tau: f64) -> f64 {
+        ln_tau.exp().clamp(self.bounds[0], self.bounds[1])
+    }
+
     /// Climbs from `start` (logarithms) with first steps of `step`; the height
     /// and the noise there.
     fn climb(&self, start: [f64; 3], step: f64) -> Option<(f64, Coloured)> {
-        let mut simplex = vec![start.to_vec()];
-        for k in 0..3 {
-            let mut corner = start.to_vec();
-            corner[k] += if k == 2 { -1.4 * step } else { step };
-            simplex.push(corner);
-        }
-        let solver = NelderMead::new(simplex).with_sd_tolerance(1e-3).ok()?;
-        let result = Executor::new(self, solver)
-            .configure(|s| s.max_iters(120))
-            .run()
-            .ok()?;
-        let noise = self.at(&result.state.best_param?);
+        let noise = if self.least > 0.0 {
+            self.at(&summit(&self, &start, &[step, step, -1.4 * step])?)
+        } else {
+            let start = [start[1] - start[0], start[2]];
+            Scaled(self).at(&summit(&Scaled(self), &start, &[-step, -1.4 * step])?)
+        };
         Some((noise.log_likelihood(self.t_s, self.y, self.count), noise))
     }
+}
+
+/// Where `problem` is least, from `start` with first steps `steps`.
+fn summit<C>(problem: &C, start: &[f64], steps: &[f64]) -> Option<Vec<f64>>
+where
+    C: CostFunction<Param = Vec<f64>, Output = f64> + Copy,
+{
+    let mut simplex = vec![start.to_vec()];
+    for (k, step) in steps.iter().enumerate() {
+        let mut corner = start.to_vec();
+        corner[k] += step;
+        simplex.push(corner);
+    }
+    let solver = NelderMead::new(simplex).with_sd_tolerance(1e-3).ok()?;
+    let result = Executor::new(*problem, solver)
+        .configure(|s| s.max_iters(120))
+        .run()
+        .ok()?;
+    result.state.best_param
 }
 
 impl CostFunction for &Likelihood<'_> {
@@ -460,6 +498,50 @@ impl CostFunction for &Likelihood<'_> {
 
     fn cost(&self, p: &Vec<f64>) -> Result<f64, argmin::core::Error> {
         Ok(-self.at(p).log_likelihood(self.t_s, self.y, self.count))
+    }
+}
+
+/// The likelihood at the best size of all noise, which is known at any ratio of its parts:
+/// `s^2 = mean of e_k^2 / S_k`. Logarithms of slow over white, and of the correlation time.
+#[derive(Clone, Copy)]
+struct Scaled<'a>(&'a Likelihood<'a>);
+
+impl Scaled<'_> {
+    fn relative(self, p: &[f64]) -> Coloured {
+        Coloured {
+            white: 1.0,
+            slow: p[0].clamp(-20.0, 20.0).exp(),
+            tau_s: self.0.tau(p[1]),
+        }
+    }
+
+    fn sums(self, p: &[f64]) -> Sums {
+        self.relative(p).sums(self.0.t_s, self.0.y, self.0.count)
+    }
+
+    fn at(self, p: &[f64]) -> Coloured {
+        let Sums { squares, kept, .. } = self.sums(p);
+        let size = (squares / kept).sqrt().max(1e-12 * self.0.rms);
+        let relative = self.relative(p);
+        Coloured {
+            white: size,
+            slow: size * relative.slow,
+            ..relative
+        }
+    }
+}
+
+impl CostFunction for Scaled<'_> {
+    type Param = Vec<f64>;
+    type Output = f64;
+
+    fn cost(&self, p: &Vec<f64>) -> Result<f64, argmin::core::Error> {
+        let Sums {
+            squares,
+            determinant,
+            kept,
+        } = self.sums(p);
+        Ok(0.5 * (kept * (squares / kept).max(f64::MIN_POSITIVE).ln() + determinant))
     }
 }
 

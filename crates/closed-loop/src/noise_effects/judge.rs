@@ -22,7 +22,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
 
 use super::rows::Row;
 use super::variance::{
-    Fit, LEVEL, MAGNITUDE, Model, PARAMETERS, RATE, SHARE, SIZE, Vector, logit, sigmoid,
+    Fit, LEVEL, MAGNITUDE, Model, PARAMETERS, RATE, SHARE, SIZE, logit, sigmoid,
 };
 use crate::search::selection::FAMILY_ALPHA;
 
@@ -382,14 +382,14 @@ impl Bench<'_> {
     /// Gain of `with` over `without` on folds that took no part in the fit.
     fn gain(&self, rows: &[Row], with: &Fit, without: &Fit) -> f64 {
         let fold = |r: &Row| self.folds.fold_of_block[r.block];
-        (0..self.folds.count)
-            .map(|f| {
-                let train = |r: &Row| fold(r) != f;
-                let held = |at: &Vector| self.model.loglik(at, rows, |r| fold(r) == f);
-                let refit = |fit: &Fit| self.model.fit(rows, &fit.at, fit.free, &train).at;
-                held(&refit(with)) - held(&refit(without))
-            })
-            .sum()
+        let [with, without] = [with, without].map(|fit| {
+            let each = self.model.without_each(rows, fit, self.folds);
+            let held = each
+                .enumerate()
+                .map(|(f, at)| self.model.loglik(&at, rows, |r| fold(r) == f));
+            held.sum::<f64>()
+        });
+        with - without
     }
 }
 

@@ -19,6 +19,7 @@
 //! Source: maximum likelihood of a scale mixture; White 1980, Liang & Zeger 1986
 //! (sandwich over clusters); Berndt, Hall, Hall & Hausman 1974 (the ascent).
 
+use block_regression::Folds;
 use coloured_noise::LogProduct;
 use nalgebra::{Cholesky, SMatrix, SVector};
 use rayon::prelude::*;
@@ -45,7 +46,11 @@ const MOST_SHARE: f64 = 0.2;
 /// Least size of a spike, sigma of the usual row: smaller is no spike, but noise with tails.
 const LEAST_SIZE: f64 = 4.0;
 const ROUNDS: usize = 60;
+/// Nats that a round gains at the summit, and that one more would, as the curvature has it.
 const CONVERGED: f64 = 1e-4;
+const NEXT_TO_NOTHING: f64 = 1e-5;
+/// Pairs of parameters, each with itself too.
+const PAIRS: usize = PARAMETERS * (PARAMETERS + 1) / 2;
 
 /// The model: what is given, and the units of its parameters.
 #[derive(Clone, Debug)]
@@ -54,6 +59,24 @@ pub(super) struct Model {
     variance: f64,
     /// Outliers that are declared: share and variance.
     declared: Option<[f64; 2]>,
+}
+
+/// Log-likelihood, gradient, and sum of the outer products of the rows' gradients.
+#[derive(Clone, Debug, Default)]
+struct Sums {
+    value: f64,
+    gradient: Vector,
+    outer: Matrix,
+}
+
+impl Sums {
+    fn add(self, other: &Self) -> Self {
+        Self {
+            value: self.value + other.value,
+            gradient: self.gradient + other.gradient,
+            outer: self.outer + other.outer,
+        }
+    }
 }
 
 /// A point in the space of parameters with its likelihood.
@@ -161,8 +184,25 @@ impl Model {
         free: [bool; PARAMETERS],
         of: &(dyn Fn(&Row) -> bool + Sync),
     ) -> Fit {
+        let sums = self.sums(start, rows, of);
+        self.climb(sums, rows, start, free, of)
+    }
+
+    /// As [`fit`](Self::fit), where the `sums` at the start are known.
+    fn climb(
+        &self,
+        sums: Sums,
+        rows: &[Row],
+        start: &Vector,
+        free: [bool; PARAMETERS],
+        of: &(dyn Fn(&Row) -> bool + Sync),
+    ) -> Fit {
         let mut at = *start;
-        let (mut value, mut gradient, mut outer) = self.sums(&at, rows, of);
+        let Sums {
+            mut value,
+            mut gradient,
+            mut outer,
+        } = sums;
         let mut damping = 1e-3;
         for _ in 0..ROUNDS {
             let mut normal = outer;
@@ -182,11 +222,19 @@ impl Model {
                 break;
             };
             let step = factor.solve(&slope);
+            if 0.5 * slope.dot(&step) < NEXT_TO_NOTHING && damping < 1e-2 {
+                break;
+            }
             let next = self.bounded(&(at + step));
-            let (there, its_gradient, its_outer) = self.sums(&next, rows, of);
-            if there >= value {
-                let gained = there - value;
-                (at, value, gradient, outer) = (next, there, its_gradient, its_outer);
+            let there = self.sums(&next, rows, of);
+            if there.value >= value {
+                let gained = there.value - value;
+                at = next;
+                Sums {
+                    value,
+                    gradient,
+                    outer,
+                } = there;
                 damping = (0.2 * damping).max(1e-6);
                 if gained < CONVERGED && damping < 1e-2 {
                     break;
@@ -205,35 +253,58 @@ impl Model {
         }
     }
 
-    /// Log-likelihood, gradient, and sum of the outer products of the rows' gradients.
-    fn sums(
+    /// Best points without each of the folds, from `start`, which is the best of all.
+    pub(super) fn without_each(
         &self,
-        at: &Vector,
         rows: &[Row],
-        of: &(dyn Fn(&Row) -> bool + Sync),
-    ) -> (f64, Vector, Matrix) {
+        start: &Fit,
+        folds: &Folds,
+    ) -> impl Iterator<Item = Vector> {
+        let fold = |r: &Row| folds.fold_of_block[r.block];
+        // at the start the sums of all folds come of one pass
+        let own: Vec<Sums> = (0..folds.count)
+            .into_par_iter()
+            .map(|f| self.sums(&start.at, rows, &|r| fold(r) == f))
+            .collect();
+        (0..folds.count).map(move |f| {
+            let others = own.iter().enumerate().filter(|(k, _)| *k != f);
+            let others = others.fold(Sums::default(), |all, (_, own)| all.add(own));
+            self.climb(others, rows, &start.at, start.free, &|r| fold(r) != f)
+                .at
+        })
+    }
+
+    /// Of the rows that `of` keeps.
+    fn sums(&self, at: &Vector, rows: &[Row], of: &(dyn Fn(&Row) -> bool + Sync)) -> Sums {
         let there = self.there(at);
         // pieces of fixed length, added in order: the same for any number of threads
-        let pieces: Vec<_> = rows
+        let pieces: Vec<Sums> = rows
             .par_chunks(4096)
             .map(|chunk| {
                 let mut levels = Levels::default();
                 let (mut value, mut product) = (0.0, LogProduct::default());
-                let (mut gradient, mut outer) = (Vector::zeros(), Matrix::zeros());
+                let (mut gradient, mut outer) = ([0.0; PARAMETERS], [0.0; PAIRS]);
                 for row in chunk.iter().filter(|r| of(r)) {
                     let (density, g) = there.row(row, levels.own(&there, row));
                     value += density.exponent;
                     product.times(density.factor);
-                    gradient += g;
-                    outer += g * g.transpose();
+                    let mut pair = 0;
+                    for i in 0..PARAMETERS {
+                        gradient[i] += g[i];
+                        for j in 0..=i {
+                            outer[pair] += g[i] * g[j];
+                            pair += 1;
+                        }
+                    }
                 }
-                (value + product.ln(), gradient, outer)
+                Sums {
+                    value: value + product.ln(),
+                    gradient: gradient.into(),
+                    outer: Matrix::from_fn(|i, j| outer[i.max(j) * (i.max(j) + 1) / 2 + i.min(j)]),
+                }
             })
             .collect();
-        pieces.into_iter().fold(
-            (0.0, Vector::zeros(), Matrix::zeros()),
-            |(a, b, c), (x, y, z)| (a + x, b + y, c + z),
-        )
+        pieces.iter().fold(Sums::default(), Sums::add)
     }
 
     /// Whether parameter `k` stands at a bound that `gradient` pushes it against.
@@ -323,7 +394,7 @@ impl Model {
             let along = |side: f64| {
                 let mut at = fit.at;
                 at[k] += side * h;
-                self.sums(&at, rows, everywhere).1
+                self.sums(&at, rows, everywhere).gradient
             };
             let (up, down) = (along(1.0), along(-1.0));
             for (i, &other) in inside.iter().enumerate() {

@@ -462,6 +462,8 @@ fn coloured<'a>(
     let mut chosen: Vec<usize> = Vec::new();
     let mut noise = start;
     let mut moments = white.moments(folds, &borrowed(&candidates));
+    // fits of the same columns, those under the noise of the last choice
+    let mut known: Option<[Fitted; 2]> = None;
     loop {
         let all: Vec<usize> = (0..moments.width()).collect();
         let under = |noise: &CommonNoise| {
@@ -473,9 +475,14 @@ fn coloured<'a>(
             )
         };
         let beside = |fitted: Fitted| fitted.beside(folds, &borrowed(&candidates), &chosen);
-        let grams = moments.white_of(&all);
-        let plain = beside(fit_grams(white, &grams, folds, &borrowed(&candidates))?)?;
-        let filtered = beside(under(&noise)?)?;
+        let [plain, filtered] = match known.take() {
+            Some([plain, filtered]) => [beside(plain)?, filtered],
+            None => {
+                let grams = moments.white_of(&all);
+                let plain = fit_grams(white, &grams, folds, &borrowed(&candidates))?;
+                [beside(plain)?, beside(under(&noise)?)?]
+            }
+        };
         let trial = Trial {
             moments: &moments,
             folds,
@@ -569,6 +576,8 @@ fn coloured<'a>(
             // there is no room for the old products beside the new
             drop((plain, filtered, fitted, moments));
             moments = white.moments(folds, &borrowed(&candidates));
+        } else {
+            known = Some([plain, fitted]);
         }
     }
 }

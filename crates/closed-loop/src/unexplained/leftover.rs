@@ -111,8 +111,9 @@ impl Series {
             .each
             .into_par_iter()
             .map(|(mut track, spectrum)| {
-                let lines = spectrum.map_or_else(Vec::new, |s| track.lines(alpha, s));
-                let jumps = track.jumps(alpha);
+                let (lines, noise) =
+                    spectrum.map_or_else(Default::default, |s| track.lines(alpha, s));
+                let jumps = track.jumps(alpha, noise);
                 (track, lines, jumps)
             })
             .collect();

@@ -96,15 +96,19 @@ struct Stepped {
 }
 
 impl Track {
-    /// Instants of jumps: the middle between the points on either side.
-    pub(super) fn jumps(&mut self, alpha: f64) -> Vec<f64> {
+    /// Instants of jumps: the middle between the points on either side. `noise`: of the series, where it is
+    /// known.
+    pub(super) fn jumps(&mut self, alpha: f64, mut noise: Option<Coloured>) -> Vec<f64> {
         let mut found = Vec::new();
         while found.len() < MOST {
-            let noise = self.noise();
+            let noise = noise.take().unwrap_or_else(|| self.noise());
             let before = self.loglik(&noise);
-            let best = [noise, whole(&noise)]
-                .iter()
-                .filter_map(|n| best_step(&[self], &[*n]))
+            let under = |n: Coloured| best_step(&[self], &[n]);
+            let coloured = (noise.slow > 0.0).then(|| under(noise)).flatten();
+            let white = under(whole(&noise)).filter(|at| coloured != Some(*at));
+            let best = [coloured, white]
+                .into_iter()
+                .flatten()
                 .filter_map(|at| Some((at, self.stepped(at, &noise)?)))
                 .max_by(|a, b| a.1.loglik.total_cmp(&b.1.loglik));
             let Some((at, Stepped { loglik, size, left })) = best else {
@@ -139,8 +143,12 @@ impl Track {
         let columns = [vec![1.0; step.len()], step];
         let mut its_noise = *noise;
         let (mut size, mut left) = self.take_out(&whole(noise), &columns)?;
-        for _ in 0..2 {
+        for round in 0..2 {
             its_noise = left.noise();
+            if round == 0 && its_noise.slow <= 0.0 {
+                // white noise was what it was taken out under
+                break;
+            }
             (size, left) = self.take_out(&its_noise, &columns)?;
         }
         Some(Stepped {

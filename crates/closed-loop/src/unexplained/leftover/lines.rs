@@ -14,6 +14,7 @@
 
 use std::sync::Arc;
 
+use coloured_noise::Coloured;
 use effects::{Candidate, Scene};
 use rayon::prelude::*;
 use spectra::robust::median_step;
@@ -67,6 +68,7 @@ impl Grid {
 pub(crate) struct Spectrum {
     grid: Grid,
     plan: Arc<LombScargle>,
+    noise: Coloured,
     white: Vec<f64>,
     /// Logarithms.
     chance: Vec<f64>,
@@ -74,7 +76,8 @@ pub(crate) struct Spectrum {
 
 impl Spectrum {
     fn of(track: &Track, grid: Grid, plan: Arc<LombScargle>) -> Option<Self> {
-        let white = track.whitened(&track.noise(), &track.value);
+        let noise = track.noise();
+        let white = track.whitened(&noise, &track.value);
         let power = plan.process(&white).ok()?.psd;
         let chance = |k: usize| {
             let (sum, n) = USUAL.sum(&power, k);
@@ -84,6 +87,7 @@ impl Spectrum {
         Some(Self {
             grid,
             plan,
+            noise,
             white,
             chance,
         })
@@ -163,9 +167,8 @@ impl Series {
         let law = ChiSquared::new(2.0 * turns.len() as f64).ok()?;
         let frequency_hz = grid.at(best);
         let likely = law.sf(-2.0 * sum) * (bins as f64) < WORTH_A_SEARCH;
-        let seen = turns.iter().any(|(track, _)| {
-            let noise = track.noise();
-            let size = track.take_out(&noise, &track.sinusoids(&[frequency_hz]));
+        let seen = turns.iter().any(|(track, spectrum)| {
+            let size = track.take_out(&spectrum.noise, &track.sinusoids(&[frequency_hz]));
             size.is_some_and(|(size, _)| track.is_beyond_declared([size[1], size[2]]))
         });
         (likely && seen).then_some(SharedLine {
@@ -177,39 +180,43 @@ impl Series {
 
 impl Track {
     /// Frequencies of lines that the declared model does not make; all are taken out of the series,
-    /// whose `spectrum` this is.
-    pub(super) fn lines(&mut self, alpha: f64, spectrum: Spectrum) -> Vec<f64> {
+    /// whose `spectrum` this is. With the noise that the series has then, if it is still the same.
+    pub(super) fn lines(&mut self, alpha: f64, spectrum: Spectrum) -> (Vec<f64>, Option<Coloured>) {
         let mut found: Vec<f64> = Vec::new();
         let whole = self.clone();
-        let Spectrum { grid, plan, .. } = &spectrum;
-        let (grid, plan) = (*grid, Arc::clone(plan));
-        let mut now = Some(spectrum);
+        let (grid, plan) = (spectrum.grid, Arc::clone(&spectrum.plan));
+        let mut now = spectrum;
         while found.len() < MOST {
-            let Some(f) = now.and_then(|s| s.strongest(alpha, self)) else {
+            let Some(f) = now.strongest(alpha, self) else {
                 break;
             };
             found.push(f);
-            let noise = self.noise();
-            let Some((_, left)) = whole.take_out(&noise, &whole.sinusoids(&found)) else {
+            let left = whole.take_out(&now.noise, &whole.sinusoids(&found));
+            let next = left.and_then(|(_, left)| {
+                let spectrum = Spectrum::of(&left, grid, Arc::clone(&plan))?;
+                Some((left, spectrum))
+            });
+            let Some((left, spectrum)) = next else {
                 found.pop();
                 break;
             };
-            *self = left;
-            now = Spectrum::of(self, grid, Arc::clone(&plan));
+            (*self, now) = (left, spectrum);
         }
+        let noise = now.noise;
+        // white noise takes a mean out that is out already
+        let known = (found.is_empty() && noise.slow <= 0.0).then_some(noise);
         // once more each, without what the others left in it
         for k in 0..found.len() {
             let others: Vec<f64> = (0..found.len())
                 .filter(|&j| j != k)
                 .map(|j| found[j])
                 .collect();
-            let noise = self.noise();
             if let Some((_, left)) = whole.take_out(&noise, &whole.sinusoids(&others)) {
                 let white = left.whitened(&noise, &left.value);
                 found[k] = left.top(&white, found[k], grid.step_hz);
             }
         }
-        if let Some((size, left)) = whole.take_out(&self.noise(), &whole.sinusoids(&found)) {
+        if let Some((size, left)) = whole.take_out(&noise, &whole.sinusoids(&found)) {
             *self = left;
             let each = found.into_iter().enumerate();
             found = each
@@ -217,7 +224,7 @@ impl Track {
                 .map(|(_, f)| f)
                 .collect();
         }
-        found
+        (found, known)
     }
 
     /// Whether a line with these amplitudes of cosine and sine is more than the declared model makes.
