@@ -194,25 +194,30 @@ impl Fits {
         variance: f64,
     ) -> Option<Self> {
         let n = layout.nuisance_precision.nrows();
-        let by_fold = (0..folds.count)
-            .into_par_iter()
-            .map(|f| {
-                let pick = layout.picked(Some(f));
-                let train = sums.without(f);
-                let mut fold = Eliminated::new(&train, layout, variance, &pick)?;
-                let (own, scalars) = &sums.fold[f];
-                let unseen = |&k: &usize| train.0[(k, k)] < UNSEEN * own[(k, k)];
-                let alone: Vec<usize> = (0..n).filter(unseen).collect();
-                if !alone.is_empty() {
-                    fold.learn(&alone, own, &pick)?;
-                }
-                let held = transformed(own, n, &pick, &fold.nuisance);
-                Some((fold, (held, *scalars)))
-            })
-            .collect::<Option<Vec<_>>>()?;
-        let (by_fold, held) = by_fold.into_iter().unzip();
         let pick = layout.picked(None);
-        let all = Eliminated::new(&sums.all, layout, variance, &pick)?;
+        let of_fold = |f: usize| {
+            let pick = layout.picked(Some(f));
+            let train = sums.without(f);
+            let mut fold = Eliminated::new(&train, layout, variance, &pick)?;
+            let (own, scalars) = &sums.fold[f];
+            let unseen = |&k: &usize| train.0[(k, k)] < UNSEEN * own[(k, k)];
+            let alone: Vec<usize> = (0..n).filter(unseen).collect();
+            if !alone.is_empty() {
+                fold.learn(&alone, own, &pick)?;
+            }
+            let held = transformed(own, n, &pick, &fold.nuisance);
+            Some((fold, (held, *scalars)))
+        };
+        let of_all = |variance: f64| Eliminated::new(&sums.all, layout, variance, &pick);
+        let (by_fold, (all, free)) = rayon::join(
+            || {
+                let folds = (0..folds.count).into_par_iter();
+                folds.map(of_fold).collect::<Option<Vec<_>>>()
+            },
+            || rayon::join(|| of_all(variance), || of_all(FREE * variance)),
+        );
+        let (by_fold, held) = by_fold?.into_iter().unzip();
+        let (all, free) = (all?, free?);
         let own_residuals = if layout.residuals == 1 {
             0
         } else {
@@ -221,7 +226,6 @@ impl Fits {
         let whole = (0..own_residuals)
             .map(|f| Eliminated::new(&sums.all, layout, variance, &layout.picked(Some(f))))
             .collect::<Option<Vec<_>>>()?;
-        let free = Eliminated::new(&sums.all, layout, FREE * variance, &pick)?;
         let inner = grams
             .gram
             .par_iter()

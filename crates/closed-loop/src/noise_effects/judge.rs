@@ -22,7 +22,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
 
 use super::rows::Row;
 use super::variance::{
-    Fit, LEVEL, MAGNITUDE, Model, PARAMETERS, RATE, SHARE, SIZE, logit, sigmoid,
+    Covariance, Fit, LEVEL, MAGNITUDE, Model, PARAMETERS, RATE, SHARE, SIZE, Vector, logit, sigmoid,
 };
 use crate::search::selection::FAMILY_ALPHA;
 
@@ -130,14 +130,21 @@ pub(super) fn judge(make: &Make<'_>, folds: &Folds, known: Known) -> Option<Verd
     let mut rows = make(&|row: &Row| [row.declared, 1.0]);
     let mut free = [false; PARAMETERS];
     let mut model = Model::new(&rows, known.outliers);
+    // the highest hill is known from the first round on
+    let mut hill: Option<Vector> = None;
+    let up = |hill: Option<Vector>, model: &Model, rows: &[Row], free: Free| match hill {
+        Some(hill) => Some(model.fit(rows, &hill, free, &|_| true)),
+        None => climb(model, rows, free),
+    };
     for _ in 0..ROUNDS {
         if rows.iter().filter(|r| !r.marked).count() < 10 * MIN_ROWS {
             return None;
         }
         free = observable(&rows, known.moving);
-        let full = climb(&model, &rows, free)?;
+        let full = up(hill, &model, &rows, free)?;
         rows = make(&model.belief(&full.at));
         model = Model::new(&rows, known.outliers);
+        hill = Some(full.at);
     }
     let stars = rows.iter().map(|r| r.star + 1).max()?;
     let bench = Bench {
@@ -147,9 +154,10 @@ pub(super) fn judge(make: &Make<'_>, folds: &Folds, known: Known) -> Option<Verd
         stars,
         least_slope: known.least_slope,
     };
-    let full = climb(&bench.model, &bench.rows, free)?;
+    let full = up(hill, &bench.model, &bench.rows, free)?;
     let outliers = bench.spikes(&full);
-    let [mut magnitude, mut rate] = [MAGNITUDE, RATE].map(|k| bench.one(k, &full));
+    let shown = bench.known(&full);
+    let [mut magnitude, mut rate] = [MAGNITUDE, RATE].map(|k| bench.one(k, &full, shown.as_ref()));
     if magnitude.observable && rate.observable && magnitude.stands != rate.stands {
         // the one that stands, without the freedom of the other
         let (alone, other) = if magnitude.stands {
@@ -157,8 +165,7 @@ pub(super) fn judge(make: &Make<'_>, folds: &Folds, known: Known) -> Option<Verd
         } else {
             (RATE, MAGNITUDE)
         };
-        let fit = bench.without(&full, other);
-        let again = bench.one(alone, &fit);
+        let again = bench.alone(alone, &full, other);
         if again.stands {
             *(if alone == MAGNITUDE {
                 &mut magnitude
@@ -168,8 +175,8 @@ pub(super) fn judge(make: &Make<'_>, folds: &Folds, known: Known) -> Option<Verd
         }
     } else if magnitude.observable && rate.observable && !magnitude.stands {
         // they may hide behind each other
-        let alone = bench.one(MAGNITUDE, &bench.without(&full, RATE));
-        let other = bench.one(RATE, &bench.without(&full, MAGNITUDE));
+        let alone = bench.alone(MAGNITUDE, &full, RATE);
+        let other = bench.alone(RATE, &full, MAGNITUDE);
         if alone.stands && (!other.stands || alone.gain >= other.gain) {
             magnitude = alone;
         } else if other.stands {
@@ -242,23 +249,33 @@ impl Bench<'_> {
         self.model.fit(&self.rows, &at, free, &|_| true)
     }
 
-    /// Slope or rate beside all else that is free in `full`.
-    fn one(&self, k: usize, full: &Fit) -> Judged {
+    /// How well the parameters of `fit` are known, by blocks, by stars and by both.
+    fn known(&self, fit: &Fit) -> Option<Covariance<3>> {
+        self.model.covariance(
+            fit,
+            &self.rows,
+            [&|r| r.block, &|r| r.star, &|r| {
+                r.block * self.stars + r.star
+            }],
+        )
+    }
+
+    /// Slope or rate without the `other`.
+    fn alone(&self, k: usize, full: &Fit, other: usize) -> Judged {
+        let fit = self.without(full, other);
+        self.one(k, &fit, self.known(&fit).as_ref())
+    }
+
+    /// Slope or rate beside all else that is free in `full`, whose parameters are `known` so well.
+    fn one(&self, k: usize, full: &Fit, known: Option<&Covariance<3>>) -> Judged {
         if !full.free[k] {
             return UNSEEN;
         }
         let without = self.without(full, k);
         let value = full.at[k];
-        let known = self.model.covariance(
-            full,
-            &self.rows,
-            [&|r| r.block, &|r| r.star, &|r| {
-                r.block * self.stars + r.star
-            }],
-        );
         // variances, and of how many sums
         let [blocks, stars, cells] = known.map_or([(0.0, 0); 3], |c| {
-            c.clustered.map(|(matrix, count)| (matrix[(k, k)], count))
+            (c.clustered.each_ref()).map(|(matrix, count)| (matrix[(k, k)], *count))
         });
         let widened = self.model.widening(&full.at, &self.rows);
         // what has to be shown is more than what passes for nothing

@@ -389,16 +389,14 @@ impl Model {
     ) -> Option<nalgebra::DMatrix<f64>> {
         let everywhere: &(dyn Fn(&Row) -> bool + Sync) = &|_| true;
         let mut hessian = nalgebra::DMatrix::zeros(inside.len(), inside.len());
+        let here = self.sums(&fit.at, rows, everywhere).gradient;
         for (j, &k) in inside.iter().enumerate() {
             let h = 1e-4 * fit.at[k].abs().max(if k == RATE { 0.0 } else { 1.0 });
-            let along = |side: f64| {
-                let mut at = fit.at;
-                at[k] += side * h;
-                self.sums(&at, rows, everywhere).gradient
-            };
-            let (up, down) = (along(1.0), along(-1.0));
+            let mut at = fit.at;
+            at[k] += h;
+            let there = self.sums(&at, rows, everywhere).gradient;
             for (i, &other) in inside.iter().enumerate() {
-                hessian[(i, j)] = -(up[other] - down[other]) / (2.0 * h);
+                hessian[(i, j)] = -(there[other] - here[other]) / h;
             }
         }
         let hessian = 0.5 * (&hessian + hessian.transpose());
