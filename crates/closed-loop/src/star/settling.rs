@@ -64,7 +64,8 @@ pub(crate) fn settle(
         {
             let effects = declared::effects(situation)?;
             if data.project_through(theta, variance, reference, &effects) {
-                data.update_phase(phase);
+                // beside the misalignment the distortion is what it was
+                data.move_modelled(&mut before, phase);
                 turns += 1;
                 continue;
             }
