@@ -28,7 +28,9 @@
 //! After each addition all chosen groups are judged again beside the others and
 //! those that no longer stand are dropped. Where none stands, two are tried at once: an effect that is left
 //! out scatters from block to block as coloured noise does, so that each of two large ones may hide the
-//! other. Tried are those that white noise would let stand; each must stand beside the other.
+//! other. Tried are those that white noise would let stand; each must stand beside the other. And where nothing
+//! more stands, other forms of what was chosen are tried, alone and with one more: of a step and a ramp the best
+//! single step is neither, and beside it the ramp is nothing.
 //!
 //! Source: Schwarz 1978 for the price of a parameter; Genovese, Roeder & Wasserman 2006
 //! for weights of p-values.
@@ -98,6 +100,11 @@ impl Judgement {
 
 /// How many of those that white noise would let stand are tried two by two.
 const HIDDEN: usize = 6;
+/// How many are tried beside another form of what was chosen.
+const BESIDE: usize = 12;
+/// How often forms are exchanged, and what that has to be worth, nats.
+const EXCHANGES: usize = 4;
+const WORTH_IT: f64 = 0.5;
 
 /// The outcome of the search.
 #[derive(Clone, Debug)]
@@ -166,17 +173,24 @@ impl Trials<'_> {
         // Each round adds one or stops; a group dropped by the backward check may
         // not return, so the search ends.
         let mut may = may.to_vec();
+        let mut exchanges = EXCHANGES;
         loop {
             let tried = self.tried(&may, &chosen);
             let added = match tried.iter().find(|t| t.judgement.stands()) {
                 Some(best) => vec![best.group],
                 None => self.hidden(&tried, &chosen),
             };
-            if added.is_empty() {
-                break;
+            if !added.is_empty() {
+                chosen.extend(added);
+                self.prune(&mut chosen, &mut may);
+                continue;
             }
-            chosen.extend(added);
-            self.prune(&mut chosen, &mut may);
+            let better = (exchanges > 0).then(|| self.exchanged(&may, &chosen));
+            let Some(better) = better.flatten() else {
+                break;
+            };
+            exchanges -= 1;
+            chosen = better;
         }
         let judged = self.judged(&chosen);
         Selection { chosen, judged }
@@ -235,6 +249,60 @@ impl Trials<'_> {
             }
         }
         best.1
+    }
+
+    /// `chosen` with one of them in another form, and perhaps one more, where that gains more after its price
+    /// and each stands beside the others; the best of these.
+    fn exchanged(&self, may: &[bool], chosen: &[usize]) -> Option<Vec<usize>> {
+        let family = |g: usize| &self.groups[g].family;
+        let forms = |g: usize| {
+            let all = 0..self.groups.len();
+            all.filter(move |&c| c != g && may[c] && family(c) == family(g))
+        };
+        let now = self.worth(chosen)? + WORTH_IT;
+        let mut better: Vec<(f64, Vec<usize>)> = Vec::new();
+        for (at, &g) in chosen.iter().enumerate() {
+            let rest: Vec<usize> = chosen.iter().copied().filter(|&c| c != g).collect();
+            let others = forms(g).next().map(|_| self.tried(may, &rest));
+            let others: Vec<usize> = others
+                .into_iter()
+                .flatten()
+                .map(|t| t.group)
+                .filter(|&h| family(h) != family(g))
+                .take(BESIDE)
+                .collect();
+            let each: Vec<_> = forms(g).collect();
+            better.par_extend(each.into_par_iter().flat_map_iter(|form| {
+                let mut swapped = chosen.to_vec();
+                swapped[at] = form;
+                let more = others.iter().map(|&h| {
+                    let mut set = swapped.clone();
+                    set.push(h);
+                    set
+                });
+                let sets = std::iter::once(swapped.clone()).chain(more);
+                let worth = sets.filter_map(|set| Some((self.worth(&set)?, set)));
+                worth.filter(|(worth, _)| *worth > now).collect::<Vec<_>>()
+            }));
+        }
+        better.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let stands = |set: &[usize]| {
+            let stands = |&g: &usize| self.within(set, g).is_some_and(|j| j.stands());
+            set.iter().all(stands)
+        };
+        better
+            .into_iter()
+            .map(|(_, set)| set)
+            .find(|set| stands(set))
+    }
+
+    /// Log-likelihood out of fold less the price of all parameters and choices.
+    fn worth(&self, set: &[usize]) -> Option<f64> {
+        let paid: f64 = set
+            .iter()
+            .map(|&g| price(&self.groups[g], self.scalars))
+            .sum();
+        Some(self.out_of_fold(set)?.total_loglik() - paid)
     }
 
     /// Standing of every group beside (for a chosen one: within) `chosen`.
