@@ -370,9 +370,9 @@ pub(crate) fn terms(
         let star = (Variable::Star(ids), [0.0, 1.0]);
         terms.extend(one(&star));
         terms.extend(two(&star, &time));
-        if let Some(slots) = own_slots(data) {
-            terms.extend(one(&(Variable::Slot(slots), [0.0, 1.0])));
-        }
+    }
+    if let Some(slots) = own_slots(data) {
+        terms.extend(one(&(Variable::Slot(slots), [0.0, 1.0])));
     }
     let mut scalars = vec![&time, &mag, &colour];
     if channels.len() <= MOST_CHANNELS {

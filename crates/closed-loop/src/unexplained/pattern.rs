@@ -56,7 +56,7 @@ const REFINED: usize = 6;
 /// Chances of a top for each independent wave vector.
 const CHANCES: f64 = 8.0;
 /// Waves fewer than this times the distortion's order across the detector are its own.
-const ORDERS: f64 = 1.0;
+const ORDERS: f64 = 0.5;
 /// The order where none is declared.
 const USUAL_ORDER: u32 = 7;
 /// Cycles over the extent within which a wave is one of pixel phase.
