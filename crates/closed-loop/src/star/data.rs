@@ -509,15 +509,20 @@ impl StarData {
         }
     }
 
-    /// Moves the modelled positions to projection + what `residual` was modelled by (the fitted
-    /// misalignment, distortion and directions), and evaluates the declared centroid error where the
+    /// Moves the modelled positions to projection + what the residuals `inside` were modelled by (misalignment,
+    /// distortion and directions as all data have them), and evaluates the declared centroid error where the
     /// light fell.
     /// Takes its change out of `residual`; returns the sum of its squares, arcsec^2.
-    pub(crate) fn move_modelled(&mut self, residual: &mut Residuals, phase: &CentroidError) -> f64 {
+    pub(crate) fn move_modelled(
+        &mut self,
+        inside: &Residuals,
+        residual: &mut Residuals,
+        phase: &CentroidError,
+    ) -> f64 {
         let scale = self.camera.arcsec_per_px();
         let known = self.phase_error.clone();
-        self.light = Light::of(self, [&residual.axes[0], &residual.axes[1]]);
-        self.modelled = self.shifted(&residual.modelled);
+        self.light = Light::of(self, [&inside.axes[0], &inside.axes[1]]);
+        self.modelled = self.shifted(&inside.modelled);
         self.update_phase(phase);
         let mut squares = 0.0;
         for axis in 0..2 {

@@ -150,6 +150,76 @@ impl<'a> StarEvidence<'a> {
     fn residual(&self, fold: usize) -> &[Vec<f64>; 2] {
         &self.residuals[if self.residuals.len() == 1 { 0 } else { fold }]
     }
+
+    /// As [`Evidence::residuals`], of several amplitudes in one pass.
+    pub(crate) fn residuals_of<const N: usize>(
+        &self,
+        folds: &Folds,
+        candidates: &[&dyn Candidate],
+        amplitudes: [&Amplitudes; N],
+    ) -> [Residuals; N] {
+        let data = self.data;
+        let all = self.all(candidates);
+        let columns = StarColumns {
+            residuals: &[],
+            ..self.columns(&all)
+        };
+        let layout = columns.layout();
+        let rows = data.t_s.len();
+        let mut out = amplitudes.map(|_| Residuals {
+            axes: vec![vec![0.0; rows]; 2],
+            modelled: vec![vec![0.0; rows]; 2],
+        });
+        let whole: Vec<[DVector<f64>; N]> = (0..folds.count)
+            .map(|f| {
+                amplitudes.map(|a| {
+                    let (nuisance, candidate) = (&a.nuisance[f], &a.candidates[f]);
+                    DVector::from_iterator(
+                        nuisance.len() + candidate.len(),
+                        nuisance.iter().chain(candidate.iter()).copied(),
+                    )
+                })
+            })
+            .collect();
+        let chunks: Vec<_> = folds
+            .fold_ranges()
+            .into_iter()
+            .enumerate()
+            .flat_map(|(fold, frames)| {
+                let end = frames.end;
+                frames
+                    .step_by(CHUNK_FRAMES)
+                    .map(move |at| (fold, at..(at + CHUNK_FRAMES).min(end)))
+            })
+            .collect();
+        let shift = |filled: &mut Filled, (fold, frames): &(usize, Range<usize>)| {
+            columns.fill(frames.clone(), &layout, filled);
+            let each = whole[*fold].each_ref();
+            each.map(|whole| columns.shift(frames.clone(), &layout, filled, whole))
+        };
+        // some at a time: all would be as large again as what comes of them
+        let shifts = chunks.chunks(SHIFTED).flat_map(|some| {
+            let shifts = some.par_iter().map_init(Filled::default, shift);
+            shifts.collect::<Vec<[[DVector<f64>; 2]; N]>>()
+        });
+        for ((fold, frames), shifts) in chunks.iter().zip(shifts) {
+            let first = data.frames.first_row[frames.start];
+            for (out, shift) in out.iter_mut().zip(shifts) {
+                for axis in 0..2 {
+                    for (i, s) in shift[axis].iter().enumerate() {
+                        out.modelled[axis][first + i] = *s;
+                        out.axes[axis][first + i] = self.residual(*fold)[axis][first + i] - s;
+                    }
+                }
+                if data.free_attitude {
+                    for frame in frames.clone() {
+                        remove_attitude(data, frame, &mut out.axes);
+                    }
+                }
+            }
+        }
+        out
+    }
 }
 
 impl Evidence for StarEvidence<'_> {
@@ -189,61 +259,7 @@ impl Evidence for StarEvidence<'_> {
         candidates: &[&dyn Candidate],
         amplitudes: &Amplitudes,
     ) -> Residuals {
-        let data = self.data;
-        let all = self.all(candidates);
-        let columns = StarColumns {
-            residuals: &[],
-            ..self.columns(&all)
-        };
-        let layout = columns.layout();
-        let rows = data.t_s.len();
-        let mut out = Residuals {
-            axes: vec![vec![0.0; rows]; 2],
-            modelled: vec![vec![0.0; rows]; 2],
-        };
-        let whole: Vec<DVector<f64>> = (0..folds.count)
-            .map(|f| {
-                let (nuisance, candidate) = (&amplitudes.nuisance[f], &amplitudes.candidates[f]);
-                DVector::from_iterator(
-                    nuisance.len() + candidate.len(),
-                    nuisance.iter().chain(candidate.iter()).copied(),
-                )
-            })
-            .collect();
-        let chunks: Vec<_> = folds
-            .fold_ranges()
-            .into_iter()
-            .enumerate()
-            .flat_map(|(fold, frames)| {
-                let end = frames.end;
-                frames
-                    .step_by(CHUNK_FRAMES)
-                    .map(move |at| (fold, at..(at + CHUNK_FRAMES).min(end)))
-            })
-            .collect();
-        let shift = |filled: &mut Filled, (fold, frames): &(usize, Range<usize>)| {
-            columns.fill(frames.clone(), &layout, filled);
-            columns.shift(frames.clone(), &layout, filled, &whole[*fold])
-        };
-        // some at a time: all would be as large again as what comes of them
-        let shifts = chunks.chunks(SHIFTED).flat_map(|some| {
-            let shifts = some.par_iter().map_init(Filled::default, shift);
-            shifts.collect::<Vec<[DVector<f64>; 2]>>()
-        });
-        for ((fold, frames), shift) in chunks.iter().zip(shifts) {
-            let first = data.frames.first_row[frames.start];
-            for axis in 0..2 {
-                for (i, s) in shift[axis].iter().enumerate() {
-                    out.modelled[axis][first + i] = *s;
-                    out.axes[axis][first + i] = self.residual(*fold)[axis][first + i] - s;
-                }
-            }
-            if data.free_attitude {
-                for frame in frames.clone() {
-                    remove_attitude(data, frame, &mut out.axes);
-                }
-            }
-        }
+        let [out] = self.residuals_of(folds, candidates, [amplitudes]);
         out
     }
 

@@ -14,7 +14,7 @@ use crate::causes::commonness::Slow;
 use crate::causes::description::{self, Described};
 use crate::close::Closed;
 use crate::error::CloseError;
-use crate::evidence::{Evidence, Residuals};
+use crate::evidence::{Amplitudes, Evidence, Residuals};
 use crate::figures;
 use crate::image_level::{self, ImageLevel};
 use crate::noise_effects;
@@ -65,13 +65,30 @@ impl Finish<'_> {
             .residuals(self.folds, &only.candidates, &amplitudes))
     }
 
-    /// What the nuisance shifts each row by beside the chosen effects, arcsec.
-    pub(crate) fn fitted(&self) -> Result<Vec<Vec<f64>>, CloseError> {
+    /// What the nuisance shifts each row by beside the chosen effects, and what both do, as all data have them,
+    /// arcsec.
+    pub(crate) fn modelled(&self) -> Result<[Vec<Vec<f64>>; 2], CloseError> {
         let chosen = &self.found.selection.chosen;
-        let none = |_: &_| DVector::zeros(0);
-        let amplitudes = amplitudes_as(&self.found.fitted, self.folds, chosen, none)
-            .ok_or(CloseError::Singular)?;
-        Ok(self.level.residuals(self.folds, &[], &amplitudes).modelled)
+        let fits = &self.found.fitted.fits;
+        let set = columns_of(&self.found.fitted.groups, chosen);
+        let only = self.found.only(chosen);
+        let beta = match set.is_empty() {
+            true => DVector::zeros(0),
+            false => fits.estimate(&set).ok_or(CloseError::Singular)?.value,
+        };
+        let count = self.folds.count;
+        let whole = Amplitudes {
+            nuisance: vec![fits.nuisance(None, &set, &beta); count],
+            candidates: vec![only.spread(&beta); count],
+        };
+        let mut fitted = whole.clone();
+        for candidate in &mut fitted.candidates {
+            candidate.fill(0.0);
+        }
+        let both = self
+            .level
+            .residuals_of(self.folds, &only.candidates, [&fitted, &whole]);
+        Ok(both.map(|r| r.modelled))
     }
 
     fn power(&self, residual: &Residuals) -> f64 {

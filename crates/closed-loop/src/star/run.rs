@@ -296,7 +296,10 @@ fn explain(
     };
     let after = whole.residuals(&searched.found.selection.chosen)?;
     if !last && formed.is_none() && data.lands_elsewhere(&after.modelled) {
-        return Ok(Explained::Elsewhere([whole.fitted()?, after.modelled]));
+        let modelled = whole.modelled()?;
+        if data.lands_elsewhere(&modelled[1]) {
+            return Ok(Explained::Elsewhere(modelled));
+        }
     }
     progress("figures");
     Ok(Explained::Closed(Box::new(finish(&whole, after, inside)?)))

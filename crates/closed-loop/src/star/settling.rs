@@ -10,16 +10,17 @@ use block_regression::Folds;
 
 use crate::declared;
 use crate::error::CloseError;
-use crate::evidence::{Evidence, Residuals};
+use crate::evidence::{Amplitudes, Residuals};
 use crate::search::{amplitudes, fit};
 use crate::situation::Situation;
 use crate::star::data::StarData;
 use crate::star::evidence::StarEvidence;
 use nalgebra::DVector;
 
-/// Fits of the declared unknowns, each at better modelled positions: at most, and at least.
-const SETTLING_ROUNDS: usize = 4;
-const LEAST_ROUNDS: usize = 2;
+/// Fits of the declared unknowns, each at better modelled positions: at most, and at least, where frames have
+/// attitudes of their own too.
+const MOST_ROUNDS: usize = 12;
+const LEAST_ROUNDS: [usize; 2] = [2, 4];
 /// Most projections: from a degree two do, each leaves the square of the last.
 const TURNS: usize = 8;
 
@@ -41,23 +42,25 @@ pub(crate) fn settle(
     folds: &Folds,
 ) -> Result<Settled, CloseError> {
     let (mut round, mut turns) = (0, 0);
+    let least = LEAST_ROUNDS[usize::from(data.free_attitude)];
+    let mut last = f64::INFINITY;
     loop {
-        let (mut before, loglik, variance, misalignment) = {
+        let (mut before, inside, loglik, variance, misalignment) = {
             let evidence = StarEvidence::new(data, situation, vec![data.measured_residual()], None);
             let fitted = fit(&evidence, folds, &[])?;
             let amplitudes = amplitudes(&fitted, folds, &[], 0).ok_or(CloseError::Singular)?;
+            let none = DVector::zeros(0);
+            let whole = fitted.fits.nuisance(None, &[], &none);
+            let misalignment = evidence.nuisance.misalignment_of(&whole);
+            let inside = Amplitudes {
+                nuisance: vec![whole; folds.count],
+                candidates: vec![none; folds.count],
+            };
             let loglik = fitted.fits.out_of_fold(&[]).map(|o| o.data_loglik());
             let variance = fitted.fits.variance(&[]).unwrap_or(0.0);
-            (
-                evidence.residuals(folds, &[], &amplitudes),
-                loglik,
-                variance,
-                evidence.nuisance.misalignment_of(&fitted.fits.nuisance(
-                    None,
-                    &[],
-                    &DVector::zeros(0),
-                )),
-            )
+            // where other folds have no stars they know little of the distortion, and so of where the light fell
+            let [before, inside] = evidence.residuals_of(folds, &[], [&amplitudes, &inside]);
+            (before, inside, loglik, variance, misalignment)
         };
         if let Some((theta, reference)) = misalignment.zip(situation.reference.as_ref())
             && turns < TURNS
@@ -65,30 +68,25 @@ pub(crate) fn settle(
             let effects = declared::effects(situation)?;
             if data.project_through(theta, variance, reference, &effects) {
                 // beside the misalignment the distortion is what it was
-                data.move_modelled(&mut before, phase);
+                data.move_modelled(&inside, &mut before, phase);
                 turns += 1;
                 continue;
             }
         }
         let added = data.mark_outliers(&before.axes);
         round += 1;
-        if round >= SETTLING_ROUNDS && (added == 0 || round > 3 * SETTLING_ROUNDS) {
-            let loglik = loglik.filter(|_| added == 0);
-            return Ok(Settled {
-                before,
-                loglik,
-                phase_error: None,
-            });
-        }
         if data.free_attitude {
-            data.turn_frames(&before.modelled);
+            data.turn_frames(&inside.modelled);
         }
-        let moved = data.move_modelled(&mut before, phase);
-        // all rows together by less than the noise of one: another fit would move them by a hundredth of that
-        if round >= LEAST_ROUNDS && added == 0 && !data.free_attitude && moved < variance {
+        let moved = data.move_modelled(&inside, &mut before, phase);
+        // steep centroid errors move where they are evaluated: each round leaves a share of what the one before
+        // did, and what is left of all rows together is less than the noise of one
+        let settled = moved * (moved / last).min(1.0) < variance;
+        last = moved;
+        if round >= least && added == 0 && settled || round >= MOST_ROUNDS {
             return Ok(Settled {
                 before,
-                loglik,
+                loglik: loglik.filter(|_| added == 0),
                 phase_error: None,
             });
         }
