@@ -1,12 +1,13 @@
 //! Stars as the measurement: centroids against catalogue and reference, or against themselves.
 //!
 //! ```text
-//! run             the order of the steps, from bundle to report
+//! run, finish     the order of the steps, from bundle to what is found, and to the report
 //! data            centroids beside what the declared model says of them
 //! directions      directions and attitudes from the centroids alone, where nothing else tells them
 //! misalignment    the rotation between camera and reference, taken exactly
 //! frame_rotation  the rotation that the stars of a frame agree on
 //! light           where the light of each star fell, better than its reference says
+//! outliers        rows that stand out
 //! nuisance        what the declared model leaves unknown, as columns with priors
 //! changes         what residuals change by from frame to frame
 //! weights         how much each star counts
@@ -15,6 +16,7 @@
 //! moments         their products, in one pass, for every fit at every noise
 //! evidence        data, noise and products as what the search asks of a measurement
 //! settling        the declared model at its best, and the outliers beside it
+//! steadied        the reference's path less its slow error
 //! search          the search where the reference itself may err
 //! pointed         which of many stars and pixels the residual points at
 //! reference_wander, own_attitude    two things to tell beside the effects
@@ -35,6 +37,7 @@ mod light;
 mod misalignment;
 mod moments;
 pub(crate) mod nuisance;
+mod outliers;
 mod own_attitude;
 mod pointed;
 mod reference_noise;

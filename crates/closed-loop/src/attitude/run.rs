@@ -40,6 +40,9 @@ use telemetry::report::{Dependence, Errors, Report, Rows, Unattributed};
 /// likelihood hardly sees, is not worth a word.
 const SLOW_SHARE: f64 = 0.1;
 const SLOW_GAIN: f64 = 20.0;
+/// A slow error of so many times the declared is as declared: over a few correlation times its size is known to
+/// a half.
+const WIDER: f64 = 2.0;
 /// Fewest frames from which an effect and its noise can both be had.
 const MIN_FRAMES: usize = 20;
 
@@ -452,10 +455,11 @@ fn finish(
         let own: f64 = changes.slow_arcsec.iter().map(|s| s * s).sum();
         unattributed.present &= unattributed.variance_fraction.unwrap_or(0.0) * whole > own;
     }
-    if situation.model.hem.is_none() {
-        let declared = changes.map_or([0.0; 3], |c| c.slow_arcsec);
-        slow_leftover(data, &plain, declared, &mut unattributed, last / whole);
-    }
+    let declared = match &situation.model.hem {
+        Some(hem) => [&hem.x, &hem.y, &hem.z].map(|axis| WIDER * axis.sigma_hsf_arcsec),
+        None => changes.map_or([0.0; 3], |c| c.slow_arcsec),
+    };
+    slow_leftover(data, &plain, declared, &mut unattributed, last / whole);
     let series = series.unwrap_or_else(|| tracks(data, &plain, changes));
     series.describe().tell(&mut unattributed);
     let errors = |r: &Residuals| Errors {

@@ -40,9 +40,6 @@ use crate::star::directions;
 use crate::star::frame_rotation::{rotation_of, rotation_row};
 use crate::star::light::Light;
 
-/// A star with fewer rows has no scatter of its own: the median deviation of so many
-/// is uncertain by a quarter.
-const FEW_ROWS: usize = 10;
 /// A star that moves by less of the detector's width than this is where it was, to
 /// a declared distortion of the usual order.
 const NEAR_SHARE: f64 = 1.0 / 16.0;
@@ -165,44 +162,6 @@ impl StarData {
         data.log_flux = data.fluxes();
         data.frames.flux = None;
         data
-    }
-
-    /// Marks rows that stand out of `axes`, residuals of every row, and says how many.
-    ///
-    /// A row is held against the rows of its star, or of all stars that have too few for
-    /// a scatter of their own (snapshots of the sky hardly see a star twice). Where a
-    /// frame's attitude comes from its own stars, one that was mistaken for another pulls
-    /// all others off as well: of such a frame only the worst goes at a time.
-    pub(crate) fn mark_outliers(&mut self, axes: &[Vec<f64>]) -> usize {
-        let mut rows = vec![0_usize; self.stars.len()];
-        for &s in &self.star {
-            rows[s] += 1;
-        }
-        let few = self.stars.len();
-        let of = |&s: &usize| if rows[s] < FEW_ROWS { few } else { s };
-        let group: Vec<usize> = self.star.iter().map(of).collect();
-        let mut marked = self.outlier.clone();
-        for axis in axes {
-            robust::mark_outliers(axis, &group, few + 1, &mut marked);
-        }
-        let size = |r: usize| axes.iter().map(|a| a[r] * a[r]).sum::<f64>();
-        let mut added = 0;
-        for frame in 0..self.frames.frames() {
-            let rows = self.frames.rows_of(frame);
-            let mut new: Vec<usize> = rows.filter(|&r| marked[r] && !self.outlier[r]).collect();
-            if self.free_attitude {
-                let worst = new
-                    .iter()
-                    .copied()
-                    .max_by(|&a, &b| size(a).total_cmp(&size(b)));
-                new = worst.into_iter().collect();
-            }
-            added += new.len();
-            for r in new {
-                self.outlier[r] = true;
-            }
-        }
-        added
     }
 
     /// Whether each frame is a picture of its own: its attitude is free, and hardly a

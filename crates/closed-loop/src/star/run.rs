@@ -82,7 +82,7 @@ pub(crate) fn run(
         let closed = trace(&mut data, situation, &phase, &folds, progress)?;
         // a star mistaken for another hides in the residual of a lens that nobody calibrated
         let left = closed.stars.as_ref().filter(|_| unrelated);
-        if left.is_none_or(|s| data.mark_outliers(&s.after_arcsec) == 0) {
+        if left.is_none_or(|s| data.mark_outliers(&[&s.after_arcsec]) == 0) {
             return Ok(closed);
         }
     }

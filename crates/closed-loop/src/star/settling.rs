@@ -73,7 +73,7 @@ pub(crate) fn settle(
                 continue;
             }
         }
-        let added = data.mark_outliers(&before.axes);
+        let added = data.mark_outliers(&[&before.axes, &inside.axes]);
         round += 1;
         if data.free_attitude {
             data.turn_frames(&inside.modelled);

@@ -1,0 +1,64 @@
+//! Rows that stand out: particle hits, stars mistaken for others.
+//!
+//! ```text
+//! |r - median| > 8 (1.4826 MAD)      of its star, or of all stars that have few rows
+//! ```
+//!
+//! Source: formats.md of the design notes (outliers); [`spectra::robust`].
+
+use spectra::robust;
+
+use crate::star::data::StarData;
+
+/// A star with fewer rows has no scatter of its own: the median deviation of so many
+/// is uncertain by a quarter.
+const FEW_ROWS: usize = 10;
+
+impl StarData {
+    /// Marks rows that stand out of each of `residuals`, of every row, and says how many: out of what other folds
+    /// predict alone sound rows do too, where these know nothing of the distortion.
+    ///
+    /// A row is held against the rows of its star, or of all stars that have too few for
+    /// a scatter of their own (snapshots of the sky hardly see a star twice). Where a
+    /// frame's attitude comes from its own stars, one that was mistaken for another pulls
+    /// all others off as well: of such a frame only the worst goes at a time.
+    pub(crate) fn mark_outliers(&mut self, residuals: &[&[Vec<f64>]]) -> usize {
+        let mut rows = vec![0_usize; self.stars.len()];
+        for &s in &self.star {
+            rows[s] += 1;
+        }
+        let few = self.stars.len();
+        let of = |&s: &usize| if rows[s] < FEW_ROWS { few } else { s };
+        let group: Vec<usize> = self.star.iter().map(of).collect();
+        let marked: Vec<Vec<bool>> = residuals
+            .iter()
+            .map(|axes| {
+                let mut marked = self.outlier.clone();
+                for axis in *axes {
+                    robust::mark_outliers(axis, &group, few + 1, &mut marked);
+                }
+                marked
+            })
+            .collect();
+        let stands_out = |r: usize| marked.iter().all(|marked| marked[r]);
+        let size = |r: usize| residuals[0].iter().map(|a| a[r] * a[r]).sum::<f64>();
+        let mut added = 0;
+        for frame in 0..self.frames.frames() {
+            let rows = self.frames.rows_of(frame);
+            let new = rows.filter(|&r| !self.outlier[r] && stands_out(r));
+            let mut new: Vec<usize> = new.collect();
+            if self.free_attitude {
+                let worst = new
+                    .iter()
+                    .copied()
+                    .max_by(|&a, &b| size(a).total_cmp(&size(b)));
+                new = worst.into_iter().collect();
+            }
+            added += new.len();
+            for r in new {
+                self.outlier[r] = true;
+            }
+        }
+        added
+    }
+}
