@@ -459,7 +459,10 @@ fn finish(
         Some(hem) => [&hem.x, &hem.y, &hem.z].map(|axis| WIDER * axis.sigma_hsf_arcsec),
         None => changes.map_or([0.0; 3], |c| c.slow_arcsec),
     };
-    slow_leftover(data, &plain, declared, &mut unattributed, last / whole);
+    // what acts in one fold alone is predicted by no other, and would be slow noise out of fold
+    let inside = in_sample(&evidence, data.t_s.len(), found);
+    let left = inside.as_ref().unwrap_or(&plain);
+    slow_leftover(data, left, declared, &mut unattributed, last / whole);
     let series = series.unwrap_or_else(|| tracks(data, &plain, changes));
     series.describe().tell(&mut unattributed);
     let errors = |r: &Residuals| Errors {

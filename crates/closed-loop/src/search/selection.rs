@@ -100,8 +100,8 @@ impl Judgement {
 
 /// How many of those that white noise would let stand are tried two by two.
 const HIDDEN: usize = 6;
-/// How many are tried beside another form of what was chosen.
-const BESIDE: usize = 12;
+/// How many sets with other forms of what was chosen are judged, of those that fit better.
+const BETTER: usize = 24;
 /// How often forms are exchanged, and what that has to be worth, nats.
 const EXCHANGES: usize = 4;
 const WORTH_IT: f64 = 0.5;
@@ -254,55 +254,61 @@ impl Trials<'_> {
     /// `chosen` with one of them in another form, and perhaps one more, where that gains more after its price
     /// and each stands beside the others; the best of these.
     fn exchanged(&self, may: &[bool], chosen: &[usize]) -> Option<Vec<usize>> {
-        let family = |g: usize| &self.groups[g].family;
-        let forms = |g: usize| {
-            let all = 0..self.groups.len();
-            all.filter(move |&c| c != g && may[c] && family(c) == family(g))
-        };
-        let now = self.worth(chosen)? + WORTH_IT;
-        let mut better: Vec<(f64, Vec<usize>)> = Vec::new();
+        let groups = self.groups;
+        let open = |g: &usize| may[*g] && !groups[*g].columns.is_empty();
+        let all: Vec<usize> = (0..groups.len()).filter(open).collect();
+        let family = |g: usize| groups[g].family.as_str();
+        let mut swapped: Vec<Vec<usize>> = Vec::new();
         for (at, &g) in chosen.iter().enumerate() {
-            let rest: Vec<usize> = chosen.iter().copied().filter(|&c| c != g).collect();
-            let others = forms(g).next().map(|_| self.tried(may, &rest));
-            let others: Vec<usize> = others
-                .into_iter()
-                .flatten()
-                .map(|t| t.group)
-                .filter(|&h| family(h) != family(g))
-                .take(BESIDE)
-                .collect();
-            let each: Vec<_> = forms(g).collect();
-            better.par_extend(each.into_par_iter().flat_map_iter(|form| {
-                let mut swapped = chosen.to_vec();
-                swapped[at] = form;
-                let more = others.iter().map(|&h| {
-                    let mut set = swapped.clone();
-                    set.push(h);
-                    set
-                });
-                let sets = std::iter::once(swapped.clone()).chain(more);
-                let worth = sets.filter_map(|set| Some((self.worth(&set)?, set)));
-                worth.filter(|(worth, _)| *worth > now).collect::<Vec<_>>()
+            let forms = all.iter().filter(|&&c| c != g && family(c) == family(g));
+            swapped.extend(forms.map(|&form| {
+                let mut set = chosen.to_vec();
+                set[at] = form;
+                set
             }));
         }
+        // in sample first, which costs little
+        let now = self.fit(chosen)?;
+        let mut better: Vec<(f64, Vec<usize>)> = swapped
+            .into_par_iter()
+            .flat_map_iter(|set| {
+                let other = |h: &&usize| set.iter().all(|&c| family(c) != family(**h));
+                let more = all.iter().filter(other).map(|&h| [&set[..], &[h]].concat());
+                let sets = std::iter::once(set.clone()).chain(more);
+                let fits = sets.filter_map(|set| Some((self.fit(&set)?, set)));
+                fits.filter(|(fit, _)| *fit > now + WORTH_IT)
+                    .collect::<Vec<_>>()
+            })
+            .collect();
         better.sort_by(|a, b| b.0.total_cmp(&a.0));
+        better.truncate(BETTER);
+        let now = self.worth(chosen)? + WORTH_IT;
         let stands = |set: &[usize]| {
             let stands = |&g: &usize| self.within(set, g).is_some_and(|j| j.stands());
             set.iter().all(stands)
         };
         better
             .into_iter()
+            .filter_map(|(_, set)| Some((self.worth(&set)?, set)))
+            .filter(|(worth, set)| *worth > now && stands(set))
+            .max_by(|a, b| a.0.total_cmp(&b.0))
             .map(|(_, set)| set)
-            .find(|set| stands(set))
+    }
+
+    /// Log-likelihood in sample less the price of all parameters and choices, up to a constant.
+    fn fit(&self, set: &[usize]) -> Option<f64> {
+        let variance = self.fits.variance(&columns_of(self.groups, set))?;
+        Some(-0.5 * self.scalars * variance.ln() - self.paid(set))
+    }
+
+    fn paid(&self, set: &[usize]) -> f64 {
+        let each = set.iter().map(|&g| price(&self.groups[g], self.scalars));
+        each.sum()
     }
 
     /// Log-likelihood out of fold less the price of all parameters and choices.
     fn worth(&self, set: &[usize]) -> Option<f64> {
-        let paid: f64 = set
-            .iter()
-            .map(|&g| price(&self.groups[g], self.scalars))
-            .sum();
-        Some(self.out_of_fold(set)?.total_loglik() - paid)
+        Some(self.out_of_fold(set)?.total_loglik() - self.paid(set))
     }
 
     /// Standing of every group beside (for a chosen one: within) `chosen`.
@@ -495,5 +501,70 @@ mod tests {
         };
         assert_eq!(chosen(12.0 / (rows as f64).sqrt()).len(), 2);
         assert_eq!(chosen(0.0), Vec::<usize>::new());
+    }
+
+    /// A step at 0.8 of the run on a ramp that falls by 1.5 times as much: nine steps, a ramp, and what is measured.
+    struct OnARamp(DMatrix<f64>);
+
+    impl OnARamp {
+        fn new(seed: u64) -> Self {
+            let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+            let mut out = DMatrix::zeros(1000, 11);
+            for k in 0..1000 {
+                let t = (k as f64 + 0.5) / 1000.0;
+                for form in 1..10 {
+                    let at = form as f64 / 10.0;
+                    out[(k, form - 1)] = f64::from(u8::from(t >= at)) - (1.0 - at);
+                }
+                out[(k, 9)] = t - 0.5;
+                let noise: f64 = StandardNormal.sample(&mut rng);
+                out[(k, 10)] = out[(k, 7)] - 1.5 * out[(k, 9)] + 0.7 * noise;
+            }
+            Self(out)
+        }
+    }
+
+    impl Design for OnARamp {
+        fn width(&self) -> usize {
+            11
+        }
+        fn fill(&self, frames: Range<usize>, out: &mut DMatrix<f64>) -> usize {
+            *out = self.0.rows(frames.start, frames.len()).into_owned();
+            frames.len()
+        }
+    }
+
+    /// The best single step is that at 0.3, which takes 92 of 219 in chi-squared, and beside it the ramp takes 1;
+    /// with that at 0.8 all are taken, and in nearly all draws of the noise the search ends there.
+    #[test]
+    fn another_form_beside_another_effect_is_found() {
+        let folds = Folds::cut(1000);
+        let layout = Layout {
+            nuisance_precision: DMatrix::zeros(0, 0),
+            candidates: 10,
+            residuals: 1,
+        };
+        let mut groups: Vec<Group> = (0..10).map(|_| group("step", 1)).collect();
+        groups[9] = group("ramp", 1);
+        for (column, group) in groups.iter_mut().enumerate() {
+            group.columns = vec![column];
+            group.bounds = vec![[-9.0, 9.0]];
+        }
+        let found = (0..10).filter(|&seed| {
+            let grams = BlockGrams::accumulate(&OnARamp::new(seed), &folds);
+            let fits = Fits::new(&grams, &folds, &layout, 1.0).unwrap();
+            let trials = Trials {
+                fits: &fits,
+                groups: &groups,
+                cost: &costs(&groups, &[true; 10]),
+                scalars: 1000.0,
+            };
+            let first = &trials.tried(&[true; 10], &[])[0];
+            assert!(first.group < 5, "{seed}: step {}", first.group);
+            let mut chosen = trials.select(&[true; 10]).chosen;
+            chosen.sort_unstable();
+            chosen == [7, 9]
+        });
+        assert!(found.count() >= 8);
     }
 }
