@@ -242,13 +242,15 @@ pub(crate) fn run<'a>(
             kept.extend(keep(&found, g, change));
             continue;
         }
-        let small = remainders(&described, &found);
+        let least = next_to_nothing(&described);
+        let small = chosen_that(&found, |gains| gains < least);
         if !last && refuse(&mut refused, small, Refusal::Remainder) {
             continue;
         }
+        // nor without the description, which is not in the model
         let found = judged_alone(found, &mut refused);
-        let worse = worse(&found);
-        if !last && refuse(&mut refused, worse, Refusal::Remainder) {
+        let small = chosen_that(&found, |gains| gains <= least);
+        if !last && refuse(&mut refused, small, Refusal::Remainder) {
             continue;
         }
         let searched = Searched {
@@ -333,20 +335,14 @@ fn best_beside(found: &Found, may: &[bool]) -> f64 {
     open.map(|(_, (j, _))| j.delta_loglik).fold(0.0, f64::max)
 }
 
-/// Families of chosen effects that gain next to nothing beside a description of what no effect
-/// explains: what such a description leaves is fitted by anything.
-fn remainders(described: &Described, found: &Found) -> Vec<String> {
+/// Nats that are next to nothing beside what no effect explains: what a description leaves of it is fitted by
+/// anything.
+fn next_to_nothing(described: &Described) -> f64 {
     let set = columns_of(&described.fitted.groups, &described.chosen);
     let alone = described.fitted.fits.out_of_fold(&set);
     let gain = describe(described, &set).zip(alone);
     let gain = gain.map_or(0.0, |((worth, _), alone)| worth - alone.total_loglik());
-    chosen_that(found, |gains| gains < REMAINDER * gain)
-}
-
-/// Families of chosen effects with which the model predicts worse than without: they stand beside a
-/// description alone, which is not in it.
-fn worse(found: &Found) -> Vec<String> {
-    chosen_that(found, |gains| gains <= 0.0)
+    REMAINDER * gain.max(0.0)
 }
 
 /// Families of the chosen effects of whose gains, nats, this holds.

@@ -279,15 +279,20 @@ fn slow_leftover(
 ) {
     let (mut slow, mut whole, mut gain, mut most) = (0.0, 0.0, 0.0, 0.0_f64);
     for axis in 0..3 {
-        let means = data.binned(axis, &after.axes[axis]);
-        let noise = Coloured::fit(&data.bins.t_s, &means, &data.count[axis]);
+        let mut means = data.binned(axis, &after.axes[axis]);
+        let count = &data.count[axis];
+        let sum: f64 = means.iter().zip(count).map(|(v, n)| v * n).sum();
+        let mean = sum / count.iter().sum::<f64>().max(1.0);
+        means.iter_mut().for_each(|v| *v -= mean);
+        let noise = Coloured::fit(&data.bins.t_s, &means, count);
         let white = Coloured {
             slow: 0.0,
             white: noise.white.hypot(noise.slow),
             ..noise
         };
-        let loglik = |n: &Coloured| n.log_likelihood(&data.bins.t_s, &means, &data.count[axis]);
-        let square = figures::rms(&after.axes[axis], &data.outlier[axis]).map_or(0.0, |r| r * r);
+        let loglik = |n: &Coloured| n.log_likelihood(&data.bins.t_s, &means, count);
+        let square = figures::rms(&after.axes[axis], &data.outlier[axis])
+            .map_or(0.0, |r| (r * r - mean * mean).max(f64::MIN_POSITIVE));
         whole += square;
         // what the declared model makes by itself is not left over
         if noise.slow > declared[axis] {
