@@ -463,6 +463,19 @@ mod tests {
         let mut left: Vec<[f64; 2]> = (0..stars * rows)
             .map(|_| [(); 2].map(|()| StandardNormal.sample(rng)))
             .collect();
+        // in sigmas as neighbours' differences tell them
+        for own in &rows_of {
+            let change = |w: &[usize]| -> f64 {
+                (0..2)
+                    .map(|a| (left[w[1]][a] - left[w[0]][a]).powi(2))
+                    .sum()
+            };
+            let squares: f64 = own.windows(2).map(change).sum();
+            let sigma = (0.25 * squares / (rows - 1) as f64).sqrt();
+            for &r in own {
+                left[r] = left[r].map(|v| v / sigma);
+            }
+        }
         let freedom = vec![2.0; left.len()];
         normalised(&mut left, &rows_of, &freedom);
         let each: Vec<Products> = rows_of
