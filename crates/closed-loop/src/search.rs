@@ -21,6 +21,7 @@ use selection::{Group, Selection, Trials, columns_of, costs};
 
 pub(crate) mod empirical;
 pub(crate) mod instants;
+pub(crate) mod orbits;
 pub(crate) mod refusal;
 pub(crate) mod selection;
 
@@ -161,6 +162,7 @@ fn grouped(fits: &Fits, candidates: &[&dyn Candidate]) -> Vec<Group> {
             bounds,
             choices: candidate.choices(),
             shapes: candidate.nonlinear().len(),
+            slopes: candidate.slopes(),
             family: family(*candidate),
             kind: candidate.id(),
             stands_for: candidate.stands_for(),
@@ -203,6 +205,12 @@ pub(crate) struct Found {
 }
 
 impl Found {
+    /// What was chosen.
+    pub(crate) fn chosen(&self) -> impl Iterator<Item = &dyn Candidate> {
+        let chosen = self.selection.chosen.iter();
+        chosen.map(|&g| self.candidates[g].as_ref())
+    }
+
     /// Whether one of the candidates put forward last, `count` at the end of the list, was chosen.
     pub(crate) fn names_one_of_the_last(&self, count: usize) -> bool {
         let first = self.candidates.len() - count;

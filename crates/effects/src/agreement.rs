@@ -3,13 +3,14 @@
 //! Not physics: tests of the physics in the other files.
 
 use focal_plane::{ARCSEC_PER_RAD, Pixel};
-use nalgebra::{DMatrix, Vector3};
+use nalgebra::{DMatrix, Matrix6, Vector3};
 use star_tracker::{Disturbance, Pbm, TemporalNoise};
 
 use crate::harness::{Bench, Sway, as_given};
 use crate::{
     Candidate, EffectError, FrameGeometry, Parameters, Surroundings, VectorFrame, WarmPixels,
-    build, catalogue, harmonics_of, hot_pixel_at, kind, line_at, reported, step_at,
+    build, catalogue, free_orbit, harmonics_of, hot_pixel_at, kind, line_at, nearest_circle,
+    reported, step_at,
 };
 
 fn candidates(bench: &Bench, id: &str) -> Vec<Box<dyn Candidate>> {
@@ -155,6 +156,26 @@ fn an_uncorrected_tracker_errs_by_boresight_cross_velocity() {
     assert!(left < 0.1 * got, "{left} of {got} rad");
 }
 
+/// An orbit that turns once in 200 s, as a fit without the law of circles would tell it.
+fn circle() -> Box<dyn Candidate> {
+    let (span_s, values) = ([0.0, 120.0], [3000.0, 0.0, 4000.0, 0.0, 5000.0, 0.0].into());
+    nearest_circle(200.0, span_s, &values, &Matrix6::identity(), 1).1
+}
+
+/// The first column of an orbit is all of it, to rounding of positions; of an attitude, as with channels, but for
+/// terms of the field's asymmetry.
+#[test]
+fn an_orbit_moves_stars_as_its_speed_says() {
+    let bench = Bench::with(Sway { amplitude: 1e-4 });
+    let values = [5000.0, 0.0, 0.0, 0.0, 0.0];
+    bench.stars_agree(circle().as_ref(), &values);
+    let [got, left] = bench.attitude_error(circle().as_ref(), &values);
+    assert!(
+        got * ARCSEC_PER_RAD > 2.0 && left < 0.1 * got,
+        "{left} of {got} rad"
+    );
+}
+
 fn frames(vectors_in: VectorFrame, quaternion_signs: Option<[f64; 3]>) -> FrameGeometry {
     let cameras = vectors_in == VectorFrame::Body;
     FrameGeometry {
@@ -216,6 +237,8 @@ fn every_description_builds_the_same_effect_again() {
     all.push(line_at(0.0123, [0.0, 120.0], 1));
     // the phase counts from the middle of data this late
     all.push(line_at(0.0123, [500.0, 620.0], 1));
+    all.push(circle());
+    all.push(free_orbit(200.0, [0.0, 120.0]));
     assert!(all.len() > 60);
     for candidate in all {
         let values = a_third(candidate.as_ref());

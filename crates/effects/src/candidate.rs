@@ -195,6 +195,11 @@ pub trait Candidate: Debug + Send + Sync {
     fn choices(&self) -> usize {
         0
     }
+    /// How many of its coefficients are the slope of a parameter that is otherwise searched (a period, in steps):
+    /// such a one is paid for by the forms that were looked at, as one that is [`nonlinear`](Self::nonlinear) is.
+    fn slopes(&self) -> usize {
+        0
+    }
     /// How many forms of its effect were looked at for each that is proposed, this one among them: a form
     /// that was chosen out of many by this very data has to pay for all of them.
     fn stands_for(&self) -> f64 {

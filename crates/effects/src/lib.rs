@@ -57,4 +57,5 @@ pub use periodic_misalignment::line_at;
 pub use pixel_phase_harmonics::{harmonics_of, left_of_wave};
 pub use scene::{FrameGeometry, Scene, StarFacts, Surroundings, VectorFrame};
 pub use step_misalignment::step_at;
+pub use velocity_aberration::{free_orbit, nearest_circle, orbit_could_show};
 pub use warm_pixels::WarmPixels;

@@ -25,7 +25,7 @@
 //! be given in that frame at all. The candidates are the patterns that differ by more than the sign of
 //! `scale` (a negative estimate turns all signs round) on the axes where the arm lets anything show.
 //!
-//! Without channels, an orbit makes the velocity: circular, of `speed_m_s` and `period_s`, with the
+//! Without channels, an orbit makes the velocity ([`orbit`] for how it enters a residual): circular, of `speed_m_s` and `period_s`, with the
 //! argument of latitude `phase_rad` at t = 0:
 //!
 //! ```text
@@ -34,13 +34,12 @@
 //!
 //! Source: first-order stellar aberration, `focal_plane::aberrated`; derivation above.
 
-use core::f64::consts::TAU;
 use std::collections::BTreeMap;
 
 use focal_plane::{
     AttitudeSource, Camera, Pixel, PointsMut, SPEED_OF_LIGHT_M_S, Series, VectorsMut, aberrated,
 };
-use nalgebra::{Rotation3, Vector3};
+use nalgebra::Vector3;
 use star_tracker::{Disturbance, Stages, StarView};
 
 use crate::candidate::check_columns;
@@ -66,6 +65,11 @@ const CHANNELS: [([&str; 3], f64); 2] = [
     (["vx_km_s", "vy_km_s", "vz_km_s"], 1000.0),
 ];
 
+mod orbit;
+
+use orbit::Orbit;
+pub use orbit::{free_orbit, nearest_circle, orbit_could_show};
+
 /// The kind.
 #[derive(Debug)]
 pub(crate) struct Kind;
@@ -78,7 +82,7 @@ impl EffectKind for Kind {
         "the apparent direction is u + v/c, and nobody corrected it"
     }
     fn needs(&self) -> &'static str {
-        "velocity channels (vx_km_s, vy_km_s, vz_km_s or in m/s), and for an attitude the boresights of [frames]"
+        "velocity channels (vx_km_s, vy_km_s, vz_km_s or in m/s), and for an attitude the boresights of [frames]; or an inertial reference, for an orbit that no channel tells"
     }
     fn acts_on(&self) -> ActsOn {
         ActsOn {
@@ -157,15 +161,6 @@ enum Velocity {
     Orbit(Orbit),
 }
 
-#[derive(Clone, Debug)]
-struct Orbit {
-    speed_m_s: f64,
-    period_s: f64,
-    phase_rad: f64,
-    node_deg: f64,
-    inclination_deg: f64,
-}
-
 impl Velocity {
     fn channels(surroundings: &Surroundings<'_>) -> Option<Self> {
         CHANNELS.into_iter().find_map(|(names, m_s_per_unit)| {
@@ -190,16 +185,7 @@ impl Velocity {
                 let at = || Some(Vector3::new(x.at(t_s)?, y.at(t_s)?, z.at(t_s)?));
                 at().unwrap_or_default() * *m_s_per_unit
             }
-            Self::Orbit(orbit) => {
-                let (sin, cos) = (TAU * t_s / orbit.period_s + orbit.phase_rad).sin_cos();
-                let plane =
-                    Rotation3::from_axis_angle(&Vector3::z_axis(), orbit.node_deg.to_radians())
-                        * Rotation3::from_axis_angle(
-                            &Vector3::x_axis(),
-                            orbit.inclination_deg.to_radians(),
-                        );
-                plane * Vector3::new(-sin, cos, 0.0) * orbit.speed_m_s
-            }
+            Self::Orbit(orbit) => orbit.m_s(t_s),
         }
     }
 }

@@ -22,13 +22,11 @@ use crate::questions::confusion;
 use crate::questions::hypothesis::{self, Grounds};
 use crate::questions::manoeuvre::attitudes::fly;
 use crate::search::empirical::{Empirical, Variable, range};
-use crate::search::instants;
 use crate::search::refusal::Refused;
 use crate::search::selection::columns_of;
 use crate::search::{Found, amplitudes, borrowed, fit};
+use crate::search::{instants, orbits};
 use crate::situation::{Situation, channels_of_interest};
-use crate::unexplained::leftover::jumps::SharedJump;
-use crate::unexplained::leftover::lines::SharedLine;
 use crate::unexplained::leftover::{self, Series};
 use nalgebra::{DVector, UnitQuaternion};
 use spectra::robust::{self, median_step};
@@ -83,12 +81,11 @@ pub(crate) fn run(
     progress("searching for causes");
     let scene = scene(situation, &data);
     let changes = SpatialErrors::declared(situation, &data.t_s);
-    let search = |data: &AttitudeData, line: Option<SharedLine>, jump: Option<SharedJump>| {
+    let search = |data: &AttitudeData, put_forward: &[Arc<dyn Candidate>]| {
         let mut list = catalogue_candidates(&scene);
         list.retain(|c| c.acts_on_attitude());
         list.extend(leftover_terms(situation, data));
-        list.extend(line.map(|line| line.candidate(&scene)));
-        list.extend(jump.map(|jump| jump.candidate(&scene)));
+        list.extend(put_forward.iter().cloned());
         let with_noise = |noise: [Coloured; 3]| evidence(data, situation, noise, motion);
         let (bins, start) = (&data.bins.folds, fit_noise(data, &before));
         let (found, noise, refused) =
@@ -97,18 +94,30 @@ pub(crate) fn run(
         let series = inside.map(|inside| tracks(data, &inside, changes));
         Ok::<_, CloseError>((found, noise, refused, series))
     };
-    let (mut found, mut noise, mut refused, mut series) = search(&data, None, None)?;
+    let (mut found, mut noise, mut refused, mut series) = search(&data, &[])?;
     let line = series.as_ref().and_then(Series::shared_line);
     let jump = series.as_ref().and_then(Series::shared_jump);
-    if line.is_some() || jump.is_some() {
-        progress("searching again with the line or jump that is left");
+    let mut put_forward: Vec<_> = line
+        .map(|line| line.candidate(&scene))
+        .into_iter()
+        .collect();
+    put_forward.extend(jump.map(|jump| jump.candidate(&scene)));
+    let white = fit_noise(&data, &before).map(|n| Coloured {
+        white: n.white.hypot(n.slow),
+        slow: 0.0,
+        ..n
+    });
+    let white = evidence(&data, situation, white, motion);
+    let (bins, surroundings) = (&data.bins.folds, &scene.surroundings);
+    put_forward.extend(orbits::propose(&white, bins, surroundings, &found, 0.0)?);
+    if !put_forward.is_empty() {
+        progress("searching again with the line, jump or orbit that is left");
         if line.is_some_and(|line| !data.bins.resolve(line.frequency_hz)) {
             data.rebin(&folds, leftover::MOST_POINTS);
         }
-        let put_forward = usize::from(line.is_some()) + usize::from(jump.is_some());
-        let again = search(&data, line, jump)?;
+        let again = search(&data, &put_forward)?;
         // what was put forward in vain changes nothing
-        if again.0.names_one_of_the_last(put_forward) {
+        if again.0.names_one_of_the_last(put_forward.len()) {
             (found, noise, refused, series) = again;
         } else {
             data.rebin(&folds, bins::MOST);

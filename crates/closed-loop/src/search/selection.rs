@@ -57,6 +57,8 @@ pub(crate) struct Group {
     pub(crate) choices: usize,
     /// Parameters that the columns follow non-linearly, found by scanning.
     pub(crate) shapes: usize,
+    /// Columns that are slopes of such parameters.
+    pub(crate) slopes: usize,
     /// Groups of one family are forms of one cause: at most one is chosen.
     pub(crate) family: String,
     /// Groups of one kind are one effect, whatever it acts on.
@@ -135,9 +137,10 @@ pub(crate) fn costs(groups: &[Group], may: &[bool]) -> Vec<f64> {
     groups.iter().map(|g| root(g) * all.max(1.0)).collect()
 }
 
-/// What a group pays for its parameters and choices, nats.
+/// What a group pays for its sizes and choices, nats.
 pub(crate) fn price(group: &Group, scalars: f64) -> f64 {
-    (group.columns.len() + group.choices) as f64 * each(scalars)
+    let sizes = group.columns.len().saturating_sub(group.slopes);
+    (sizes + group.choices) as f64 * each(scalars)
 }
 
 /// What a parameter costs, nats.
@@ -407,6 +410,7 @@ mod tests {
             bounds: vec![[0.0, 1.0]; columns],
             choices: 0,
             shapes: 0,
+            slopes: 0,
             family: kind.to_owned(),
             kind,
             stands_for: 1.0,

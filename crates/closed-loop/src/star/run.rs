@@ -7,8 +7,10 @@
 //!
 //! Not physics: the order of the steps.
 
+use std::sync::Arc;
+
 use block_regression::Folds;
-use effects::{Scene, StarFacts, WarmPixels};
+use effects::{Candidate, Scene, StarFacts, WarmPixels};
 use focal_plane::{AttitudeSeries, Points};
 use spectra::robust::median_step;
 
@@ -20,6 +22,7 @@ use crate::error::CloseError;
 use crate::image_level::{self, Side};
 use crate::motion::{self, Around, gyro::with_rates, source};
 use crate::noise_effects;
+use crate::search::orbits;
 use crate::situation::Situation;
 use crate::star::data::{Inputs, Star, StarData};
 use crate::star::evidence::StarEvidence;
@@ -28,7 +31,6 @@ use crate::star::pointed::Pointed;
 use crate::star::search::Searched;
 use crate::star::settling::{Settled, settle};
 use crate::star::steadied::steadied;
-use crate::unexplained::leftover::lines::SharedLine;
 use crate::unexplained::leftover::{self, Series};
 
 /// Fewest frames: every fold needs data to be predicted from.
@@ -218,12 +220,12 @@ fn explain(
     let reference = path.or(situation.reference.as_ref());
     let by_rates = motion.is_some_and(Around::by_rates);
     let accelerates = || by_rates || reference.is_none_or(|r| motion::accelerates(r, arm));
-    let named = |line: Option<SharedLine>| {
+    let named = |put_forward: &[Arc<dyn Candidate>]| {
         let candidates = || {
             let mut list = catalogue_candidates(&scene);
             // With raw windows a warm pixel is the dark map's business.
             list.retain(|c| c.acts_on_stars() && !(formed.is_some() && c.id() == "hot_pixel"));
-            list.extend(line.map(|line| line.candidate(&scene)));
+            list.extend(put_forward.iter().cloned());
             list
         };
         let quest = Quest {
@@ -240,13 +242,26 @@ fn explain(
         let series = Series::of(&leftover::star_tracks(data, &residual, &level.weight));
         Some((residual, series))
     };
-    let mut outcome = named(None)?;
+    let mut outcome = named(&[])?;
     let mut inside = left(&outcome.searched);
-    if let Some(line) = inside.as_ref().and_then(|(_, series)| series.shared_line()) {
-        progress("searching again with the line that is left");
-        let again = named(Some(line))?;
+    let line = inside.as_ref().and_then(|(_, series)| series.shared_line());
+    let mut put_forward: Vec<_> = line
+        .map(|line| line.candidate(&scene))
+        .into_iter()
+        .collect();
+    if scene.has_reference {
+        let series = inside.as_ref().map(|(_, series)| series);
+        put_forward.extend(orbit(level, folds, &scene, &outcome.searched, series)?);
+    }
+    if !put_forward.is_empty() {
+        progress("searching again with the line or orbit that is left");
+        let again = named(&put_forward)?;
         // what was put forward in vain changes nothing
-        if again.searched.found.names_one_of_the_last(1) {
+        if again
+            .searched
+            .found
+            .names_one_of_the_last(put_forward.len())
+        {
             inside = left(&again.searched);
             outcome = again;
         }
@@ -303,6 +318,25 @@ fn explain(
     }
     progress("figures");
     Ok(Explained::Closed(Box::new(finish(&whole, after, inside)?)))
+}
+
+/// The orbit that turns the camera in place of what was found to, or beside what is left of that.
+fn orbit(
+    level: &StarEvidence<'_>,
+    folds: &Folds,
+    scene: &Scene<'_>,
+    searched: &Searched<'_>,
+    left: Option<&Series>,
+) -> Result<Option<Arc<dyn Candidate>>, CloseError> {
+    let wander = searched.wander.as_ref();
+    let slow = wander.map_or(0.0, |w| 0.5 * w.ratio.iter().sum::<f64>());
+    let turns = searched.found.chosen().any(|c| c.turns_camera());
+    let left = left.and_then(Series::across).zip(level.motion);
+    let follows = |(tracks, attitude)| orbits::might_show(&scene.surroundings, attitude, tracks);
+    if wander.is_none() && !turns && !left.is_some_and(follows) {
+        return Ok(None);
+    }
+    orbits::propose(level, folds, &scene.surroundings, &searched.found, slow)
 }
 
 fn scene<'a>(

@@ -104,6 +104,12 @@ impl Series {
         }
     }
 
+    /// Rotations about X and Y.
+    pub(crate) fn across(&self) -> Option<[&Track; 2]> {
+        let mut turns = self.each.iter().map(|(track, _)| track).filter(|t| t.turns);
+        Some([turns.next()?, turns.next()?])
+    }
+
     /// Lines and jumps of all of them.
     pub(crate) fn describe(self) -> Leftover {
         let alpha = self.alpha;

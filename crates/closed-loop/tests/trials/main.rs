@@ -8,6 +8,7 @@ mod kit;
 mod light;
 mod noise;
 mod nulls;
+mod orbits;
 mod patterns;
 mod power;
 mod snapshots;
