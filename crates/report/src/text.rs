@@ -286,12 +286,8 @@ fn considered(out: &mut String, report: &Report) {
                 }
                 _ => String::new(),
             };
-            line!(
-                out,
-                "  {:<26}{:>9.1}   {size}",
-                c.id,
-                c.delta_loglik.unwrap_or(0.0)
-            );
+            let gain = c.delta_loglik.map_or("-".to_owned(), |g| format!("{g:.1}"));
+            line!(out, "  {:<26}{gain:>9}   {size}", c.id);
             if let Some(why) = &c.against {
                 line!(out, "    not named: {why}");
             }

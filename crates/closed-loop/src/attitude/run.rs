@@ -22,10 +22,11 @@ use crate::questions::confusion;
 use crate::questions::hypothesis::{self, Grounds};
 use crate::questions::manoeuvre::attitudes::fly;
 use crate::search::empirical::{Empirical, Variable, range};
+use crate::search::instants;
+use crate::search::orbits::{self, Look};
 use crate::search::refusal::Refused;
 use crate::search::selection::columns_of;
 use crate::search::{Found, amplitudes, borrowed, fit};
-use crate::search::{instants, orbits};
 use crate::situation::{Situation, channels_of_interest};
 use crate::unexplained::leftover::{self, Series};
 use nalgebra::{DVector, UnitQuaternion};
@@ -478,6 +479,8 @@ fn finish(
     let left = inside.as_ref().unwrap_or(&plain);
     slow_leftover(data, left, declared, &mut unattributed, last / whole);
     let series = series.unwrap_or_else(|| tracks(data, &plain, changes));
+    let reference = situation.reference.as_ref().zip(series.across());
+    let look = reference.and_then(|(path, tracks)| Look::at(&surroundings, path, tracks));
     series.describe().tell(&mut unattributed);
     let errors = |r: &Residuals| Errors {
         star_rms_arcsec: None,
@@ -488,7 +491,10 @@ fn finish(
         chi2_per_dof: None,
         loglik_per_frame: Some(loglik_per_frame(data, r)),
     };
-    let considered = figures::considered(found, 0.0, refused, &situation.surroundings());
+    let mut considered = figures::considered(found, 0.0, refused, &situation.surroundings());
+    if let Some(look) = look {
+        look.tell(&mut considered);
+    }
     let lengths = column_lengths(&evidence, found);
     let hypotheses = hypothesis::answer(
         situation.questions,

@@ -19,8 +19,9 @@ use std::sync::Arc;
 
 use block_regression::Folds;
 use effects::{Candidate, Surroundings, free_orbit, nearest_circle, orbit_could_show};
-use focal_plane::AttitudeSource;
+use focal_plane::{ARCSEC_PER_RAD, AttitudeSource, SPEED_OF_LIGHT_M_S};
 use nalgebra::{Matrix6, SMatrix, SVector, Vector3, Vector6};
+use telemetry::report::ConsideredEffect;
 
 use crate::error::CloseError;
 use crate::evidence::Evidence;
@@ -28,6 +29,8 @@ use crate::search::selection::columns_of;
 use crate::search::{Found, fit};
 use crate::unexplained::leftover::Track;
 
+/// The effect of a velocity.
+const ABERRATION: &str = "velocity_aberration";
 /// Cycles in the span of the periods that are tried: nearly constant, and by quarters to where there are lines.
 const CYCLES: [f64; 8] = [0.05, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 1.75];
 /// Beside the surface of solid osmium an orbit takes sqrt(3 pi / G rho) = 42 minutes, s: a faster line is none.
@@ -48,68 +51,131 @@ fn usual_periods(surroundings: &Surroundings<'_>) -> impl Iterator<Item = f64> {
     periods.filter(|p| *p > SHORTEST_TURN_S)
 }
 
-/// Whether rotations that all stars share follow any orbit: a look at less than all rows.
-pub(crate) fn might_show(
-    surroundings: &Surroundings<'_>,
-    attitude: &dyn AttitudeSource,
-    tracks: [&Track; 2],
-) -> bool {
-    if !orbit_could_show(surroundings) {
-        return false;
+/// What rotations that all stars share say of orbits.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Look {
+    /// What any velocity that turns with one of the usual periods explains, nats.
+    nats: f64,
+    /// Speed of an orbit of any plane, once in the span, that would show at 5 sigma, m/s.
+    detectable_m_s: f64,
+}
+
+impl Look {
+    /// A look at less than all rows: at rotations about X and Y. `None` where no orbit could show.
+    pub(crate) fn at(
+        surroundings: &Surroundings<'_>,
+        attitude: &dyn AttitudeSource,
+        tracks: [&Track; 2],
+    ) -> Option<Self> {
+        if !orbit_could_show(surroundings) {
+            return None;
+        }
+        let rows: Vec<Row> = (0..2)
+            .flat_map(|k| Row::all(k, tracks[k], attitude))
+            .collect();
+        let (middle_s, length_s) = (surroundings.middle_s(), surroundings.length_s());
+        let explained = |period_s| Some(Normal::of(&rows, period_s, middle_s).eliminated()?.1);
+        let scalars = rows.len() as f64;
+        let all: f64 = rows.iter().map(|r| r.value * r.value).sum();
+        let most = usual_periods(surroundings)
+            .filter_map(explained)
+            .fold(0.0, f64::max);
+        // A and B of a circle have a third of their square along each axis
+        let (information, _) = Normal::of(&rows, length_s, middle_s).eliminated()?;
+        Some(Self {
+            nats: 0.5 * scalars * (all / (all - most).max(f64::MIN_POSITIVE)).ln(),
+            detectable_m_s: 5.0 / (information.trace() / 3.0).sqrt(),
+        })
     }
-    let rows: Vec<_> = tracks
-        .iter()
-        .enumerate()
-        .flat_map(|(axis, track)| {
-            let square: f64 = track
-                .value
-                .iter()
-                .zip(&track.weight)
-                .map(|(v, w)| w * v * v)
-                .sum();
-            let scale = (track.t_s.len() as f64 / square.max(f64::MIN_POSITIVE)).sqrt();
-            (0..track.t_s.len()).filter_map(move |k| {
-                let weight = scale * track.weight[k].sqrt();
-                let turn = attitude.attitude(track.t_s[k])?.inverse();
-                // of z x (q v) about this axis
-                let seen = turn
-                    * if axis == 0 {
-                        -Vector3::y()
-                    } else {
-                        Vector3::x()
-                    };
-                Some((
-                    axis,
-                    track.t_s[k],
-                    seen * weight,
-                    weight,
-                    track.value[k] * weight,
-                ))
+
+    /// Whether an orbit is worth a fit to all rows.
+    pub(crate) fn follows(&self) -> bool {
+        self.nats > WORTH_A_SEARCH
+    }
+
+    /// Says what was looked for without a candidate of its own.
+    pub(crate) fn tell(&self, considered: &mut [ConsideredEffect]) {
+        for entry in considered {
+            if entry.id == ABERRATION && !entry.observable && self.detectable_m_s.is_finite() {
+                entry.observable = true;
+                entry.detectable = Some(self.detectable_m_s);
+                entry.parameter = Some("speed_m_s".to_owned());
+                entry.unit = Some("m/s".to_owned());
+            }
+        }
+    }
+}
+
+/// A rotation about one axis, in units of its noise.
+struct Row {
+    axis: usize,
+    t_s: f64,
+    weight: f64,
+    /// Rotation by inertial velocities along each axis, per m/s.
+    seen: Vector3<f64>,
+    value: f64,
+}
+
+impl Row {
+    fn all<'a>(
+        axis: usize,
+        track: &'a Track,
+        attitude: &'a dyn AttitudeSource,
+    ) -> impl Iterator<Item = Self> + 'a {
+        let squares = track
+            .value
+            .iter()
+            .zip(&track.weight)
+            .map(|(v, w)| w * v * v);
+        let scale = (track.t_s.len() as f64 / squares.sum::<f64>().max(f64::MIN_POSITIVE)).sqrt();
+        // of z x (q v)/c about this axis
+        let across = [-Vector3::y(), Vector3::x()][axis] * (ARCSEC_PER_RAD / SPEED_OF_LIGHT_M_S);
+        (0..track.t_s.len()).filter_map(move |k| {
+            let weight = scale * track.weight[k].sqrt();
+            Some(Self {
+                axis,
+                t_s: track.t_s[k],
+                weight,
+                seen: attitude.attitude(track.t_s[k])?.inverse() * across * weight,
+                value: track.value[k] * weight,
             })
         })
-        .collect();
-    let scalars = rows.len() as f64;
-    let middle_s = surroundings.middle_s();
-    usual_periods(surroundings).any(|period_s| {
+    }
+}
+
+/// Products of two constants, six velocities and what was measured.
+struct Normal(SMatrix<f64, 9, 9>);
+
+impl Normal {
+    fn of(rows: &[Row], period_s: f64, middle_s: f64) -> Self {
         let mut normal = SMatrix::<f64, 9, 9>::zeros();
-        for (axis, t_s, seen, weight, value) in &rows {
-            let (sin, cos) = (TAU * (t_s - middle_s) / period_s).sin_cos();
+        for r in rows {
+            let (sin, cos) = (TAU * (r.t_s - middle_s) / period_s).sin_cos();
             let mut row = SVector::<f64, 9>::zeros();
-            row[*axis] = *weight;
-            row.fixed_rows_mut::<3>(2).copy_from(&(seen * cos));
-            row.fixed_rows_mut::<3>(5).copy_from(&(seen * sin));
-            row[8] = *value;
+            row[r.axis] = r.weight;
+            row.fixed_rows_mut::<3>(2).copy_from(&(r.seen * cos));
+            row.fixed_rows_mut::<3>(5).copy_from(&(r.seen * sin));
+            row[8] = r.value;
             normal.ger(1.0, &row, &row, 1.0);
         }
-        let columns = normal.fixed_view::<8, 8>(0, 0).into_owned();
-        let moment = normal.fixed_view::<8, 1>(0, 8).into_owned();
-        let all = normal[(8, 8)];
-        let ridge = SMatrix::<f64, 8, 8>::identity() * (1e-9 * columns.trace());
-        let explained = (columns + ridge)
-            .cholesky()
-            .map_or(0.0, |c| moment.dot(&c.solve(&moment)));
-        0.5 * scalars * (all / (all - explained).max(f64::MIN_POSITIVE)).ln() > WORTH_A_SEARCH
-    })
+        Self(normal)
+    }
+
+    /// Information of the velocities beside the constants, and the square that they explain.
+    fn eliminated(&self) -> Option<(Matrix6<f64>, f64)> {
+        let part = |i, j| self.0[(i, j)];
+        let mut left = SMatrix::<f64, 7, 7>::from_fn(|i, j| part(i + 2, j + 2));
+        for c in (0..2).filter(|&c| part(c, c) > 0.0) {
+            left -=
+                SMatrix::<f64, 7, 7>::from_fn(|i, j| part(i + 2, c) * part(c, j + 2) / part(c, c));
+        }
+        let information = left.fixed_view::<6, 6>(0, 0).into_owned();
+        let moment = left.fixed_view::<6, 1>(0, 6).into_owned();
+        // along the boresight nothing shows
+        let ridge = Matrix6::identity() * (1e-6 * information.trace());
+        let step = (information + ridge).cholesky()?.solve(&moment);
+        Some((information, moment.dot(&step)))
+    }
 }
 
 /// The orbit, if it is worth a search: beside those effects that were `found` which do not turn the camera, and

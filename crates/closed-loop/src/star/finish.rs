@@ -22,6 +22,7 @@ use crate::questions::confusion;
 use crate::questions::hypothesis::{self, Grounds};
 use crate::questions::manoeuvre::stars::Sky;
 use crate::search::instants;
+use crate::search::orbits::Look;
 use crate::search::refusal::Refused;
 use crate::search::selection::columns_of;
 use crate::search::{Found, amplitudes_as, fit};
@@ -49,6 +50,8 @@ pub(crate) struct Finish<'a> {
     pub(crate) slow: Option<Slow>,
     pub(crate) oversize: Vec<ConsideredEffect>,
     pub(crate) wander: Option<&'a Wander>,
+    /// What was looked for without candidates.
+    pub(crate) orbit: Option<Look>,
     pub(crate) settled: &'a Settled,
     pub(crate) image: Option<(&'a ImageLevel, &'a Formed)>,
 }
@@ -247,6 +250,9 @@ pub(crate) fn finish(
     noise_left.tell(&mut unattributed);
     let excess = excess(f, last);
     let mut considered = figures::considered(f.found, excess, f.refused, &surroundings);
+    if let Some(orbit) = &f.orbit {
+        orbit.tell(&mut considered);
+    }
     for entry in &mut considered {
         if let Some(size) = f.oversize.iter().find(|c| c.id == entry.id) {
             entry.clone_from(size);

@@ -22,7 +22,7 @@ use crate::error::CloseError;
 use crate::image_level::{self, Side};
 use crate::motion::{self, Around, gyro::with_rates, source};
 use crate::noise_effects;
-use crate::search::orbits;
+use crate::search::orbits::{self, Look};
 use crate::situation::Situation;
 use crate::star::data::{Inputs, Star, StarData};
 use crate::star::evidence::StarEvidence;
@@ -249,9 +249,11 @@ fn explain(
         .map(|line| line.candidate(&scene))
         .into_iter()
         .collect();
+    let tracks = inside.as_ref().and_then(|(_, series)| series.across());
+    let look = tracks.zip(level.motion).filter(|_| scene.has_reference);
+    let look = look.and_then(|(tracks, path)| Look::at(&scene.surroundings, path, tracks));
     if scene.has_reference {
-        let series = inside.as_ref().map(|(_, series)| series);
-        put_forward.extend(orbit(level, folds, &scene, &outcome.searched, series)?);
+        put_forward.extend(orbit(level, folds, &scene, &outcome.searched, look)?);
     }
     if !put_forward.is_empty() {
         progress("searching again with the line or orbit that is left");
@@ -306,6 +308,7 @@ fn explain(
         slow,
         oversize,
         wander: searched.wander.as_ref(),
+        orbit: look,
         settled,
         image: image.as_ref().zip(formed.as_ref()),
     };
@@ -326,14 +329,12 @@ fn orbit(
     folds: &Folds,
     scene: &Scene<'_>,
     searched: &Searched<'_>,
-    left: Option<&Series>,
+    look: Option<Look>,
 ) -> Result<Option<Arc<dyn Candidate>>, CloseError> {
     let wander = searched.wander.as_ref();
     let slow = wander.map_or(0.0, |w| 0.5 * w.ratio.iter().sum::<f64>());
     let turns = searched.found.chosen().any(|c| c.turns_camera());
-    let left = left.and_then(Series::across).zip(level.motion);
-    let follows = |(tracks, attitude)| orbits::might_show(&scene.surroundings, attitude, tracks);
-    if wander.is_none() && !turns && !left.is_some_and(follows) {
+    if wander.is_none() && !turns && !look.is_some_and(|l| l.follows()) {
         return Ok(None);
     }
     orbits::propose(level, folds, &scene.surroundings, &searched.found, slow)
