@@ -117,8 +117,16 @@ pub(crate) fn run(
             data.rebin(&folds, leftover::MOST_POINTS);
         }
         let again = search(&data, &put_forward)?;
+        let rivals = search::rivals(
+            &|noise| evidence(&data, situation, noise, motion),
+            &data,
+            &data.bins.folds,
+            &again.0,
+            again.1,
+        )?;
+        let theirs = orbits::a_channel_does(&again.0, &rivals);
         // what was put forward in vain changes nothing
-        if again.0.names_one_of_the_last(put_forward.len()) {
+        if again.0.names_one_of_the_last(put_forward.len()) && !theirs {
             (found, noise, refused, series) = again;
         } else {
             data.rebin(&folds, bins::MOST);

@@ -21,7 +21,8 @@
 //! and is judged at its best part.
 //!
 //! A line that the motion describes nearly as well is the motion's: of all frequencies it would have come
-//! upon that at which the tracker moves.
+//! upon that at which the tracker moves. An orbit that no channel tells takes the shape of whatever is slow: one
+//! that channels describe nearly as well is theirs.
 //!
 //! Source: Schwarz 1978 for the price of a parameter.
 
@@ -29,6 +30,7 @@ use block_regression::{Estimate, Fits};
 use statrs::function::factorial::ln_binomial;
 
 use crate::causes::description::Described;
+use crate::search::orbits::OWN_SHAPE;
 use crate::search::selection::{FAMILY_ALPHA, columns_of, each};
 
 /// Nats by which a description must be worth more.
@@ -65,8 +67,12 @@ pub(crate) fn stand_ins(described: &Described) -> Option<(Vec<usize>, Vec<Part>)
         };
         let lines = set.iter().all(|&k| described.names[k] == LINE);
         let motion = |(k, _): &Part| described.terms[*k].term.is_of_motion();
+        let free = set.iter().all(|&k| groups[k].slopes > 0);
+        let channel = |(k, _): &Part| described.terms[*k].term.is_of_channel();
         let least = if lines && parts.iter().all(motion) {
             -BY_FAR
+        } else if free && parts.iter().all(channel) {
+            -OWN_SHAPE
         } else {
             BY_FAR
         };

@@ -268,6 +268,11 @@ impl Empirical {
         matches!(self.variable, Variable::Time) && self.by.is_none()
     }
 
+    /// Whether it is a housekeeping channel alone.
+    pub(crate) fn is_of_channel(&self) -> bool {
+        matches!(self.variable, Variable::Housekeeping(..)) && self.by.is_none()
+    }
+
     /// Whether it is a shift of each star.
     pub(crate) fn is_of_stars(&self) -> bool {
         matches!(self.variable, Variable::Star(_)) && self.by.is_none()

@@ -25,6 +25,7 @@ use telemetry::report::ConsideredEffect;
 
 use crate::error::CloseError;
 use crate::evidence::Evidence;
+use crate::search::empirical::EMPIRICAL;
 use crate::search::selection::columns_of;
 use crate::search::{Found, fit};
 use crate::unexplained::leftover::Track;
@@ -41,6 +42,9 @@ const SHORTEST_TURN_S: f64 = 300.0;
 const ROUNDS: usize = 4;
 /// Nats of white noise below which an orbit is not worth a search.
 const WORTH_A_SEARCH: f64 = 12.0;
+/// Nats by which an orbit, which takes the shape in time that suits it, must be worth more than channels that
+/// have theirs: its plane, phase and period are free.
+pub(crate) const OWN_SHAPE: f64 = 15.0;
 /// Share of what others explain of the same in white noise, below which it is no orbit.
 const RIVAL: f64 = 0.5;
 
@@ -89,12 +93,12 @@ impl Look {
     }
 
     /// Whether an orbit is worth a fit to all rows.
-    pub(crate) fn follows(&self) -> bool {
+    pub(crate) fn follows(self) -> bool {
         self.nats > WORTH_A_SEARCH
     }
 
     /// Says what was looked for without a candidate of its own.
-    pub(crate) fn tell(&self, considered: &mut [ConsideredEffect]) {
+    pub(crate) fn tell(self, considered: &mut [ConsideredEffect]) {
         for entry in considered {
             if entry.id == ABERRATION && !entry.observable && self.detectable_m_s.is_finite() {
                 entry.observable = true;
@@ -104,6 +108,22 @@ impl Look {
             }
         }
     }
+}
+
+/// Whether channels explain the same as the orbit that was found first, or nearly: `rivals` as sets of candidates
+/// with their gains, nats.
+pub(crate) fn a_channel_does(found: &Found, rivals: &[(Vec<usize>, f64)]) -> bool {
+    let gain = |of: &dyn Fn(usize) -> bool| {
+        let alone = rivals
+            .iter()
+            .filter(|(set, _)| set.len() == 1 && of(set[0]));
+        alone
+            .map(|(_, gain)| *gain)
+            .fold(f64::NEG_INFINITY, f64::max)
+    };
+    let orbit = gain(&|g| found.fitted.groups[g].slopes > 0);
+    let channels = gain(&|g| found.candidates[g].id() == EMPIRICAL);
+    orbit.is_finite() && channels > orbit - OWN_SHAPE
 }
 
 /// A rotation about one axis, in units of its noise.

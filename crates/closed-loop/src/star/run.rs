@@ -334,7 +334,7 @@ fn orbit(
     let wander = searched.wander.as_ref();
     let slow = wander.map_or(0.0, |w| 0.5 * w.ratio.iter().sum::<f64>());
     let turns = searched.found.chosen().any(|c| c.turns_camera());
-    if wander.is_none() && !turns && !look.is_some_and(|l| l.follows()) {
+    if wander.is_none() && !turns && !look.is_some_and(Look::follows) {
         return Ok(None);
     }
     orbits::propose(level, folds, &scene.surroundings, &searched.found, slow)
