@@ -167,13 +167,11 @@ impl<S: Shift> Candidate for ShiftCandidate<S> {
         out.y.fill(0.0);
         let centroid = self.shift.stages().centroid;
         for i in 0..n {
-            let mut star = rows.view(i);
-            if centroid {
-                star.at = rows.landed(i);
-            }
-            if !self.shift.reaches(star.at) {
+            let at = if centroid { rows.landed(i) } else { rows.at(i) };
+            if !self.shift.reaches(at) {
                 continue;
             }
+            let star = StarView { at, ..rows.view(i) };
             self.shift.terms(&star, &mut terms[..p]);
             if centroid {
                 let variance = rows.landed_variance_px2.map(|v| v[i]);

@@ -402,7 +402,7 @@ impl Candidate for Empirical {
                     let along = [1.0 - *axis as f64, *axis as f64];
                     let variance = rows.landed_variance_px2[*axis][i];
                     let (mut s, mut c) = (sin, cos);
-                    for (k, order) in (1..).enumerate().take(HARMONICS) {
+                    for (k, order) in (1..).enumerate().take(HARMONICS.min(count.div_ceil(2))) {
                         let left = effects::left_of_wave(order, variance);
                         let [x, y] = along.map(|a| a * left);
                         put(2 * k, s * x, s * y);

@@ -94,6 +94,10 @@ pub(crate) struct Layout {
     /// Places of the columns of X and Y, and of T.
     pub(crate) own: Vec<usize>,
     pub(crate) turn: Vec<usize>,
+    /// Candidates whose columns stand among X and Y, and those that are filled by someone else, with the
+    /// residuals; none where that is empty.
+    by_rows: Vec<bool>,
+    left_out: Vec<bool>,
 }
 
 impl Layout {
@@ -105,6 +109,12 @@ impl Layout {
     /// Place of polynomial `k` on `axis`.
     pub(crate) fn shared_at(&self, k: usize, axis: usize) -> usize {
         self.shared_from + 2 * k + axis
+    }
+
+    /// The same without the columns of these candidates, and without the residuals, which someone else fills.
+    pub(crate) fn leaving_out(mut self, candidates: &[bool]) -> Self {
+        self.left_out = candidates.to_vec();
+        self
     }
 
     /// Places of all columns: D on x, D on y, X and Y, T.
@@ -119,22 +129,30 @@ impl Layout {
 
 impl StarColumns<'_> {
     pub(crate) fn layout(&self) -> Layout {
+        self.layout_with(|_| false)
+    }
+
+    /// Where all that these candidates turn has a row a star.
+    pub(crate) fn layout_with(&self, by_rows: impl Fn(usize) -> bool) -> Layout {
         let (misalignment, shared, directions) = self.nuisance.parts();
+        let each = self.candidates.iter().enumerate();
         let mut layout = Layout {
             shared,
             shared_from: misalignment,
             own: (0..misalignment).collect(),
             turn: Vec::new(),
+            by_rows: each.map(|(c, k)| !k.turns_camera() || by_rows(c)).collect(),
+            left_out: Vec::new(),
         };
         let mut place = misalignment + 2 * shared;
         layout.own.extend(place..place + directions);
         place += directions;
-        for candidate in self.candidates {
+        for (candidate, by_rows) in self.candidates.iter().zip(&layout.by_rows) {
             let end = place + candidate.coefficients().len();
-            if candidate.turns_camera() {
-                layout.turn.extend(place..end);
-            } else {
+            if *by_rows {
                 layout.own.extend(place..end);
+            } else {
+                layout.turn.extend(place..end);
             }
             place = end;
         }
@@ -151,12 +169,19 @@ impl StarColumns<'_> {
         let mut column = misalignment + directions;
         out.reset(n, frames.len(), layout, column);
         self.nuisance.fill(data, frames.clone(), out);
-        self.fill_turns(&data.frames.t_s[frames], &mut out.turn);
+        self.fill_turns(&data.frames.t_s[frames], layout, &mut out.turn);
         let seen = data.rows(rows.clone(), self.motion);
         let scale = data.camera.arcsec_per_px();
         let [x, y] = &mut out.own;
-        for candidate in self.candidates.iter().filter(|c| !c.turns_camera()) {
+        for (c, candidate) in self.candidates.iter().enumerate() {
+            if !layout.by_rows[c] {
+                continue;
+            }
             let p = candidate.coefficients().len();
+            if layout.left_out.get(c) == Some(&true) {
+                column += p;
+                continue;
+            }
             let at = column * n..(column + p) * n;
             let (x, y) = (&mut x.as_mut_slice()[at.clone()], &mut y.as_mut_slice()[at]);
             if candidate.star_columns(
@@ -175,7 +200,7 @@ impl StarColumns<'_> {
             }
             column += p;
         }
-        for residual in self.residuals {
+        for residual in self.residuals.iter().filter(|_| layout.left_out.is_empty()) {
             x.column_mut(column)
                 .copy_from_slice(&residual[0][rows.clone()]);
             y.column_mut(column)
@@ -184,11 +209,12 @@ impl StarColumns<'_> {
         }
     }
 
-    fn fill_turns(&self, t_s: &[f64], out: &mut DMatrix<f64>) {
+    fn fill_turns(&self, t_s: &[f64], layout: &Layout, out: &mut DMatrix<f64>) {
         let frames = t_s.len();
         let mut column = 0;
         let mut scratch: [Vec<f64>; 3] = Default::default();
-        for candidate in self.candidates.iter().filter(|c| c.turns_camera()) {
+        let turning = self.candidates.iter().zip(&layout.by_rows);
+        for candidate in turning.filter(|(_, by_rows)| !**by_rows).map(|(c, _)| c) {
             let p = candidate.coefficients().len();
             for axis in &mut scratch {
                 axis.clear();

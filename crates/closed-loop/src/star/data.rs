@@ -326,6 +326,49 @@ impl StarData {
         }
     }
 
+    /// Some frames of it.
+    pub(crate) fn some_frames(&self, which: &[usize]) -> Self {
+        let all = &self.frames;
+        let rows: Vec<usize> = which.iter().flat_map(|&k| all.rows_of(k)).collect();
+        let pick = |values: &[f64]| -> Vec<f64> { rows.iter().map(|&r| values[r]).collect() };
+        let pair = |values: &[Vec<f64>; 2]| values.each_ref().map(|v| pick(v));
+        let mut frames = StarFrames::new();
+        frames.t_s = which.iter().map(|&k| all.t_s[k]).collect();
+        for &k in which {
+            let last = frames.first_row.last().copied().unwrap_or(0);
+            frames.first_row.push(last + all.rows_of(k).len());
+        }
+        frames.slot = rows.iter().map(|&r| all.slot[r]).collect();
+        frames.star_id = rows.iter().map(|&r| all.star_id[r]).collect();
+        (frames.x_px, frames.y_px) = (pick(&all.x_px), pick(&all.y_px));
+        let seen = |w: &Vec<f64>| if w.is_empty() { Vec::new() } else { pick(w) };
+        Self {
+            camera: self.camera.clone(),
+            frames,
+            stars: self.stars.clone(),
+            star: rows.iter().map(|&r| self.star[r]).collect(),
+            t_s: pick(&self.t_s),
+            mag: pick(&self.mag),
+            bv: pick(&self.bv),
+            log_flux: pick(&self.log_flux),
+            window_px: self.window_px.each_ref().map(seen),
+            attitude: which.iter().map(|&k| self.attitude[k]).collect(),
+            projected: pair(&self.projected),
+            modelled: pair(&self.modelled),
+            carried: None,
+            light: Light {
+                beside_px: pair(&self.light.beside_px),
+                variance_px2: pair(&self.light.variance_px2),
+            },
+            landed: pair(&self.landed),
+            velocity: pair(&self.velocity),
+            acceleration: pair(&self.acceleration),
+            phase_error: pair(&self.phase_error),
+            outlier: rows.iter().map(|&r| self.outlier[r]).collect(),
+            ..*self
+        }
+    }
+
     /// Projected positions with what the declared effects do to them along `motion`; modelled ones are
     /// the same.
     pub(crate) fn place(

@@ -76,6 +76,18 @@ impl StarNuisance {
         }
     }
 
+    /// No unknowns at all.
+    pub(crate) fn none() -> Self {
+        Self {
+            misalignment: None,
+            distortion: None,
+            directions: 0,
+            direction_sigma: f64::INFINITY,
+            zeros: Vec::new(),
+            moments: Vec::new(),
+        }
+    }
+
     /// The same where what is constant for each star is known to these 1 sigma alone, px; where directions
     /// are unknown they hold it already.
     pub(crate) fn with_zeros(mut self, data: &StarData, sigma_px: &[[f64; 2]]) -> Self {

@@ -6,6 +6,7 @@
 //!
 //! Source: formats.md of the design notes (outliers); [`spectra::robust`].
 
+use rayon::prelude::*;
 use spectra::robust;
 
 use crate::star::data::StarData;
@@ -31,7 +32,7 @@ impl StarData {
         let of = |&s: &usize| if rows[s] < FEW_ROWS { few } else { s };
         let group: Vec<usize> = self.star.iter().map(of).collect();
         let marked: Vec<Vec<bool>> = residuals
-            .iter()
+            .par_iter()
             .map(|axes| {
                 let mut marked = self.outlier.clone();
                 for axis in *axes {

@@ -10,6 +10,7 @@ use std::collections::BTreeMap;
 
 use block_regression::Folds;
 use focal_plane::rotation_vector;
+use rayon::prelude::*;
 use spectra::robust;
 use telemetry::AttitudeResiduals;
 
@@ -52,24 +53,23 @@ pub(crate) fn residuals(
         .enumerate()
         .map(|(k, t)| (t.to_bits(), k))
         .collect();
-    let mut out = AttitudeResiduals::default();
-    for k in 0..data.frames.frames() {
-        let Some(&at) = own.get(&data.frames.t_s[k].to_bits()) else {
-            continue;
-        };
+    let of_frame = |k: usize| {
+        let at = *own.get(&data.frames.t_s[k].to_bits())?;
         // the shifts hold the whole misalignment, and so does the error against the bare reference
         let theta = rotation_vector(&table.q[at], &data.attitude[k]) * focal_plane::ARCSEC_PER_RAD
             + data.misalignment;
-        let (Some(b), Some(a)) = (
-            rotation_of(data, k, &shift_before),
-            rotation_of(data, k, &shift_after),
-        ) else {
-            continue;
-        };
+        let b = rotation_of(data, k, &shift_before)?;
+        let a = rotation_of(data, k, &shift_after)?;
+        Some((k, theta - b, theta - a))
+    };
+    let frames = (0..data.frames.frames()).into_par_iter();
+    let known: Vec<_> = frames.filter_map(of_frame).collect();
+    let mut out = AttitudeResiduals::default();
+    for (k, before, after) in known {
         out.t_s.push(data.frames.t_s[k]);
         for axis in 0..3 {
-            out.before_arcsec[axis].push(theta[axis] - b[axis]);
-            out.after_arcsec[axis].push(theta[axis] - a[axis]);
+            out.before_arcsec[axis].push(before[axis]);
+            out.after_arcsec[axis].push(after[axis]);
         }
         out.fold.push(fold[k]);
     }

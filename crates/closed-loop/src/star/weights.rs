@@ -17,6 +17,7 @@
 //!
 //! Source: Aitken 1935 (weighted least squares); Rousseeuw & Croux 1993 (the median's scale).
 
+use rayon::prelude::*;
 use spectra::robust;
 
 use crate::star::data::StarData;
@@ -45,15 +46,24 @@ pub(crate) fn of(data: &StarData, changes: &[Vec<f64>; 2]) -> Vec<f64> {
         let median = robust::median(values)?;
         Some(median / (MEDIAN_OF_NORMAL * std::f64::consts::SQRT_2))
     };
-    let all = scale(&mut sizes.concat());
+    let mut together = sizes.concat();
+    let (all, own) = rayon::join(
+        || scale(&mut together),
+        || {
+            sizes
+                .into_par_iter()
+                .map(|mut own| (own.len(), scale(&mut own)))
+                .collect::<Vec<_>>()
+        },
+    );
     let Some(common) = all.filter(|s| *s > 0.0) else {
         return vec![1.0; rows];
     };
-    let sigma: Vec<f64> = sizes
+    let sigma: Vec<f64> = own
         .into_iter()
-        .map(|mut own| {
-            let n = own.len() as f64;
-            let square = scale(&mut own).map_or(0.0, |s| s * s);
+        .map(|(n, own)| {
+            let n = n as f64;
+            let square = own.map_or(0.0, |s| s * s);
             let drawn = (n * square + COMMON * common * common) / (n + COMMON);
             drawn.sqrt().max(QUIETEST * common)
         })

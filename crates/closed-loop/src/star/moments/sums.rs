@@ -69,11 +69,13 @@ pub(super) struct Sums {
     bins: Option<Turned>,
     /// Products of the rows of bins that have no attitude, and how many scalars.
     lost: Option<(DMatrix<f64>, usize)>,
+    /// Columns of X and Y whose products are known better ([`super::paced`]), and these, below the diagonal.
+    fast: Option<(Vec<usize>, DMatrix<f64>)>,
 }
 
 /// Scratch of the inner loop.
-struct Scratch {
-    filled: Filled,
+pub(super) struct Scratch {
+    pub(super) filled: Filled,
     jacobian: Vec<[[f64; 3]; 2]>,
     /// N of each frame.
     normal: Vec<Matrix3<f64>>,
@@ -198,9 +200,18 @@ impl Sums {
         bins: Option<&SolvedBins<'_>>,
     ) -> Self {
         let layout = columns.layout();
+        let fill = |chunk: Range<usize>, layout: &Layout, filled: &mut Filled| {
+            columns.fill(chunk.clone(), layout, filled);
+            columns.weigh(chunk, filled)
+        };
+        Self::filled_by(columns, layout, frames, bins, |end| end, fill)
+    }
+
+    /// No rows yet.
+    pub(super) fn of_none(layout: Layout, bins: Option<&SolvedBins<'_>>) -> Self {
         let (shared, own, turn) = (layout.shared, layout.own.len(), layout.turn.len());
         let width = layout.width();
-        let mut sums = Self {
+        Self {
             shared: DMatrix::zeros(shared, shared),
             cross: DMatrix::zeros(2 * shared, own),
             own: DMatrix::zeros(own, own),
@@ -213,8 +224,23 @@ impl Sums {
                 )
             }),
             lost: None,
+            fast: None,
             layout,
-        };
+        }
+    }
+
+    /// `fill` fills some frames' rows, weighs them, and says how many count; `cut` says where they may end at
+    /// the latest.
+    pub(super) fn filled_by(
+        columns: &StarColumns<'_>,
+        layout: Layout,
+        frames: Range<usize>,
+        bins: Option<&SolvedBins<'_>>,
+        cut: impl Fn(usize) -> usize,
+        mut fill: impl FnMut(Range<usize>, &Layout, &mut Filled) -> usize,
+    ) -> Self {
+        let turn = layout.turn.len();
+        let mut sums = Self::of_none(layout, bins);
         let used = |frame: usize| {
             let rows = columns.data.frames.rows_of(frame);
             rows.filter(|&r| !columns.data.outlier[r]).count()
@@ -228,10 +254,9 @@ impl Sums {
         let mut at = frames.start;
         let mut bin = 0;
         while at < frames.end {
-            let chunk = at..(at + CHUNK_FRAMES).min(frames.end);
+            let chunk = at..cut((at + CHUNK_FRAMES).min(frames.end));
             at = chunk.end;
-            columns.fill(chunk.clone(), &sums.layout, &mut scratch.filled);
-            sums.scalars += 2 * columns.weigh(chunk.clone(), &mut scratch.filled);
+            sums.scalars += 2 * fill(chunk.clone(), &sums.layout, &mut scratch.filled);
             sums.add_rows(&mut scratch);
             if bins.is_none() && turn == 0 {
                 continue;
@@ -261,14 +286,25 @@ impl Sums {
                 }
             }
         }
-        for axis in 0..2 {
-            sums.put(axis, &mut scratch.sums[axis]);
-        }
+        sums.put_all(&mut scratch);
         sums
     }
 
+    /// The products of columns `which` of X and Y are those of `better`, which has no others.
+    pub(super) fn corrected(mut self, which: Vec<usize>, better: Self) -> Self {
+        self.fast = Some((which, better.own));
+        self
+    }
+
+    /// Adds what is held.
+    pub(super) fn put_all(&mut self, scratch: &mut Scratch) {
+        for axis in 0..2 {
+            self.put(axis, &mut scratch.sums[axis]);
+        }
+    }
+
     /// Adds the products of D, X and Y.
-    fn add_rows(&mut self, scratch: &mut Scratch) {
+    pub(super) fn add_rows(&mut self, scratch: &mut Scratch) {
         let Scratch {
             filled,
             axes,
@@ -420,6 +456,13 @@ impl Sums {
                 put(i, shared + own + j, self.turn[(i, j)]);
             }
         }
+        if let Some((which, better)) = &self.fast {
+            for (j, &b) in which.iter().enumerate() {
+                for (i, &a) in which.iter().enumerate().skip(j) {
+                    put(shared + a, shared + b, better[(i, j)]);
+                }
+            }
+        }
         out
     }
 
@@ -472,6 +515,11 @@ impl Sums {
 }
 
 impl Scratch {
+    /// Columns of X or Y that were not all zero when their products were added last.
+    pub(super) fn active(&self, axis: usize) -> &[usize] {
+        &self.axes[axis].active
+    }
+
     /// M of every frame and column, about each axis, and N of every frame; returns where the first
     /// frame is held.
     fn moments(
