@@ -201,7 +201,12 @@ fn an_empty_folder_is_no_bundle() -> Done {
 /// what is missing; an id that does not exist is one message with all that do.
 #[test]
 fn hypotheses_are_answered_by_name() -> Done {
-    let asked = ["velocity_aberration", "exposure_smear", "rolling_shutter"];
+    let asked = [
+        "dark_map",
+        "exposure_smear",
+        "rolling_shutter",
+        "velocity_aberration",
+    ];
     let mut command = boresight();
     command.arg("close");
     for id in asked {
@@ -211,12 +216,19 @@ fn hypotheses_are_answered_by_name() -> Done {
     let answers = report["hypotheses"].as_array().ok_or("hypotheses")?;
     let ids: Vec<&str> = answers.iter().filter_map(|h| h["id"].as_str()).collect();
     assert_eq!(ids, asked);
-    let [aberration, smear, shutter] = answers.as_slice() else {
-        return Err("three".into());
+    let [dark_map, smear, shutter, aberration] = answers.as_slice() else {
+        return Err("four".into());
     };
-    assert_eq!(aberration["observable"], false);
-    let reason = aberration["reason"].as_str().ok_or("reason")?;
-    assert!(reason.contains("velocity channels"), "{reason}");
+    assert_eq!(dark_map["observable"], false);
+    let reason = dark_map["reason"].as_str().ok_or("reason")?;
+    assert!(reason.contains("images"), "{reason}");
+    // no channel tells a velocity, but an orbit would turn the camera: 1 km/s by 0.69 arcsec, which changes over
+    // three quarters of an hour by about itself
+    assert_eq!(aberration["observable"], true);
+    let speed = aberration["sizes"][0]["detectable"]
+        .as_f64()
+        .ok_or("speed")?;
+    assert!((100.0..2000.0).contains(&speed), "{speed}");
     assert_eq!(
         (&smear["observable"], &smear["added"]),
         (&true.into(), &false.into())
