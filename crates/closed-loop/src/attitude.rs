@@ -10,6 +10,7 @@
 //! Not physics: the contents of a folder.
 
 pub(crate) mod data;
+mod declared_effects;
 mod run;
 mod search;
 pub(crate) mod spatial_errors;

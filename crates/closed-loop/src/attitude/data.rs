@@ -15,8 +15,7 @@ use block_regression::{BlockGrams, Design, Folds};
 use coloured_noise::Coloured;
 use effects::{AttitudeRows, Candidate};
 use focal_plane::{ARCSEC_PER_RAD, AttitudeResidual, AttitudeSeries, AttitudeSource, VectorsMut};
-use nalgebra::{DMatrix, DVector, UnitQuaternion};
-use star_tracker::Disturbance;
+use nalgebra::{DMatrix, DVector, UnitQuaternion, Vector3};
 
 use crate::bins::{Bins, MOST};
 use crate::evidence::{Amplitudes, Evidence, Residuals};
@@ -71,13 +70,10 @@ impl AttitudeData {
         data
     }
 
-    /// Takes off what a declared effect does to the attitude as a whole.
-    pub(crate) fn subtract(&mut self, effect: &dyn Disturbance) {
-        if !effect.stages().attitude {
-            return;
-        }
+    /// Takes off a rotation of each time, arcsec.
+    pub(crate) fn subtract(&mut self, rotation: impl Fn(f64) -> Vector3<f64>) {
         for (k, &t) in self.t_s.iter().enumerate() {
-            let theta = effect.misalignment_rad(t) * ARCSEC_PER_RAD;
+            let theta = rotation(t);
             for axis in 0..3 {
                 self.theta[axis][k] -= theta[axis];
             }

@@ -9,6 +9,7 @@ use coloured_noise::Coloured;
 use effects::{Candidate, Scene};
 
 use crate::attitude::data::{AttitudeData, AttitudeEvidence};
+use crate::attitude::declared_effects;
 use crate::attitude::search;
 use crate::attitude::spatial_errors::SpatialErrors;
 use crate::bins;
@@ -68,13 +69,14 @@ pub(crate) fn run(
             why: "the others lie outside the reference or in its gaps",
         });
     }
-    for effect in declared::effects(situation)? {
-        data.subtract(effect.as_ref());
-    }
     let folds = Folds::cut(data.t_s.len());
     let motion = &motion::around(reference, &data.t_s, 1.0);
     if !motion.resolved() {
         data.rate = std::array::from_fn(|_| vec![0.0; data.t_s.len()]);
+    }
+    let effects = declared::effects(situation)?;
+    if !effects.is_empty() {
+        data.subtract(|t_s| declared_effects::rotation(&effects, motion, t_s));
     }
     progress("residuals of the declared model");
     let before = settle(&mut data, situation, &folds, motion)?;

@@ -34,11 +34,15 @@ pub(crate) fn residuals(
         return None;
     }
     let scale = data.camera.arcsec_per_px();
+    let by_effects = data.moved_by_declared_effects();
     let shift = |residual: &Residuals, phase_error: &[Vec<f64>; 2]| -> Vec<Vec<f64>> {
         (0..2)
             .map(|a| {
                 (0..data.t_s.len())
-                    .map(|r| residual.modelled[a][r] + phase_error[a][r] * scale[a])
+                    .map(|r| {
+                        let declared = phase_error[a][r] + by_effects[a][r];
+                        residual.modelled[a][r] + declared * scale[a]
+                    })
                     .collect()
             })
             .collect()

@@ -1,5 +1,6 @@
 //! The loop on bundles of known truth.
 
+mod declared;
 mod gaps;
 mod in_time;
 mod inputs;
