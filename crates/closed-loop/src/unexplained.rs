@@ -3,6 +3,7 @@
 //! ```text
 //! leftover        lines and jumps in time, of what all rows of a frame share
 //! star_series     lines and steps in time, of each star by itself
+//! star_freedom    how many numbers those stars tell
 //! pattern         a wave on the detector, of any direction and pitch
 //! ```
 //!
@@ -15,4 +16,5 @@ mod around;
 mod grid;
 pub(crate) mod leftover;
 pub(crate) mod pattern;
+mod star_freedom;
 pub(crate) mod star_series;

@@ -9,7 +9,8 @@
 //! T(t0)  = sum over stars and axes of (step at t0)^2 / variance          chi2, 2 a star
 //! ```
 //!
-//! Times the frequencies, and stars, or the instants. A step has to stay one: where the stars are
+//! Times the frequencies, and stars, or the instants; of free attitudes with less freedom
+//! ([`crate::unexplained::star_freedom`]). A step has to stay one: where the stars are
 //! as slow without it as with it, they wander. And it has to be the stars': what a frame turned by
 //! is known but for its noise, and a reference that wanders leaves a step or a line in all stars alike, so
 //! that one has to be beyond chance at its instant or frequency without all that the stars of a frame share, too.
@@ -27,6 +28,7 @@ use crate::causes::commonness::{self, IN_TIME, MOSTLY, stars_first};
 use crate::star::data::StarData;
 use crate::unexplained::around::Around;
 use crate::unexplained::grid::Grid;
+use crate::unexplained::star_freedom::Freedom;
 
 /// Chance that either is told although there is none.
 const ALPHA: f64 = 0.001;
@@ -117,6 +119,12 @@ pub(crate) fn search(
         return OwnSeries::default();
     }
     let by_itself = LazyCell::new(|| series(data, alone, weight));
+    let beside_rotation = Freedom::beside_rotation(data, weight);
+    let freedom = if data.free_attitude {
+        beside_rotation
+    } else {
+        Freedom::WHOLE
+    };
     let series = series(data, own, weight);
     let rows: f64 = series.iter().map(|s| s.count.iter().sum::<f64>()).sum();
     let mut out = OwnSeries {
@@ -127,9 +135,9 @@ pub(crate) fn search(
         return out;
     };
     out.bin_hz = 1.0 / (last - first);
-    if let Some(lines) = Lines::of(&series, last - first)
+    if let Some(lines) = Lines::of(&series, freedom, last - first)
         && let Some((k, p, squares)) = lines.best()
-        && let Some(apart) = Lines::of(&by_itself, last - first)
+        && let Some(apart) = Lines::of(&by_itself, beside_rotation, last - first)
         && k < apart.grid.bins
         && apart.at(k).0 < ALPHA_ALONE
     {
@@ -137,8 +145,8 @@ pub(crate) fn search(
         out.p_value = p;
         out.explained = squares / (2.0 * rows);
     }
-    if let Some((t, p, square)) = step(&series, &data.frames.t_s)
-        && step_at(&by_itself, t).is_some_and(|(p, _)| p < ALPHA_ALONE)
+    if let Some((t, p, square)) = step(&series, freedom, &data.frames.t_s)
+        && step_at(&by_itself, beside_rotation, t).is_some_and(|(p, _)| p < ALPHA_ALONE)
         && is_no_wander(data, own, t)
     {
         out.jump_s = Some(t);
@@ -209,17 +217,22 @@ fn series(data: &StarData, own: &[Vec<f64>], weight: &[f64]) -> Vec<Own> {
 struct Lines {
     grid: Grid,
     power: Vec<Vec<f64>>,
+    freedom: Freedom,
 }
 
 impl Lines {
-    fn of(series: &[Own], span: f64) -> Option<Self> {
+    fn of(series: &[Own], freedom: Freedom, span: f64) -> Option<Self> {
         let median = |s: &Own| median_step(&s.t_s).unwrap_or(f64::INFINITY);
         let step = series.iter().map(median).fold(0.0, f64::max);
         let fewest = 4 * USUAL.finer * (USUAL.count + USUAL.guard);
         let grid = Grid::of(span, step, MIN_CYCLES, USUAL.finer, fewest)?;
         let powers = series.par_iter().map(|s| s.powers(&grid));
         let power = powers.collect();
-        Some(Self { grid, power })
+        Some(Self {
+            grid,
+            power,
+            freedom,
+        })
     }
 
     /// Chance of what the stars have at grid point `k`, of one of them or of all, and the squares that it takes.
@@ -229,8 +242,9 @@ impl Lines {
             let (sum, count) = USUAL.sum(p, k);
             (p[k] * count / sum, count)
         };
-        let chance = |mean: f64, of: f64, around: f64| -> f64 {
-            FisherSnedecor::new(4.0 * of, 4.0 * around).map_or(1.0, |law| law.sf(mean))
+        let chance = |mean: f64, of: f64, around: f64, share: f64| -> f64 {
+            FisherSnedecor::new(4.0 * share * of, 4.0 * share * around)
+                .map_or(1.0, |law| law.sf(mean))
         };
         let stars = self.power.len() as f64;
         let each: Vec<(f64, f64)> = self.power.iter().map(relative).collect();
@@ -238,9 +252,9 @@ impl Lines {
         let around: f64 = each.iter().map(|e| e.1).sum();
         let one = each
             .iter()
-            .map(|e| stars * chance(e.0, 1.0, e.1))
+            .map(|e| stars * chance(e.0, 1.0, e.1, self.freedom.one))
             .fold(1.0, f64::min);
-        let all = chance(sum / stars, stars, around);
+        let all = chance(sum / stars, stars, around, self.freedom.all);
         let excess = self.power.iter().zip(&each).map(|(p, e)| p[k] - p[k] / e.0);
         let squares = if one < all {
             excess.fold(0.0, f64::max)
@@ -265,7 +279,7 @@ impl Lines {
 }
 
 /// The step that is most certain: its instant, chance, and the squares that it takes.
-fn step(series: &[Own], t_s: &[f64]) -> Option<(f64, f64, f64)> {
+fn step(series: &[Own], freedom: Freedom, t_s: &[f64]) -> Option<(f64, f64, f64)> {
     let stride = t_s.len().div_ceil(MOST_POINTS).max(1);
     let instants: Vec<f64> = t_s
         .windows(2)
@@ -274,21 +288,21 @@ fn step(series: &[Own], t_s: &[f64]) -> Option<(f64, f64, f64)> {
         .collect();
     let (t, (p, squares)) = instants
         .par_iter()
-        .filter_map(|&t| Some((t, step_at(series, t)?)))
+        .filter_map(|&t| Some((t, step_at(series, freedom, t)?)))
         .min_by(|a, b| a.1.0.total_cmp(&b.1.0))?;
     let p = p * instants.len() as f64;
     (p < ALPHA).then_some((t, p, squares))
 }
 
 /// A step of every star at `t`: its chance there, and the squares that it takes.
-fn step_at(series: &[Own], t: f64) -> Option<(f64, f64)> {
-    let (mut square, mut freedom) = (0.0, 0.0);
+fn step_at(series: &[Own], freedom: Freedom, t: f64) -> Option<(f64, f64)> {
+    let (mut square, mut numbers) = (0.0, 0.0);
     for one in series.iter().filter_map(|s| s.step_square(t)) {
         square += one;
-        freedom += 2.0;
+        numbers += 2.0;
     }
-    let law = ChiSquared::new(freedom).ok()?;
-    Some((law.sf(square / WIDER), square - freedom))
+    let law = ChiSquared::new(numbers * freedom.all).ok()?;
+    Some((law.sf(square * freedom.all / WIDER), square - numbers))
 }
 
 /// Whether the stars are less slow beside a step of each at `t`.
