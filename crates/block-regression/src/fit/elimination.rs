@@ -13,6 +13,9 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use super::Layout;
 use super::out_of_fold::gaussian;
 
+/// Share of a column's information that it is given beside.
+const FLOOR: f64 = 1e-10;
+
 /// The nuisance eliminated on one training set.
 #[derive(Clone, Debug)]
 pub(super) struct Eliminated {
@@ -39,12 +42,18 @@ impl Eliminated {
     ) -> Option<Self> {
         let n = layout.nuisance_precision.nrows();
         let mut normal = gram.view((0, 0), (n, n)).into_owned();
-        // A column that nothing constrains (a gauge freedom, a star never seen in
-        // training) gets a precision far below what one scalar of data brings.
-        let floor = 1e-10 * normal.diagonal().max().max(f64::MIN_POSITIVE);
+        // A column that nothing constrains (a gauge freedom, a star never seen in training) gets a precision far
+        // below what one scalar of data brings: of its own, for columns have all sorts of units.
+        let most = normal.diagonal().max().max(f64::MIN_POSITIVE);
         let mut prior = &layout.nuisance_precision * variance;
         for k in 0..n {
-            prior[(k, k)] += floor;
+            let own = normal[(k, k)];
+            prior[(k, k)] += FLOOR
+                * if own > FLOOR * FLOOR * most {
+                    own
+                } else {
+                    most
+                };
         }
         normal += &prior;
         let cross = picked(gram, 0..n, pick);

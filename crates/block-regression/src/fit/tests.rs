@@ -517,3 +517,20 @@ fn what_lives_in_a_fold_alone_is_fitted_there() {
     let error = fits.out_of_fold(&[0]).unwrap().sse[fold] / last.len() as f64;
     assert!((0.7..1.4).contains(&error), "{error}");
 }
+
+/// A nuisance column in other units (an image that grows in px beside an angle in rad) changes no amplitude and
+/// no likelihood: what keeps a column that nothing constrains in bounds is in its own units.
+#[test]
+fn units_of_the_nuisance_do_not_matter() {
+    let plain = table(2000, 0.3, 0.2, 5);
+    let mut scaled = Table(plain.0.clone());
+    scaled.0.column_mut(1).scale_mut(1e8);
+    let all = [0, 1, 2];
+    let [(a, like_a), (b, like_b)] = [plain, scaled].map(|table| {
+        let (fits, _) = fits(&table, Matrix2::zeros());
+        let out = fits.out_of_fold(&all).unwrap();
+        (fits.estimate(&all).unwrap().value, out.total_loglik())
+    });
+    assert!((&a - &b).norm() < 1e-6 * a.norm(), "{a} {b}");
+    assert!((like_a - like_b).abs() < 1e-3, "{like_a} {like_b}");
+}
