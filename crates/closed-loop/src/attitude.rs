@@ -4,13 +4,16 @@
 //! run             the order of the steps, from bundle to report
 //! data            the rotation between both, axis by axis, as evidence for the search
 //! search          every hypothesis with its own noise
+//! declared_effects  what the declared effects turn it by
 //! spatial_errors  what the declared model itself makes of crossing and changing stars
+//! imagined        the lines of that, from drawn skies and fields
 //! ```
 //!
 //! Not physics: the contents of a folder.
 
 pub(crate) mod data;
 mod declared_effects;
+mod imagined;
 mod run;
 mod search;
 pub(crate) mod spatial_errors;

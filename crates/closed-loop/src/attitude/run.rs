@@ -91,10 +91,17 @@ pub(crate) fn run(
         list.extend(put_forward.iter().cloned());
         let with_noise = |noise: [Coloured; 3]| evidence(data, situation, noise, motion);
         let (bins, start) = (&data.bins.folds, fit_noise(data, &before));
-        let (found, noise, refused) =
-            search::search(&with_noise, data, bins, &folds, list, changes, start)?;
+        let (found, noise, refused) = search::search(
+            &with_noise,
+            data,
+            bins,
+            &folds,
+            list,
+            changes.as_ref(),
+            start,
+        )?;
         let inside = in_sample(&with_noise(noise), data.t_s.len(), &found);
-        let series = inside.map(|inside| tracks(data, &inside, changes));
+        let series = inside.map(|inside| tracks(data, &inside, changes.as_ref()));
         Ok::<_, CloseError>((found, noise, refused, series))
     };
     let (mut found, mut noise, mut refused, mut series) = search(&data, &[])?;
@@ -150,7 +157,17 @@ pub(crate) fn run(
     }
     progress("figures");
     finish(
-        situation, &data, &folds, noise, motion, &found, &refused, before, after, rivals, changes,
+        situation,
+        &data,
+        &folds,
+        noise,
+        motion,
+        &found,
+        &refused,
+        before,
+        after,
+        rivals,
+        changes.as_ref(),
         series,
     )
 }
@@ -366,7 +383,7 @@ fn in_sample(evidence: &AttitudeEvidence<'_>, rows: usize, found: &Found) -> Opt
 }
 
 /// What lines and jumps are looked for in.
-fn tracks(data: &AttitudeData, residual: &Residuals, changes: Option<SpatialErrors>) -> Series {
+fn tracks(data: &AttitudeData, residual: &Residuals, changes: Option<&SpatialErrors>) -> Series {
     let (axes, outlier) = (&residual.axes, &data.outlier);
     Series::of(&leftover::attitude_tracks(
         &data.t_s, axes, outlier, changes,
@@ -421,7 +438,7 @@ fn finish(
     before: Residuals,
     after: Residuals,
     rivals: Vec<Rival>,
-    changes: Option<SpatialErrors>,
+    changes: Option<&SpatialErrors>,
     series: Option<Series>,
 ) -> Result<Closed, CloseError> {
     let chosen = &found.selection.chosen;

@@ -41,8 +41,9 @@ use crate::search::{
     Fitted, Found, amplitudes, borrowed, family, first_column, fit, fit_design, polish,
 };
 
-/// The effect that a change of stars looks like.
+/// The effects that a change of stars looks like, and stars that come by again.
 const STEP: &str = "step_misalignment";
+const LINE: &str = "periodic_misalignment";
 
 /// Rounds of generalised least squares and noise fit.
 const ALTERNATIONS: usize = 3;
@@ -88,7 +89,7 @@ pub(crate) fn search<'d>(
     folds: &Folds,
     rows: &Folds,
     mut candidates: Vec<Arc<dyn Candidate>>,
-    changes: Option<SpatialErrors>,
+    changes: Option<&SpatialErrors>,
     start: [Coloured; 3],
 ) -> Result<(Found, [Coloured; 3], Refused), CloseError> {
     let mut chosen: Vec<usize> = Vec::new();
@@ -227,8 +228,8 @@ struct Trial<'a, 'd> {
     candidates: &'a [Arc<dyn Candidate>],
     /// Columns of all candidates, averaged over the bins.
     binned: DMatrix<f64>,
-    /// Jumps that are no step.
-    changes: Option<SpatialErrors>,
+    /// Jumps that are no step, and lines that are the declared model's.
+    changes: Option<&'a SpatialErrors>,
     noise: [Coloured; 3],
     /// Its white part alone, and beside little slow noise.
     white: [Coloured; 3],
@@ -247,7 +248,7 @@ impl<'a, 'd> Trial<'a, 'd> {
         fitted: &'a Fitted,
         binned: DMatrix<f64>,
         noise: [Coloured; 3],
-        changes: Option<SpatialErrors>,
+        changes: Option<&'a SpatialErrors>,
     ) -> Result<Self, CloseError> {
         let t_s = &data.bins.t_s;
         let span_s = t_s.last().zip(t_s.first()).map_or(0.0, |(l, f)| l - f);
@@ -345,21 +346,35 @@ impl<'a, 'd> Trial<'a, 'd> {
         let p = (p * self.cost[g]).min(1.0);
         Judgement {
             delta_loglik: with.out_of_fold - without.out_of_fold,
-            p_value: p.max(self.a_change(&set, g, &with)),
+            p_value: p.max(self.as_declared(&set, g, &with)),
             credible: with.credible,
             observable: true,
         }
     }
 
-    /// Chance that step `g` of `set` is a change of stars.
-    fn a_change(&self, set: &[usize], g: usize, scored: &Scored) -> f64 {
-        let Some(changes) = self.changes.filter(|_| self.candidates[g].id() == STEP) else {
+    /// Chance that step or line `g` of `set` is what the declared model makes: a change of stars, or stars that
+    /// come by again.
+    fn as_declared(&self, set: &[usize], g: usize, scored: &Scored) -> f64 {
+        let Some(changes) = self.changes else {
             return 0.0;
         };
         let width = |c: &usize| self.candidates[*c].coefficients().len();
         let first: usize = set.iter().take_while(|c| **c != g).map(width).sum();
-        let step = |axis: usize| scored.amplitudes.get(first + axis).copied().unwrap_or(0.0);
-        changes.chance([step(0), step(1), step(2)])
+        let size = |k: usize| scored.amplitudes.get(first + k).copied().unwrap_or(0.0);
+        let candidate = self.candidates[g].as_ref();
+        match candidate.id() {
+            STEP => changes.chance([size(0), size(1), size(2)]),
+            LINE => {
+                // cosine and sine, axis by axis
+                let frequency = candidate.nonlinear()[0].value;
+                let is_more = |axis: usize| {
+                    let amplitude = size(2 * axis).hypot(size(2 * axis + 1));
+                    changes.is_line(frequency, axis, amplitude)
+                };
+                f64::from(u8::from(!(0..3).any(is_more)))
+            }
+            _ => 0.0,
+        }
     }
 
     /// `chosen` at its own best noise: the likelier of two climbs, from the present noise and, where

@@ -13,18 +13,22 @@
 //! ```
 //!
 //! (A: peak of the declared triangle). The attitude alone does not tell such a jump from a
-//! shift of the bracket: a step counts as one only if none of N changes makes it. Lines and
-//! slow noise within the error are what was declared, once the stars cross pixels. All are
-//! taken twice as wide: bright stars stand in heaps, two may go at once, and a sum of a few
-//! places scatters.
+//! shift of the bracket: a step counts as one only if none of N changes makes it. Slow noise within the error is
+//! what was declared, once the stars cross pixels, and so are lines as the motion makes them
+//! ([`crate::attitude::imagined`]). All are taken twice as wide: bright stars stand in heaps, two may go at once,
+//! and a sum of a few places scatters.
 //!
 //! Source: [M23] Fig. 4 with equal weights; erratum E14 for attitudes of few stars.
 
-use focal_plane::AttitudeSource;
+use std::sync::{Arc, OnceLock};
+
+use centroid::{CentroidError, Triangle};
+use focal_plane::{AttitudeSeries, AttitudeSource, rotation_vector};
 use nalgebra::Vector3;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use telemetry::ModelKind;
 
+use crate::attitude::imagined::Imagined;
 use crate::situation::Situation;
 
 /// Stars of a model that does not say how many.
@@ -35,7 +39,7 @@ const WIDER: f64 = 2.0;
 const STRETCHES: usize = 24;
 
 /// What changes of stars do to an attitude.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub(crate) struct SpatialErrors {
     /// 1 sigma of a jump per axis, arcsec.
     pub(crate) sigma_arcsec: [f64; 3],
@@ -43,6 +47,8 @@ pub(crate) struct SpatialErrors {
     pub(crate) slow_arcsec: [f64; 3],
     /// How many there are.
     pub(crate) expected: f64,
+    /// What tells the lines.
+    pub(crate) imagined: Option<Arc<Imagined>>,
 }
 
 impl SpatialErrors {
@@ -70,7 +76,7 @@ impl SpatialErrors {
                 continue;
             };
             if let Some(last) = last {
-                let turn: Vector3<f64> = focal_plane::rotation_vector(&q, &last);
+                let turn: Vector3<f64> = rotation_vector(&q, &last);
                 moved += turn.xy().norm() / (2.0 * half) + turn.z.abs() / 4.0;
             }
             last = Some(q);
@@ -81,7 +87,39 @@ impl SpatialErrors {
             sigma_arcsec: [jump, jump, jump / (2.0 / 3.0 * half)],
             slow_arcsec: if crossed { slow_arcsec } else { [0.0; 3] },
             expected: n * moved,
+            imagined: Self::imagine(situation, reference, t_s),
         })
+    }
+
+    fn imagine(
+        situation: &Situation<'_>,
+        reference: &AttitudeSeries,
+        t_s: &[f64],
+    ) -> Option<Arc<Imagined>> {
+        let noise = &situation.model.noise;
+        let q: Vec<_> = t_s
+            .iter()
+            .map(|&t| reference.attitude(t))
+            .collect::<Option<_>>()?;
+        let turn = q.windows(2).map(|w| rotation_vector(&w[1], &w[0]));
+        let peak = noise.centroid_arcsec.unwrap_or(0.0);
+        let stars = situation.model.tracker.max_stars;
+        Some(Arc::new(Imagined {
+            camera: situation.camera.clone(),
+            stars: stars.map_or(USUAL_STARS as usize, |n| n as usize),
+            lsf_arcsec: noise.distortion_arcsec.unwrap_or(0.0),
+            order: noise.distortion_order.unwrap_or(7) as usize,
+            centroid: CentroidError::Triangle(Triangle::from_peak(peak)),
+            t_s: t_s.to_vec(),
+            turn: std::iter::once(Vector3::zeros()).chain(turn).collect(),
+            drawn: OnceLock::new(),
+        }))
+    }
+
+    /// Whether a line of this amplitude about an axis, arcsec, is more than the declared model makes.
+    pub(crate) fn is_line(&self, frequency_hz: f64, axis: usize, amplitude: f64) -> bool {
+        let imagined = self.imagined.as_ref();
+        imagined.is_none_or(|i| i.is_beyond(frequency_hz, axis, amplitude))
     }
 
     /// Chance that one of the changes makes a jump as large as `step`, arcsec.
@@ -115,6 +153,7 @@ mod tests {
             sigma_arcsec: [0.5, 0.5, 5.0],
             slow_arcsec: [0.0; 3],
             expected: 20.0,
+            imagined: None,
         };
         assert!(changes.chance([1.5, 0.0, 0.0]) > 0.5);
         // exp(-x/2) (1 + ...) at 36: 7.5e-8 times 20

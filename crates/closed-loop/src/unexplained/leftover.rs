@@ -211,13 +211,13 @@ pub(crate) fn attitude_tracks(
     t_s: &[f64],
     axes: &[Vec<f64>],
     outlier: &[Vec<bool>; 3],
-    changes: Option<SpatialErrors>,
+    changes: Option<&SpatialErrors>,
 ) -> Vec<Track> {
     axes.iter()
         .zip(outlier)
         .enumerate()
         .map(|(axis, (value, outlier))| Track {
-            changes: changes.map(|c| (c, axis)),
+            changes: changes.map(|c| (c.clone(), axis)),
             turns: true,
             t_s: t_s.to_vec(),
             value: value.clone(),
@@ -250,7 +250,7 @@ impl Track {
             t_s: Vec::new(),
             value: Vec::new(),
             weight: Vec::new(),
-            changes: self.changes,
+            changes: self.changes.clone(),
             turns: self.turns,
         };
         for rows in rows {

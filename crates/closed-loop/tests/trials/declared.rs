@@ -56,3 +56,28 @@ fn what_is_declared_is_not_found_again() {
         }
     }
 }
+
+/// Slews to and fro take the stars over the same distortion every 240 s, and an attitude errs with them: no line of
+/// the tracker's own, in any of its harmonics. One of 1.5 arcsec is beyond that, and named.
+#[test]
+fn what_a_motion_makes_of_the_declared_errors_is_no_line() {
+    let at = |seed: u64, line: Option<&str>| {
+        let mut case = Case::new(Path::Slews, seed);
+        case.duration_s = 900.0;
+        if let Some(line) = line {
+            case = case.with("periodic_misalignment", line);
+        }
+        let (model, mut bundle) = case.make();
+        bundle.stars = None;
+        closed(&model, &bundle).expect("the loop closes").report
+    };
+    for seed in [7, 19, 20] {
+        let report = at(seed, None);
+        assert!(report.effects.is_empty(), "{seed}: {:?}", report.effects);
+        assert!(report.unattributed.lines_hz.is_empty(), "{seed}");
+    }
+    let line = "frequency_hz = 0.0613\nx_cos_arcsec = 1.5\ny_sin_arcsec = 1.5";
+    let report = at(7, Some(line));
+    let ids: Vec<&str> = report.effects.iter().map(|e| e.id.as_str()).collect();
+    assert_eq!(ids, ["periodic_misalignment"]);
+}

@@ -115,8 +115,10 @@ impl Track {
                 break;
             };
             let p = chance(loglik - before, 1);
-            let change = |(c, axis): (SpatialErrors, usize)| c.chance_on(axis, size);
-            if p * self.instants() as f64 >= alpha || self.changes.map_or(0.0, change) >= alpha {
+            let change = |(c, axis): &(SpatialErrors, usize)| c.chance_on(*axis, size);
+            if p * self.instants() as f64 >= alpha
+                || self.changes.as_ref().map_or(0.0, change) >= alpha
+            {
                 break;
             }
             found.push(self.before(at));

@@ -169,7 +169,7 @@ impl Series {
         let likely = law.sf(-2.0 * sum) * (bins as f64) < WORTH_A_SEARCH;
         let seen = turns.iter().any(|(track, spectrum)| {
             let size = track.take_out(&spectrum.noise, &track.sinusoids(&[frequency_hz]));
-            size.is_some_and(|(size, _)| track.is_beyond_declared([size[1], size[2]]))
+            size.is_some_and(|(size, _)| track.is_beyond_declared(frequency_hz, [size[1], size[2]]))
         });
         (likely && seen).then_some(SharedLine {
             frequency_hz,
@@ -220,7 +220,7 @@ impl Track {
             *self = left;
             let each = found.into_iter().enumerate();
             found = each
-                .filter(|(k, _)| self.is_beyond_declared([size[1 + 2 * k], size[2 + 2 * k]]))
+                .filter(|(k, f)| self.is_beyond_declared(*f, [size[1 + 2 * k], size[2 + 2 * k]]))
                 .map(|(_, f)| f)
                 .collect();
         }
@@ -228,9 +228,9 @@ impl Track {
     }
 
     /// Whether a line with these amplitudes of cosine and sine is more than the declared model makes.
-    fn is_beyond_declared(&self, [cos, sin]: [f64; 2]) -> bool {
-        let declared = self.changes.map_or(0.0, |(c, axis)| c.slow_arcsec[axis]);
-        cos.hypot(sin) / std::f64::consts::SQRT_2 > declared
+    fn is_beyond_declared(&self, frequency_hz: f64, [cos, sin]: [f64; 2]) -> bool {
+        let changes = self.changes.as_ref();
+        changes.is_none_or(|(c, axis)| c.is_line(frequency_hz, *axis, cos.hypot(sin)))
     }
 
     fn sinusoids(&self, frequencies: &[f64]) -> Vec<Vec<f64>> {

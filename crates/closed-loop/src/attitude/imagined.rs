@@ -1,0 +1,191 @@
+//! Attitude errors that the declared model makes along a motion, imagined: what a line is held against.
+//!
+//! Stars that cross the detector bring the declared distortion and centroid error of their places along. A motion
+//! that repeats makes a line of them, and so does a steady one that takes pixel after pixel. How large depends on
+//! stars and coefficients that an attitude does not tell. So some skies and fields are drawn, and for a frequency
+//!
+//! ```text
+//! theta = (sum N^T N)^-1 sum N^T e(P_s(t))         n stars, e: the drawn error at each star's place
+//! a(f)  = rms over the draws of the amplitude of theta at f
+//! ```
+//!
+//! Stars that leave the field on one side come in on the other. An amplitude is Rayleigh over draws: one in 8000
+//! is beyond three times its rms.
+//!
+//! Source: [M23] Fig. 4 with equal weights; Sections 2.2 and 2.3 for the errors.
+
+use std::f64::consts::TAU;
+use std::sync::OnceLock;
+
+use centroid::CentroidError;
+use distortion::{DistortionField, LsfSigma};
+use focal_plane::{Angle, Camera, Pixel};
+use nalgebra::{Matrix3, Vector3};
+use rayon::prelude::*;
+use star_tracker::{Purpose, stream};
+
+/// Skies and fields.
+const DRAWS: u64 = 10;
+/// Most frames that are gone through: a part of a longer run is as good as the whole.
+const MOST_FRAMES: usize = 20_000;
+/// Amplitudes beyond so many of the imagined are not the declared model's.
+const BEYOND: f64 = 3.0;
+
+/// What is drawn, and along which motion.
+#[derive(Debug)]
+pub(crate) struct Imagined {
+    pub(crate) camera: Camera,
+    pub(crate) stars: usize,
+    /// Of the distortion, arcsec, and its order.
+    pub(crate) lsf_arcsec: f64,
+    pub(crate) order: usize,
+    /// Arcsec.
+    pub(crate) centroid: CentroidError,
+    /// Times of the frames, and the turn to each from the one before, rad, tracker axes.
+    pub(crate) t_s: Vec<f64>,
+    pub(crate) turn: Vec<Vector3<f64>>,
+    /// Drawn when it is asked for.
+    pub(crate) drawn: OnceLock<Vec<[Vec<f64>; 3]>>,
+}
+
+impl Imagined {
+    /// Whether a line of these amplitudes per axis, arcsec, is more than the declared model makes at `f`, Hz.
+    pub(crate) fn is_beyond(&self, f: f64, axis: usize, amplitude: f64) -> bool {
+        amplitude > BEYOND * self.line_arcsec(f)[axis]
+    }
+
+    /// a(f), arcsec per axis.
+    fn line_arcsec(&self, f: f64) -> [f64; 3] {
+        let drawn = self.drawn.get_or_init(|| {
+            let draws = (0..DRAWS).into_par_iter();
+            draws.filter_map(|k| self.draw(k)).collect()
+        });
+        let frames = self.t_s.len().min(MOST_FRAMES);
+        let waves: Vec<[f64; 3]> = self.t_s[..frames]
+            .iter()
+            .map(|t| {
+                let (sin, cos) = (TAU * f * (t - self.t_s[0])).sin_cos();
+                [1.0, cos, sin]
+            })
+            .collect();
+        let normal: Matrix3<f64> = waves
+            .iter()
+            .map(|w| Vector3::from(*w) * Vector3::from(*w).transpose())
+            .sum();
+        let Some(inverse) = normal.try_inverse() else {
+            return [0.0; 3];
+        };
+        std::array::from_fn(|axis| {
+            let square = |theta: &[Vec<f64>; 3]| -> f64 {
+                let all = waves.iter().zip(&theta[axis]);
+                let score: Vector3<f64> = all.map(|(w, v)| Vector3::from(*w) * *v).sum();
+                let size = inverse * score;
+                size.y * size.y + size.z * size.z
+            };
+            let n = drawn.len().max(1) as f64;
+            (drawn.iter().map(square).sum::<f64>() / n).sqrt()
+        })
+    }
+
+    /// Errors of one sky and field, arcsec per axis, frame by frame.
+    fn draw(&self, k: u64) -> Option<[Vec<f64>; 3]> {
+        let sigma = LsfSigma::Circular(Angle::from_arcsec(self.lsf_arcsec));
+        let mut rng = stream(0, k, Purpose::Distortion);
+        let field = DistortionField::draw(self.order, sigma, &mut rng).ok()?;
+        let half = self.camera.half_size_px();
+        let [fx, fy] = self.camera.focal_length_px();
+        // spread evenly (Roberts' sequence), and otherwise in every draw
+        let spread = |i: usize, step: f64| -> f64 {
+            let at = (0.5 + step * (i as f64 + 1.0) + 0.37 * k as f64 * step).fract();
+            2.0 * at - 1.0
+        };
+        let mut at: Vec<[f64; 2]> = (0..self.stars)
+            .map(|i| {
+                [
+                    spread(i, 0.754_877_666) * half[0],
+                    spread(i, 0.569_840_291) * half[1],
+                ]
+            })
+            .collect();
+        let mut out: [Vec<f64>; 3] = Default::default();
+        for turn in self.turn.iter().take(MOST_FRAMES) {
+            let (mut normal, mut score) = (Matrix3::zeros(), Vector3::zeros());
+            for star in &mut at {
+                // dv = theta x v, v = (x, y, 1)
+                let [x, y] = [star[0] / fx, star[1] / fy];
+                let rows = [
+                    Vector3::new(-x * y, 1.0 + x * x, -y),
+                    Vector3::new(-1.0 - y * y, x * y, x),
+                ];
+                for (axis, row) in rows.iter().enumerate() {
+                    let moved = star[axis] + row.dot(turn) * [fx, fy][axis];
+                    star[axis] = (moved + half[axis]).rem_euclid(2.0 * half[axis]) - half[axis];
+                }
+                let pixel = Pixel {
+                    x: star[0],
+                    y: star[1],
+                };
+                let lsf = field.evaluate(self.camera.normalised(pixel));
+                let hsf = self.centroid.error_at(pixel, self.camera.pixel_centre());
+                for (axis, row) in rows.iter().enumerate() {
+                    normal += row * row.transpose();
+                    score += row * (lsf[axis] + hsf[axis]);
+                }
+            }
+            let theta = normal.try_inverse()? * score;
+            for (axis, out) in out.iter_mut().enumerate() {
+                out.push(theta[axis]);
+            }
+        }
+        Some(out)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Ten minutes at 2 Hz about X, by what `path` tells in rad.
+    fn imagined(lsf_arcsec: f64, peak_arcsec: f64, path: impl Fn(f64) -> f64) -> Imagined {
+        let t_s: Vec<f64> = (0..1200).map(|k| 0.5 * f64::from(k)).collect();
+        let turn = t_s
+            .windows(2)
+            .map(|t| Vector3::x() * (path(t[1]) - path(t[0])));
+        Imagined {
+            camera: Camera::from_fov_deg([1024, 1024], [20.0, 20.0]).expect("a camera"),
+            stars: 12,
+            lsf_arcsec,
+            order: 7,
+            centroid: CentroidError::Triangle(centroid::Triangle::from_peak(peak_arcsec)),
+            turn: std::iter::once(Vector3::zeros()).chain(turn).collect(),
+            t_s,
+            drawn: OnceLock::new(),
+        }
+    }
+
+    /// A swing by 1 degree (50 px) takes all stars over the same distortion again and again: a line at its
+    /// frequency, ten times what there is elsewhere, of the size of 3 arcsec over sqrt(12) or less.
+    #[test]
+    fn a_motion_that_repeats_makes_a_line() {
+        let swing = imagined(3.0, 0.0, |t| 0.0175 * (TAU * 0.04 * t).sin());
+        let [line, beside] = [0.04, 0.0533].map(|f| swing.line_arcsec(f));
+        for axis in 0..3 {
+            assert!(line[axis] > 10.0 * beside[axis], "{line:?} {beside:?}");
+        }
+        assert!(line[0] < 3.0 / 12.0_f64.sqrt(), "{line:?}");
+        assert!(swing.is_beyond(0.04, 0, 3.1 * line[0]) && !swing.is_beyond(0.04, 0, line[0]));
+    }
+
+    /// A drift of 0.1 px/s takes pixel after pixel: the triangle's line is at 0.1 Hz, about X. Without errors there
+    /// is none.
+    #[test]
+    fn a_drift_over_pixels_makes_a_line() {
+        let px =
+            imagined(0.0, 0.0, |_| 0.0).camera.arcsec_per_px()[0] / focal_plane::ARCSEC_PER_RAD;
+        let drift = |peak: f64| imagined(0.0, peak, move |t| 0.1 * px * t);
+        let [line, beside] = [0.1, 0.0727].map(|f| drift(5.0).line_arcsec(f)[0]);
+        assert!(line > 5.0 * beside, "{line} {beside}");
+        let none = drift(0.0).line_arcsec(0.1);
+        assert!(none.iter().all(|a| a.abs() < 1e-12), "{none:?}");
+    }
+}
