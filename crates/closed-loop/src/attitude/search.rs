@@ -25,6 +25,7 @@ use std::sync::Arc;
 use block_regression::Folds;
 use coloured_noise::Coloured;
 use effects::Candidate;
+use focal_plane::{ARCSEC_PER_RAD, SPEED_OF_LIGHT_M_S};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -36,7 +37,7 @@ use crate::evidence::Evidence;
 use crate::figures;
 use crate::search::empirical::EMPIRICAL;
 use crate::search::refusal::{Refusal, Refused};
-use crate::search::selection::{Judgement, Selection, columns_of, costs, price};
+use crate::search::selection::{FAMILY_ALPHA, Judgement, Selection, columns_of, costs, price};
 use crate::search::{
     Fitted, Found, amplitudes, borrowed, family, first_column, fit, fit_design, polish,
 };
@@ -44,6 +45,8 @@ use crate::search::{
 /// The effects that a change of stars looks like, and stars that come by again.
 const STEP: &str = "step_misalignment";
 const LINE: &str = "periodic_misalignment";
+/// The effect of an orbit.
+const ABERRATION: &str = "velocity_aberration";
 
 /// Rounds of generalised least squares and noise fit.
 const ALTERNATIONS: usize = 3;
@@ -343,17 +346,20 @@ impl<'a, 'd> Trial<'a, 'd> {
         let ratio = 2.0 * (with.loglik - without.loglik) / WIDENING;
         let freedom = (group.columns.len() + group.choices) as f64;
         let p = ChiSquared::new(freedom).map_or(1.0, |law| law.sf(ratio.max(0.0)));
-        let p = (p * self.cost[g]).min(1.0);
+        let mut p = (p * self.cost[g]).min(1.0);
+        if p < FAMILY_ALPHA {
+            p = p.max(self.as_declared(&set, g, &with));
+        }
         Judgement {
             delta_loglik: with.out_of_fold - without.out_of_fold,
-            p_value: p.max(self.as_declared(&set, g, &with)),
+            p_value: p,
             credible: with.credible,
             observable: true,
         }
     }
 
-    /// Chance that step or line `g` of `set` is what the declared model makes: a change of stars, or stars that
-    /// come by again.
+    /// Chance that step, line or orbit `g` of `set` is what the declared model makes: a change of stars, stars that
+    /// come by again, or that go on.
     fn as_declared(&self, set: &[usize], g: usize, scored: &Scored) -> f64 {
         let Some(changes) = self.changes else {
             return 0.0;
@@ -367,11 +373,20 @@ impl<'a, 'd> Trial<'a, 'd> {
             LINE => {
                 // cosine and sine, axis by axis
                 let frequency = candidate.nonlinear()[0].value;
+                let t_s = &self.data.bins.t_s;
+                let span_s = t_s.last().zip(t_s.first()).map_or(0.0, |(l, f)| l - f);
                 let is_more = |axis: usize| {
                     let amplitude = size(2 * axis).hypot(size(2 * axis + 1));
-                    changes.is_line(frequency, axis, amplitude)
+                    let rows = self.data.count[axis].iter().sum::<f64>() / span_s;
+                    changes.is_line(frequency, axis, amplitude, &scored.noise[axis], rows)
                 };
                 f64::from(u8::from(!(0..3).any(is_more)))
+            }
+            // an orbit of which part of a turn is seen looks like a slow error
+            ABERRATION if self.fitted.groups[g].slopes > 0 => {
+                let amplitude = size(0) / SPEED_OF_LIGHT_M_S * ARCSEC_PER_RAD;
+                let slow = changes.slow_arcsec[0].max(changes.slow_arcsec[1]);
+                f64::from(u8::from(amplitude / std::f64::consts::SQRT_2 <= slow))
             }
             _ => 0.0,
         }

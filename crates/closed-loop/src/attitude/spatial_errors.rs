@@ -23,6 +23,7 @@
 use std::sync::{Arc, OnceLock};
 
 use centroid::{CentroidError, Triangle};
+use coloured_noise::Coloured;
 use focal_plane::{AttitudeSeries, AttitudeSource, rotation_vector};
 use nalgebra::Vector3;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -32,7 +33,7 @@ use crate::attitude::imagined::Imagined;
 use crate::situation::Situation;
 
 /// Stars of a model that does not say how many.
-const USUAL_STARS: f64 = 10.0;
+const USUAL_STARS: u32 = 10;
 /// See the header.
 const WIDER: f64 = 2.0;
 /// Stretches of the motion; a jitter faster than that changes no stars for long.
@@ -64,7 +65,7 @@ impl SpatialErrors {
         let star = (noise.distortion_arcsec.unwrap_or(0.0).powi(2) / 2.0
             + noise.centroid_arcsec.unwrap_or(0.0).powi(2) / 3.0)
             .sqrt();
-        let n = model.tracker.max_stars.map_or(USUAL_STARS, f64::from);
+        let n = f64::from(model.tracker.max_stars.unwrap_or(USUAL_STARS));
         let [x, y] = situation.camera.half_size_px();
         let half = x.max(y) / situation.camera.focal_length_px()[0];
         let jump = WIDER * std::f64::consts::SQRT_2 * star / n;
@@ -106,7 +107,7 @@ impl SpatialErrors {
         let stars = situation.model.tracker.max_stars;
         Some(Arc::new(Imagined {
             camera: situation.camera.clone(),
-            stars: stars.map_or(USUAL_STARS as usize, |n| n as usize),
+            stars: stars.unwrap_or(USUAL_STARS) as usize,
             lsf_arcsec: noise.distortion_arcsec.unwrap_or(0.0),
             order: noise.distortion_order.unwrap_or(7) as usize,
             centroid: CentroidError::Triangle(Triangle::from_peak(peak)),
@@ -116,10 +117,25 @@ impl SpatialErrors {
         }))
     }
 
-    /// Whether a line of this amplitude about an axis, arcsec, is more than the declared model makes.
-    pub(crate) fn is_line(&self, frequency_hz: f64, axis: usize, amplitude: f64) -> bool {
-        let imagined = self.imagined.as_ref();
-        imagined.is_none_or(|i| i.is_beyond(frequency_hz, axis, amplitude))
+    /// Whether a line of this amplitude about an axis, arcsec, is more than the declared model makes beside `noise`
+    /// of so many rows in a second.
+    pub(crate) fn is_line(
+        &self,
+        frequency_hz: f64,
+        axis: usize,
+        amplitude: f64,
+        noise: &Coloured,
+        rows_s: f64,
+    ) -> bool {
+        let Some(imagined) = &self.imagined else {
+            return true;
+        };
+        // amplitudes have a mean square of four densities over the span
+        let turns = std::f64::consts::TAU * frequency_hz * noise.tau_s;
+        let slow = 2.0 * noise.slow.powi(2) * noise.tau_s / (1.0 + turns * turns);
+        let density = noise.white.powi(2) / rows_s + slow;
+        let noise = 4.0 * density / imagined.span_s();
+        imagined.is_beyond(frequency_hz, axis, amplitude, noise)
     }
 
     /// Chance that one of the changes makes a jump as large as `step`, arcsec.

@@ -145,8 +145,7 @@ impl SharedLine {
 }
 
 impl Series {
-    /// The line that the tracker most likely turns with, if it is worth a search, and more than
-    /// the declared model makes by itself.
+    /// The line that the tracker most likely turns with, if it is worth a search.
     pub(crate) fn shared_line(&self) -> Option<SharedLine> {
         let turns: Vec<(&Track, &Spectrum)> = self
             .each
@@ -167,11 +166,7 @@ impl Series {
         let law = ChiSquared::new(2.0 * turns.len() as f64).ok()?;
         let frequency_hz = grid.at(best);
         let likely = law.sf(-2.0 * sum) * (bins as f64) < WORTH_A_SEARCH;
-        let seen = turns.iter().any(|(track, spectrum)| {
-            let size = track.take_out(&spectrum.noise, &track.sinusoids(&[frequency_hz]));
-            size.is_some_and(|(size, _)| track.is_beyond_declared(frequency_hz, [size[1], size[2]]))
-        });
-        (likely && seen).then_some(SharedLine {
+        likely.then_some(SharedLine {
             frequency_hz,
             tried: bins,
         })
@@ -220,7 +215,9 @@ impl Track {
             *self = left;
             let each = found.into_iter().enumerate();
             found = each
-                .filter(|(k, f)| self.is_beyond_declared(*f, [size[1 + 2 * k], size[2 + 2 * k]]))
+                .filter(|(k, f)| {
+                    self.is_beyond_declared(*f, [size[1 + 2 * k], size[2 + 2 * k]], &noise)
+                })
                 .map(|(_, f)| f)
                 .collect();
         }
@@ -228,9 +225,16 @@ impl Track {
     }
 
     /// Whether a line with these amplitudes of cosine and sine is more than the declared model makes.
-    fn is_beyond_declared(&self, frequency_hz: f64, [cos, sin]: [f64; 2]) -> bool {
+    fn is_beyond_declared(
+        &self,
+        frequency_hz: f64,
+        [cos, sin]: [f64; 2],
+        noise: &Coloured,
+    ) -> bool {
+        let rows_s = self.weight.iter().sum::<f64>() / self.span();
         let changes = self.changes.as_ref();
-        changes.is_none_or(|(c, axis)| c.is_line(frequency_hz, *axis, cos.hypot(sin)))
+        changes
+            .is_none_or(|(c, axis)| c.is_line(frequency_hz, *axis, cos.hypot(sin), noise, rows_s))
     }
 
     fn sinusoids(&self, frequencies: &[f64]) -> Vec<Vec<f64>> {
