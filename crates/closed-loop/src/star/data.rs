@@ -393,21 +393,6 @@ impl StarData {
         }
     }
 
-    /// What the declared effects move the image of each row by, per axis, px.
-    pub(crate) fn moved_by_declared_effects(&self) -> [Vec<f64>; 2] {
-        let mut moved = self.projected.clone();
-        for k in 0..self.frames.frames() {
-            for row in self.frames.rows_of(k) {
-                let u = self.stars[self.star[row]].direction;
-                let centre = self.position(&self.attitude[k], &u);
-                for axis in 0..2 {
-                    moved[axis][row] -= centre[axis];
-                }
-            }
-        }
-        moved
-    }
-
     /// Velocity and acceleration across the detector, from `motion` at three
     /// instants around each frame; zero where there is none.
     pub(crate) fn follow(&mut self, motion: Option<&dyn AttitudeSource>) {
@@ -487,7 +472,7 @@ impl StarData {
         }
     }
 
-    fn position(&self, q: &UnitQuaternion<f64>, u: &Vector3<f64>) -> [f64; 2] {
+    pub(crate) fn position(&self, q: &UnitQuaternion<f64>, u: &Vector3<f64>) -> [f64; 2] {
         self.camera
             .project(&(q * u))
             .map_or([f64::NAN; 2], |p| [p.x, p.y])

@@ -34,7 +34,7 @@ pub(crate) fn residuals(
         return None;
     }
     let scale = data.camera.arcsec_per_px();
-    let by_effects = data.moved_by_declared_effects();
+    let by_effects = moved_by_declared_effects(data);
     let shift = |residual: &Residuals, phase_error: &[Vec<f64>; 2]| -> Vec<Vec<f64>> {
         (0..2)
             .map(|a| {
@@ -83,4 +83,19 @@ pub(crate) fn residuals(
         robust::mark_outliers(&out.before_arcsec[axis], &group, 1, &mut out.outlier);
     }
     (!out.t_s.is_empty()).then_some(out)
+}
+
+/// What the declared effects move the image of each row by, per axis, px.
+fn moved_by_declared_effects(data: &StarData) -> [Vec<f64>; 2] {
+    let mut moved = data.projected.clone();
+    for k in 0..data.frames.frames() {
+        for row in data.frames.rows_of(k) {
+            let u = data.stars[data.star[row]].direction;
+            let centre = data.position(&data.attitude[k], &u);
+            for axis in 0..2 {
+                moved[axis][row] -= centre[axis];
+            }
+        }
+    }
+    moved
 }
