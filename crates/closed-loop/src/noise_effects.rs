@@ -32,7 +32,7 @@ use crate::declared;
 use crate::error::CloseError;
 use crate::evidence::{Amplitudes, Evidence, Residuals};
 use crate::search::Found;
-use crate::search::selection::columns_of;
+use crate::search::selection::{FAMILY_ALPHA, columns_of};
 use crate::situation::Situation;
 use crate::star::data::StarData;
 use crate::star::evidence::StarEvidence;
@@ -307,8 +307,9 @@ impl NoiseEffects {
         }
         if !judged.stands {
             let [value, sigma] = judged.values[0];
+            let significant = judged.p_value < FAMILY_ALPHA && judged.gain > 0.0;
             self.considered.push(ConsideredEffect {
-                against: None,
+                against: judged.against.filter(|_| significant).map(str::to_owned),
                 id: id.to_owned(),
                 delta_loglik: Some(judged.gain),
                 p_value: Some(judged.p_value),

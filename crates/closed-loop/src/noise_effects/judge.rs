@@ -63,6 +63,8 @@ pub(super) struct Judged {
     pub(super) p_value: f64,
     pub(super) observable: bool,
     pub(super) stands: bool,
+    /// What speaks against it although it is significant.
+    pub(super) against: Option<&'static str>,
     /// The share of rows that the fewest spikes are which make one.
     pub(super) fewest: Option<f64>,
     /// Values with sigmas: slope; rate; share and size.
@@ -91,6 +93,7 @@ const UNSEEN: Judged = Judged {
     p_value: 1.0,
     observable: false,
     stands: false,
+    against: None,
     fewest: None,
     values: [[0.0; 2]; 2],
     least: 0.0,
@@ -318,6 +321,7 @@ impl Bench<'_> {
             p_value,
             observable: true,
             stands: credible && gain > 0.0 && p_value < FAMILY_ALPHA,
+            against: (!credible).then_some("it would be larger than nature makes it"),
             fewest: None,
             values: [values, [0.0; 2]],
             least,
@@ -379,14 +383,21 @@ impl Bench<'_> {
             });
             all.map(|m| m[(k, k)]).fold(0.0, f64::max).sqrt()
         };
-        let enough = share * rows.len() as f64 >= MIN_SPIKES
-            && with.loglik > self.model.loglik_of_tails(&with.at, &rows) + BEYOND_TAILS;
+        let tails = self.model.loglik_of_tails(&with.at, &rows) + BEYOND_TAILS;
+        let against = if share * (rows.len() as f64) < MIN_SPIKES {
+            Some("so few rows are no share")
+        } else if with.loglik <= tails {
+            Some("noise with long tails explains as much")
+        } else {
+            None
+        };
         let p_value = (TRIED * likely(ratio, 2.0)).min(1.0);
         Judged {
             gain,
             p_value,
             observable: true,
-            stands: enough && gain > 0.0 && p_value < FAMILY_ALPHA,
+            stands: against.is_none() && gain > 0.0 && p_value < FAMILY_ALPHA,
+            against,
             fewest: Some(MIN_SPIKES / rows.len().max(1) as f64),
             values: [
                 [share, sigma(SHARE) * share * (1.0 - share)],

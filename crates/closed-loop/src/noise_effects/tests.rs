@@ -87,6 +87,21 @@ fn claims(seeds: std::ops::Range<u64>, frames: usize, truth: Truth) -> [usize; 3
     count
 }
 
+/// Noise of long tails is told from Gaussian noise beyond doubt, and from spikes not at all: that is said.
+#[test]
+fn long_tails_speak_against_spikes() {
+    let truth = Truth {
+        tails: Some(4.0),
+        ..Truth::default()
+    };
+    let spikes = verdicts(3, 600, truth).outliers;
+    assert!(!spikes.stands && spikes.p_value < 1e-3, "{spikes:?}");
+    assert!(
+        spikes.against.is_some_and(|why| why.contains("tails")),
+        "{spikes:?}"
+    );
+}
+
 /// What could have been seen counts from what passes for nothing, wherever below it the estimate lies.
 #[test]
 fn a_small_slope_is_held_against_all_that_passes_for_none() {
