@@ -15,13 +15,12 @@
 //!
 //! Source: \[M23\] Section 4.2.1 names the effect; the series is that of the mean of a path.
 
-use focal_plane::{Camera, PointsMut, VectorsMut, rotation_vector};
-use nalgebra::{UnitQuaternion, Vector3};
+use focal_plane::{Camera, PointsMut, VectorsMut};
 use star_tracker::{Disturbance, Stages};
 
 use crate::candidate::check_columns;
 use crate::parameters::Reader;
-use crate::path::{GAUSS_LEGENDRE_8, Path};
+use crate::path::{GAUSS_LEGENDRE_8, Path, mean_turn};
 use crate::{
     ActsOn, AttitudeRows, Candidate, Coefficient, Effect, EffectError, EffectKind, Parameter,
     Parameters, Scene, StarRows, Surroundings,
@@ -168,16 +167,9 @@ impl Candidate for SmearCandidate {
         let squared = self.about_s * self.about_s;
         let mut hint = 0;
         for (i, &t_s) in rows.t_s.iter().enumerate() {
-            let mut mean = || {
-                let mut mean = Vector3::zeros();
-                for (node, weight) in GAUSS_LEGENDRE_8 {
-                    let turn = source.turn(t_s, 0.5 * self.about_s * node, &mut hint)?;
-                    mean += rotation_vector(&turn, &UnitQuaternion::identity()) * (0.5 * weight);
-                }
-                Some(mean)
-            };
+            let mean = mean_turn(source, t_s, 0.0, self.about_s, &mut hint);
             // an exposure that leaves the span cannot be told
-            let theta = mean().unwrap_or_default() / squared;
+            let theta = mean.unwrap_or_default() / squared;
             out.x[i] = theta.x;
             out.y[i] = theta.y;
             out.z[i] = theta.z;

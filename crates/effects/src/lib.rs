@@ -53,7 +53,7 @@ pub use empirical::empirical_parameters;
 pub use error::EffectError;
 pub use hot_pixel::hot_pixel_at;
 pub use parameters::{Parameter, ParameterValue, Parameters};
-pub use path::GAUSS_LEGENDRE_8;
+pub use path::mean_turn;
 pub use periodic_misalignment::line_at;
 pub use pixel_phase_harmonics::{harmonics_of, left_of_wave};
 pub use scene::{FrameGeometry, Scene, StarFacts, Surroundings, VectorFrame};

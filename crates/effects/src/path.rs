@@ -7,13 +7,13 @@
 //!
 //! Source: the frames of `focal_plane` (`v_tracker = q v_inertial`).
 
-use focal_plane::{AttitudeSource, Camera};
-use nalgebra::UnitQuaternion;
+use focal_plane::{AttitudeSource, Camera, rotation_vector};
+use nalgebra::{UnitQuaternion, Vector3};
 
 use crate::StarRows;
 
 /// Gauss-Legendre nodes and weights on [-1, 1], exact to degree 15 (Abramowitz & Stegun, Table 25.4).
-pub const GAUSS_LEGENDRE_8: [(f64, f64); 8] = [
+pub(crate) const GAUSS_LEGENDRE_8: [(f64, f64); 8] = [
     (-0.960_289_856_497_536_2, 0.101_228_536_290_376_26),
     (-0.796_666_477_413_626_7, 0.222_381_034_453_374_47),
     (-0.525_532_409_916_329, 0.313_706_645_877_887_3),
@@ -23,6 +23,30 @@ pub const GAUSS_LEGENDRE_8: [(f64, f64); 8] = [
     (0.796_666_477_413_626_7, 0.222_381_034_453_374_47),
     (0.960_289_856_497_536_2, 0.101_228_536_290_376_26),
 ];
+
+/// Mean turn of the tracker from `t_s` to an exposure of `exposure_s` about `t_s + shift_s`, rad, tracker axes:
+/// the mean of `log( q(t + shift + s) q(t)^-1 )`. `None` where `source` does not know the path. `hint` is that of
+/// [`AttitudeSource::turn`].
+pub fn mean_turn(
+    source: &dyn AttitudeSource,
+    t_s: f64,
+    shift_s: f64,
+    exposure_s: f64,
+    hint: &mut usize,
+) -> Option<Vector3<f64>> {
+    let mut turn = |d_s: f64| {
+        let turn = source.turn(t_s, d_s, hint)?;
+        Some(rotation_vector(&turn, &UnitQuaternion::identity()))
+    };
+    if exposure_s <= 0.0 {
+        return turn(shift_s);
+    }
+    let mut mean = Vector3::zeros();
+    for (node, weight) in GAUSS_LEGENDRE_8 {
+        mean += turn(shift_s + 0.5 * exposure_s * node)? * (0.5 * weight);
+    }
+    Some(mean)
+}
 
 /// Follows the modelled path of star rows.
 pub(crate) struct Path<'a> {

@@ -11,13 +11,12 @@
 //! Source: definition; the sign of theta follows from `v_meas = v + theta x v` and
 //! `v(t + d) = v - d omega x v`.
 
-use focal_plane::{Camera, PointsMut, VectorsMut, rotation_vector};
-use nalgebra::UnitQuaternion;
+use focal_plane::{Camera, PointsMut, VectorsMut};
 use star_tracker::{Disturbance, Stages, StarView};
 
 use crate::candidate::check_columns;
 use crate::parameters::Reader;
-use crate::path::Path;
+use crate::path::{Path, mean_turn};
 use crate::{
     ActsOn, AttitudeRows, Candidate, Coefficient, Effect, EffectError, EffectKind, Parameter,
     Parameters, Scene, StarRows, Surroundings,
@@ -147,8 +146,7 @@ impl Candidate for OffsetCandidate {
                 if d_s.abs() < SMALLEST_S {
                     return source.rate_rad_s(t_s).map(|rate| -rate);
                 }
-                let turn = source.turn(t_s, d_s, &mut hint)?;
-                Some(rotation_vector(&turn, &UnitQuaternion::identity()) / d_s)
+                Some(mean_turn(source, t_s, d_s, 0.0, &mut hint)? / d_s)
             };
             let theta = match chord() {
                 Some(theta) => theta,

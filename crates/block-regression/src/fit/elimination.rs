@@ -48,12 +48,8 @@ impl Eliminated {
         let mut prior = &layout.nuisance_precision * variance;
         for k in 0..n {
             let own = normal[(k, k)];
-            prior[(k, k)] += FLOOR
-                * if own > FLOOR * FLOOR * most {
-                    own
-                } else {
-                    most
-                };
+            let told = own > FLOOR * FLOOR * most;
+            prior[(k, k)] += FLOOR * if told { own } else { most };
         }
         normal += &prior;
         let cross = picked(gram, 0..n, pick);

@@ -13,9 +13,9 @@
 
 use std::sync::Arc;
 
-use effects::{Effect, GAUSS_LEGENDRE_8};
-use focal_plane::{ARCSEC_PER_RAD, AttitudeSource, Pixel, rotation_vector};
-use nalgebra::{UnitQuaternion, Vector3};
+use effects::{Effect, mean_turn};
+use focal_plane::{ARCSEC_PER_RAD, AttitudeSource, Pixel};
+use nalgebra::Vector3;
 use star_tracker::StarView;
 
 use crate::motion::Around;
@@ -53,25 +53,7 @@ pub(crate) fn rotation(effects: &[Arc<dyn Effect>], motion: &Around, t_s: f64) -
         }
     }
     if motion.resolved() && (shift_s != 0.0 || exposure_s > 0.0) {
-        theta += along(motion, t_s, shift_s, exposure_s).unwrap_or_default();
+        theta += mean_turn(motion, t_s, shift_s, exposure_s, &mut 0).unwrap_or_default();
     }
     theta * ARCSEC_PER_RAD
-}
-
-/// Mean turn of the tracker from `t_s` to an exposure that is `shift_s` later, rad; `None` where the path is not
-/// known.
-fn along(motion: &Around, t_s: f64, shift_s: f64, exposure_s: f64) -> Option<Vector3<f64>> {
-    let mut hint = 0;
-    let mut turn = |d_s: f64| {
-        let turn = motion.turn(t_s, d_s, &mut hint)?;
-        Some(rotation_vector(&turn, &UnitQuaternion::identity()))
-    };
-    if exposure_s <= 0.0 {
-        return turn(shift_s);
-    }
-    let mut mean = Vector3::zeros();
-    for (node, weight) in GAUSS_LEGENDRE_8 {
-        mean += turn(shift_s + 0.5 * exposure_s * node)? * (0.5 * weight);
-    }
-    Some(mean)
 }

@@ -10,8 +10,8 @@
 //! ```
 //!
 //! Bright stars stand in heaps: each sky is a part of the field, and stars that leave it on one side come in on
-//! the other. An amplitude is Rayleigh over draws: one in 1e5 is
-//! beyond 3.4 times its rms, and of as many frequencies the largest is found; the rms of 48 draws is known to 7 %.
+//! the other. An amplitude is Rayleigh over draws: one in 1e5 is beyond 3.4 times its rms, and of as many
+//! frequencies the largest is found; the rms of 48 draws is known to 7 %.
 //!
 //! Source: [M23] Fig. 4 with equal weights; Sections 2.2 and 2.3 for the errors.
 
@@ -62,7 +62,7 @@ impl Imagined {
     /// make, of which amplitudes have a mean square of `noise`, arcsec^2.
     pub(crate) fn is_beyond(&self, f: f64, axis: usize, amplitude: f64, noise: f64) -> bool {
         let step = (0.5 / self.span_s()).max(SPREAD * f);
-        let near = (-NEAR..=NEAR).map(|k| self.line_arcsec(f + step * f64::from(k))[axis]);
+        let near = (-NEAR..=NEAR).map(|k| self.line_arcsec(f + step * f64::from(k), axis));
         amplitude > BEYOND * near.fold(0.0, f64::max).hypot(noise.sqrt())
     }
 
@@ -70,8 +70,8 @@ impl Imagined {
         self.t_s.last().unwrap_or(&0.0) - self.t_s.first().unwrap_or(&0.0)
     }
 
-    /// a(f), arcsec per axis.
-    fn line_arcsec(&self, f: f64) -> [f64; 3] {
+    /// a(f) about an axis, arcsec.
+    fn line_arcsec(&self, f: f64, axis: usize) -> f64 {
         let drawn = self.drawn.get_or_init(|| {
             let draws = (0..DRAWS).into_par_iter();
             draws.filter_map(|k| self.draw(k)).collect()
@@ -89,18 +89,16 @@ impl Imagined {
             .map(|w| Vector3::from(*w) * Vector3::from(*w).transpose())
             .sum();
         let Some(inverse) = normal.try_inverse() else {
-            return [0.0; 3];
+            return 0.0;
         };
-        std::array::from_fn(|axis| {
-            let square = |theta: &[Vec<f64>; 3]| -> f64 {
-                let all = waves.iter().zip(&theta[axis]);
-                let score: Vector3<f64> = all.map(|(w, v)| Vector3::from(*w) * *v).sum();
-                let size = inverse * score;
-                size.y * size.y + size.z * size.z
-            };
-            let n = drawn.len().max(1) as f64;
-            (drawn.iter().map(square).sum::<f64>() / n).sqrt()
-        })
+        let square = |theta: &[Vec<f64>; 3]| -> f64 {
+            let all = waves.iter().zip(&theta[axis]);
+            let score: Vector3<f64> = all.map(|(w, v)| Vector3::from(*w) * *v).sum();
+            let size = inverse * score;
+            size.y * size.y + size.z * size.z
+        };
+        let n = drawn.len().max(1) as f64;
+        (drawn.iter().map(square).sum::<f64>() / n).sqrt()
     }
 
     /// Errors of one sky and field, arcsec per axis, frame by frame.
@@ -181,7 +179,8 @@ mod tests {
     #[test]
     fn a_motion_that_repeats_makes_a_line() {
         let swing = imagined(3.0, 0.0, |t| 0.0175 * (TAU * 0.04 * t).sin());
-        let [line, beside] = [0.04, 0.0533].map(|f| swing.line_arcsec(f));
+        let [line, beside] =
+            [0.04, 0.0533].map(|f| [0, 1, 2].map(|axis| swing.line_arcsec(f, axis)));
         for axis in 0..3 {
             assert!(line[axis] > 10.0 * beside[axis], "{line:?} {beside:?}");
         }
@@ -198,9 +197,9 @@ mod tests {
         let px =
             imagined(0.0, 0.0, |_| 0.0).camera.arcsec_per_px()[0] / focal_plane::ARCSEC_PER_RAD;
         let drift = |peak: f64| imagined(0.0, peak, move |t| 0.1 * px * t);
-        let [line, beside] = [0.1, 0.0727].map(|f| drift(5.0).line_arcsec(f)[0]);
+        let [line, beside] = [0.1, 0.0727].map(|f| drift(5.0).line_arcsec(f, 0));
         assert!(line > 5.0 * beside, "{line} {beside}");
-        let none = drift(0.0).line_arcsec(0.1);
+        let none = [0, 1, 2].map(|axis| drift(0.0).line_arcsec(0.1, axis));
         assert!(none.iter().all(|a| a.abs() < 1e-12), "{none:?}");
     }
 }

@@ -33,12 +33,9 @@ impl Freedom {
 
     /// Beside a free rotation of the frame with the most stars; rows have these weights.
     pub(crate) fn beside_rotation(data: &StarData, weight: &[f64]) -> Self {
-        let counted = |k: usize| -> Vec<usize> {
-            let rows = data.frames.rows_of(k);
-            rows.filter(|&r| !data.outlier[r]).collect()
-        };
-        let most = (0..data.frames.frames()).max_by_key(|&k| counted(k).len());
-        most.and_then(|k| Self::of(data, &counted(k), weight))
+        let counted = |k: usize| data.frames.rows_of(k).filter(|&r| !data.outlier[r]);
+        let most = (0..data.frames.frames()).max_by_key(|&k| counted(k).count());
+        most.and_then(|k| Self::of(data, &counted(k).collect::<Vec<_>>(), weight))
             .unwrap_or(Self::WHOLE)
     }
 

@@ -119,9 +119,9 @@ pub(crate) fn search(
         return OwnSeries::default();
     }
     let by_itself = LazyCell::new(|| series(data, alone, weight));
-    let beside_rotation = Freedom::beside_rotation(data, weight);
+    let beside_rotation = LazyCell::new(|| Freedom::beside_rotation(data, weight));
     let freedom = if data.free_attitude {
-        beside_rotation
+        *beside_rotation
     } else {
         Freedom::WHOLE
     };
@@ -137,7 +137,7 @@ pub(crate) fn search(
     out.bin_hz = 1.0 / (last - first);
     if let Some(lines) = Lines::of(&series, freedom, last - first)
         && let Some((k, p, squares)) = lines.best()
-        && let Some(apart) = Lines::of(&by_itself, beside_rotation, last - first)
+        && let Some(apart) = Lines::of(&by_itself, *beside_rotation, last - first)
         && k < apart.grid.bins
         && apart.at(k).0 < ALPHA_ALONE
     {
@@ -146,7 +146,7 @@ pub(crate) fn search(
         out.explained = squares / (2.0 * rows);
     }
     if let Some((t, p, square)) = step(&series, freedom, &data.frames.t_s)
-        && step_at(&by_itself, beside_rotation, t).is_some_and(|(p, _)| p < ALPHA_ALONE)
+        && step_at(&by_itself, *beside_rotation, t).is_some_and(|(p, _)| p < ALPHA_ALONE)
         && is_no_wander(data, own, t)
     {
         out.jump_s = Some(t);
