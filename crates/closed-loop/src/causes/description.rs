@@ -32,6 +32,8 @@ const MOST_STARS: usize = 64;
 const MOST_OF_OWN_SIZE: usize = 24;
 /// Chance beyond which stars differ by more than a line through them.
 const BESIDE_A_LINE: f64 = 1e-4;
+/// Spread of a motion's size over its mean below which it is steady: such a size is nothing beside what it multiplies.
+const STEADY: f64 = 0.25;
 /// Channels beyond which none is paired with another variable: all pairs are paid for.
 const MOST_CHANNELS: usize = 6;
 
@@ -314,10 +316,21 @@ pub(crate) fn terms(
     data: &StarData,
     acceleration: bool,
 ) -> Vec<Empirical> {
-    let largest = |series: &[Vec<f64>; 2]| {
-        let [low, high] = range(series.iter().flatten().copied());
-        let size = low.abs().max(high.abs());
-        [-size, size]
+    let motion = |[x, y]: &[Vec<f64>; 2]| {
+        let [low, high] = range(x.iter().chain(y).copied());
+        let largest = low.abs().max(high.abs());
+        let sizes = x.iter().zip(y).map(|(x, y)| x.hypot(*y));
+        let [count, sum, squares] = sizes
+            .filter(|size| size.is_finite())
+            .fold([0.0, 0.0, 0.0], |[n, sum, squares], v| {
+                [n + 1.0, sum + v, squares + v * v]
+            });
+        let mean = sum / f64::max(count, 1.0);
+        let spread = (squares / f64::max(count, 1.0) - mean * mean)
+            .max(0.0)
+            .sqrt();
+        let steady = if spread < STEADY * mean { mean } else { 0.0 };
+        [steady - largest, steady + largest]
     };
     let range = |values: &[f64]| range(values.iter().copied());
     let off: Vec<f64> = (0..2)
@@ -329,7 +342,7 @@ pub(crate) fn terms(
     let position = [0, 1].map(|a| (Variable::Position(a), range(&data.modelled[a])));
     let phase = [0, 1].map(|a| (Variable::Phase(a), [0.0, 1.0]));
     let time = (Variable::Time, range(&data.t_s));
-    let rate = (Variable::Rate, largest(&data.velocity));
+    let rate = (Variable::Rate, motion(&data.velocity));
     let mag = (Variable::Magnitude, range(&data.mag));
     let colour = (Variable::Colour, range(&data.bv));
     let flux: Vec<f64> = data.mag.iter().map(|m| flux_of(*m)).collect();
@@ -354,7 +367,13 @@ pub(crate) fn terms(
         terms.extend(one(single));
     }
     if acceleration {
-        terms.extend(one(&(Variable::Acceleration, largest(&data.acceleration))));
+        let acceleration = (Variable::Acceleration, motion(&data.acceleration));
+        terms.extend(one(&acceleration));
+        terms.extend(
+            [&mag, &colour]
+                .iter()
+                .filter_map(|by| two(&acceleration, by)),
+        );
     }
     if mag.1[0] >= mag.1[1] || !mag.1[0].is_finite() {
         // no magnitudes

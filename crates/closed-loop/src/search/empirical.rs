@@ -8,12 +8,13 @@
 //! ```
 //!
 //! a shift along each axis, a roll and a scale; on an attitude it drives each
-//! axis. Motion (a, b) drives each axis by each of its own, and by its squares a^2, b^2 and ab; a pixel
-//! phase its own axis by its first six harmonics, the place within the window its own
-//! axis. Motion also drives by its direction alone, whatever its speed: backlash does. Two variables together are what neither does alone,
+//! axis. Motion (a, b) drives each axis by each of its own, by its squares a^2, b^2 and ab and by its size; a
+//! pixel phase its own axis by its first six harmonics, the place within the window its own axis. A rate also
+//! drives by its direction alone, whatever its size: backlash does. Two variables together are what neither does
+//! alone,
 //!
 //! ```text
-//! P_1(a) times the first columns of b
+//! P_1(a) times the first columns of b, of a motion those of its size, too
 //! ```
 //!
 //! Such a term predicts; it never explains.
@@ -37,6 +38,9 @@ const ORDERS: usize = 3;
 pub(crate) const HARMONICS: usize = 6;
 /// Columns of a variable that another one may multiply.
 const OF_A_PAIR: usize = 2;
+/// The first of a motion's two columns of its size, and how many it has up to these: all that an acceleration has.
+const SIZE: usize = 12;
+const UP_TO_SIZE: usize = SIZE + 2;
 /// Share of the largest rate below which a direction fades: it has none at rest.
 const AT_REST: f64 = 0.02;
 
@@ -90,7 +94,8 @@ impl Variable {
     }
 }
 
-/// Middle and half range of a variable: scale it to -1..1.
+/// Middle and half range of a variable: scale it to -1..1. Of a motion the mean of its size where that is steady,
+/// and its largest component.
 #[derive(Clone, Copy, Debug)]
 struct Scale {
     middle: f64,
@@ -210,8 +215,8 @@ impl Empirical {
             // A polynomial in time is only good outside its fold if it is straight.
             Variable::Time if stars => 4,
             Variable::Time => 3,
-            Variable::Rate => 16,
-            Variable::Acceleration => 6,
+            Variable::Rate => UP_TO_SIZE + 4,
+            Variable::Acceleration => UP_TO_SIZE,
             _ if stars => 4 * orders(&variable),
             _ => 3 * orders(&variable),
         };
@@ -237,7 +242,10 @@ impl Empirical {
             return None;
         }
         if !term.is_of_many() {
-            term.coefficients.truncate(OF_A_PAIR);
+            // a size that hardly changes, times the time, is the time
+            let has_size = term.is_of_motion() && !matches!(by, Variable::Time);
+            term.coefficients
+                .truncate(if has_size { OF_A_PAIR + 2 } else { OF_A_PAIR });
         }
         term.by = Some((by, scale));
         Some(term)
@@ -278,6 +286,12 @@ impl Empirical {
         matches!(self.variable, Variable::Star(_)) && self.by.is_none()
     }
 
+    /// Whether it is a pair that a motion takes part in by its size.
+    fn has_size(&self) -> bool {
+        let of_motion = matches!(self.variable, Variable::Rate | Variable::Acceleration);
+        of_motion && self.by.is_some() && self.coefficients.len() > OF_A_PAIR
+    }
+
     /// The name in `unattributed.depends_on`.
     pub(crate) fn name(&self) -> String {
         let mut both = vec![&self.variable];
@@ -297,15 +311,19 @@ impl Empirical {
             let leading = LEADING.iter().filter(|l| **l < n);
             leading.map(|l| (0..*l).collect()).collect()
         };
-        if matches!(self.variable, Variable::Rate) && self.by.is_none() {
-            // along the motion, bent; its square, its squares; its direction alone
-            parts.extend([
-                vec![0, 12],
-                vec![6, 7],
-                (6..10).collect(),
-                (6..12).collect(),
-            ]);
-            parts.extend([vec![14], vec![14, 15]]);
+        if self.is_of_motion() {
+            // its square, its squares, its size
+            parts.extend([vec![6, 7], (6..10).collect(), (6..12).collect()]);
+            parts.push(vec![SIZE, SIZE + 1]);
+            if n > UP_TO_SIZE {
+                // along the motion, bent; its direction alone
+                parts.extend([vec![0, 14], vec![16], vec![16, 17]]);
+            }
+        } else if self.has_size() {
+            parts.push((OF_A_PAIR..n).collect());
+        } else if n == 4 * ORDERS {
+            // what bends alone
+            parts.extend([vec![4, 5], (4..8).collect()]);
         }
         parts.push((0..n).collect());
         parts
@@ -380,9 +398,17 @@ impl Candidate for Empirical {
         let by = self.by.as_ref();
         let by = by.map(|(by, scale)| (by.values(rows), scale));
         let values = self.variable.values(rows);
+        let in_pair = self.has_size();
         for i in 0..n {
             let times = by.as_ref().map_or(1.0, |(by, scale)| scale.of(by[i]));
             let mut put = |k: usize, dx: f64, dy: f64| {
+                let k = if !in_pair || k < OF_A_PAIR {
+                    k
+                } else if (SIZE..UP_TO_SIZE).contains(&k) {
+                    k - SIZE + OF_A_PAIR
+                } else {
+                    count
+                };
                 if k < count {
                     out.x[k * n + i] = times * dx * per_arcsec[0];
                     out.y[k * n + i] = times * dy * per_arcsec[1];
@@ -436,11 +462,15 @@ impl Candidate for Empirical {
                         put(6 + 2 * k, square, 0.0);
                         put(7 + 2 * k, 0.0, square);
                     }
-                    put(12, square.sqrt() * a, square.sqrt() * b);
-                    put(13, -square.sqrt() * b, square.sqrt() * a);
+                    let size = square.sqrt();
+                    let more = size - self.scale.middle / self.scale.half;
+                    put(SIZE, more, 0.0);
+                    put(SIZE + 1, 0.0, more);
+                    put(14, size * a, size * b);
+                    put(15, -size * b, size * a);
                     let speed = (square + AT_REST * AT_REST).sqrt();
-                    put(14, a / speed, b / speed);
-                    put(15, -b / speed, a / speed);
+                    put(16, a / speed, b / speed);
+                    put(17, -b / speed, a / speed);
                 }
                 Variable::Star(ids) => {
                     if let Some(k) = ids.iter().position(|&id| id == rows.star_id[i]) {
@@ -578,7 +608,7 @@ mod tests {
         let two = Empirical::pair(Variable::Rate, whole, Variable::Time, range).unwrap();
         // the order of formats.md, whichever multiplies
         assert_eq!(two.name(), "time*rate");
-        assert_eq!(two.coefficients().len(), 2);
+        assert_eq!(two.coefficients().len(), OF_A_PAIR);
         let z = [-0.5, 1.0];
         for (one, two) in columns(&one).iter().zip(columns(&two)) {
             for (k, value) in two.iter().enumerate() {
@@ -591,6 +621,31 @@ mod tests {
         assert!(x[0] != 0.0 && x[1] == 0.0 && y[1] == 0.0);
         let still = Empirical::pair(Variable::Rate, whole, Variable::Time, [3.0, 3.0]);
         assert!(still.is_none());
+    }
+
+    /// A rate of 1 and 2 px/s of at most 2, and one of -1: by its size alone, and in a pair with the place.
+    #[test]
+    fn a_motion_drives_by_its_size() {
+        let (whole, range) = ([-2.0, 2.0], [-400.0, 400.0]);
+        let unit = camera().arcsec_per_px()[0].recip();
+        let sizes = [1.25_f64.sqrt(), 0.5];
+        for variable in [Variable::Rate, Variable::Acceleration] {
+            let alone = Empirical::new(variable.clone(), whole, true).unwrap();
+            let pair = Empirical::pair(variable, whole, Variable::Position(0), range).unwrap();
+            for (term, at) in [(&alone, SIZE), (&pair, OF_A_PAIR)] {
+                assert!(term.parts().contains(&vec![at, at + 1]), "{term:?}");
+            }
+        }
+        let alone = Empirical::new(Variable::Rate, whole, true).unwrap();
+        let pair = Empirical::pair(Variable::Rate, whole, Variable::Position(0), range).unwrap();
+        let ([x, y], [px, py]) = (columns(&alone), columns(&pair));
+        for (row, size) in sizes.into_iter().enumerate() {
+            let place = [-100.3, 200.2][row] / 400.0;
+            let first = 2 * SIZE + row;
+            assert!((x[first] - size * unit).abs() < 1e-14 && y[first].abs() < 1e-14);
+            let second = 2 * (OF_A_PAIR + 1) + row;
+            assert!((py[second] - place * size * unit).abs() < 1e-14 && px[second].abs() < 1e-14);
+        }
     }
 
     #[test]
@@ -617,7 +672,8 @@ mod tests {
         assert_eq!(term.parts(), [vec![0, 1], vec![2, 3], vec![0, 1, 2, 3]]);
         let line = Empirical::new(Variable::Magnitude, [3.0, 5.0], true).unwrap();
         let counts: Vec<usize> = line.parts().iter().map(Vec::len).collect();
-        assert_eq!(counts, [2, 4, 12]);
+        // a straight line, what bends alone, everything
+        assert_eq!(counts, [2, 4, 2, 4, 12]);
         let window = Empirical::new(Variable::Window, [-0.5, 0.5], true).unwrap();
         let [x, y] = columns(&window);
         let unit = camera().arcsec_per_px()[0].recip();
