@@ -6,7 +6,8 @@
 //! search          every hypothesis with its own noise
 //! declared_effects  what the declared effects turn it by
 //! spatial_errors  what the declared model itself makes of crossing and changing stars
-//! imagined        the lines of that, from drawn skies and fields
+//! imagined        the same from drawn skies and fields, and its lines
+//! likeness        how much of an effect that makes
 //! ```
 //!
 //! Not physics: the contents of a folder.
@@ -14,6 +15,7 @@
 pub(crate) mod data;
 mod declared_effects;
 mod imagined;
+mod likeness;
 mod run;
 mod search;
 pub(crate) mod spatial_errors;

@@ -206,6 +206,18 @@ impl AttitudeEvidence<'_> {
             columns
                 .view_mut((axis * m, width), (m, 1))
                 .copy_from_slice(&theta);
+        }
+        self.whiten(&mut columns);
+        Box::new(WhitenedDesign {
+            data: self.data,
+            columns,
+        })
+    }
+
+    /// Whitens columns of x, y and z of every bin.
+    pub(crate) fn whiten(&self, columns: &mut DMatrix<f64>) {
+        let m = self.data.bins.rows.len();
+        for axis in 0..3 {
             let mut slices: Vec<&mut [f64]> = columns
                 .as_mut_slice()
                 .chunks_exact_mut(3 * m)
@@ -213,10 +225,6 @@ impl AttitudeEvidence<'_> {
                 .collect();
             self.noise[axis].whiten(&self.data.bins.t_s, &self.data.count[axis], &mut slices);
         }
-        Box::new(WhitenedDesign {
-            data: self.data,
-            columns,
-        })
     }
 
     /// Constants and candidates averaged over the bins: x, y, z of every bin by

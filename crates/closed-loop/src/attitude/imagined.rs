@@ -9,13 +9,14 @@
 //! a(f)  = rms over the draws of the amplitude of theta at f; the largest near f counts
 //! ```
 //!
-//! Bright stars stand in heaps: each sky is a part of the field, and stars that leave it on one side come in on
-//! the other. An amplitude is Rayleigh over draws: one in 1e5 is beyond 3.4 times its rms, and of as many
+//! Bright stars stand in heaps: for lines each sky is a part of the field, and stars that leave it on one side come
+//! in on the other. An amplitude is Rayleigh over draws: one in 1e5 is beyond 3.4 times its rms, and of as many
 //! frequencies the largest is found; the rms of 48 draws is known to 7 %.
 //!
 //! Source: [M23] Fig. 4 with equal weights; Sections 2.2 and 2.3 for the errors.
 
 use std::f64::consts::TAU;
+use std::ops::Range;
 use std::sync::OnceLock;
 
 use centroid::CentroidError;
@@ -53,9 +54,13 @@ pub(crate) struct Imagined {
     /// Times of the frames, and the turn to each from the one before, rad, tracker axes.
     pub(crate) t_s: Vec<f64>,
     pub(crate) turn: Vec<Vector3<f64>>,
-    /// Drawn when it is asked for.
-    pub(crate) drawn: OnceLock<Vec<[Vec<f64>; 3]>>,
+    /// Drawn when it is asked for: the first frames, and some of all.
+    pub(crate) drawn: OnceLock<Vec<Errors>>,
+    pub(crate) sampled: OnceLock<Vec<Errors>>,
 }
+
+/// Errors of one sky and field, arcsec per axis, frame by frame.
+pub(crate) type Errors = [Vec<f64>; 3];
 
 impl Imagined {
     /// Whether a line at `f`, Hz, of this amplitude about an axis, arcsec, is more than the declared model and noise
@@ -73,8 +78,10 @@ impl Imagined {
     /// a(f) about an axis, arcsec.
     fn line_arcsec(&self, f: f64, axis: usize) -> f64 {
         let drawn = self.drawn.get_or_init(|| {
-            let draws = (0..DRAWS).into_par_iter();
-            draws.filter_map(|k| self.draw(k)).collect()
+            let frames = self.turn.len().min(MOST_FRAMES);
+            all_of(&self.turn[..frames], |turn, k| {
+                self.draw(turn, Place::Heap, k)
+            })
         });
         let frames = self.t_s.len().min(MOST_FRAMES);
         let waves: Vec<[f64; 3]> = self.t_s[..frames]
@@ -91,7 +98,7 @@ impl Imagined {
         let Some(inverse) = normal.try_inverse() else {
             return 0.0;
         };
-        let square = |theta: &[Vec<f64>; 3]| -> f64 {
+        let square = |theta: &Errors| -> f64 {
             let all = waves.iter().zip(&theta[axis]);
             let score: Vector3<f64> = all.map(|(w, v)| Vector3::from(*w) * *v).sum();
             let size = inverse * score;
@@ -101,8 +108,28 @@ impl Imagined {
         (drawn.iter().map(square).sum::<f64>() / n).sqrt()
     }
 
-    /// Errors of one sky and field, arcsec per axis, frame by frame.
-    fn draw(&self, k: u64) -> Option<[Vec<f64>; 3]> {
+    /// Means of the errors of every draw over bins of frames. In a long run, over some frames of each.
+    pub(crate) fn binned(&self, bins: &[Range<usize>]) -> Vec<Errors> {
+        let stride = self.turn.len().div_ceil(MOST_FRAMES).max(1);
+        let sampled = self.sampled.get_or_init(|| {
+            let steps = self.turn.chunks(stride);
+            let turn: Vec<Vector3<f64>> = steps.map(|step| step.iter().sum()).collect();
+            all_of(&turn, |turn, k| self.draw(turn, Place::Whole, k))
+        });
+        let mean = |values: &[f64], bin: &Range<usize>| {
+            let first = bin.start / stride;
+            let values = &values[first..bin.end.div_ceil(stride).clamp(first + 1, values.len())];
+            values.iter().sum::<f64>() / values.len() as f64
+        };
+        let means = |values: &Vec<f64>| bins.iter().map(|bin| mean(values, bin)).collect();
+        sampled
+            .iter()
+            .map(|axes| axes.each_ref().map(means))
+            .collect()
+    }
+
+    /// Errors along these turns from frame to frame.
+    fn draw(&self, turns: &[Vector3<f64>], place: Place, k: u64) -> Option<Errors> {
         let sigma = LsfSigma::Circular(Angle::from_arcsec(self.lsf_arcsec));
         let mut rng = stream(0, k, Purpose::Distortion);
         let field = DistortionField::draw(self.order, sigma, &mut rng).ok()?;
@@ -110,15 +137,17 @@ impl Imagined {
         let [fx, fy] = self.camera.focal_length_px();
         let mut rng = stream(0, k, Purpose::StarField);
         let mut within = |size: f64| size * (2.0 * (rng.next_u64() as f64 / u64::MAX as f64) - 1.0);
-        // bright stars stand in heaps: all of them in a part of the field
-        let share = LEAST_PART + (1.0 - LEAST_PART) * within(0.5).abs() * 2.0;
+        let share = match place {
+            Place::Whole => 1.0,
+            Place::Heap => LEAST_PART + (1.0 - LEAST_PART) * within(0.5).abs() * 2.0,
+        };
         let size = half.map(|half| share * half);
         let centre = half.map(|half| within((1.0 - share) * half));
         let mut at: Vec<[f64; 2]> = (0..self.stars)
             .map(|_| [0, 1].map(|axis| centre[axis] + within(size[axis])))
             .collect();
-        let mut out: [Vec<f64>; 3] = Default::default();
-        for turn in self.turn.iter().take(MOST_FRAMES) {
+        let mut out = Errors::default();
+        for turn in turns {
             let (mut normal, mut score) = (Matrix3::zeros(), Vector3::zeros());
             for star in &mut at {
                 // dv = theta x v, v = (x, y, 1)
@@ -152,6 +181,23 @@ impl Imagined {
     }
 }
 
+/// Where in the field stars stand.
+#[derive(Clone, Copy, Debug)]
+enum Place {
+    /// Anywhere: they go and come at its edges, where a distortion is largest.
+    Whole,
+    /// All of them in a part of it.
+    Heap,
+}
+
+fn all_of(
+    turns: &[Vector3<f64>],
+    draw: impl Fn(&[Vector3<f64>], u64) -> Option<Errors> + Sync,
+) -> Vec<Errors> {
+    let draws = (0..DRAWS).into_par_iter();
+    draws.filter_map(|k| draw(turns, k)).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -171,6 +217,7 @@ mod tests {
             turn: std::iter::once(Vector3::zeros()).chain(turn).collect(),
             t_s,
             drawn: OnceLock::new(),
+            sampled: OnceLock::new(),
         }
     }
 

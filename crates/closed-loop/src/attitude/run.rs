@@ -132,8 +132,9 @@ pub(crate) fn run(
             &data.bins.folds,
             &again.0,
             again.1,
+            search::follows_a_channel,
         )?;
-        let theirs = orbits::a_channel_does(&again.0, &rivals);
+        let theirs = orbits::is_beaten(&again.0, &rivals, search::follows_a_channel);
         // what was put forward in vain changes nothing
         if again.0.names_one_of_the_last(put_forward.len()) && !theirs {
             (found, noise, refused, series) = again;
@@ -145,7 +146,8 @@ pub(crate) fn run(
     let with_noise = |noise: [Coloured; 3]| evidence(&data, situation, noise, motion);
     let after = residuals(&with_noise(noise), &folds, &found, &found.selection.chosen)?;
     let mut rivals = Vec::new();
-    for (set, gain) in search::rivals(&with_noise, &data, bins, &found, noise)? {
+    let channels = search::is_a_channel;
+    for (set, gain) in search::rivals(&with_noise, &data, bins, &found, noise, channels)? {
         let residual = residuals(&with_noise(noise), &folds, &found, &set)?;
         rivals.push(Rival {
             what: names(&found, &set),

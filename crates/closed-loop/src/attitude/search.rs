@@ -31,6 +31,7 @@ use rayon::prelude::*;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use crate::attitude::data::{AttitudeData, AttitudeEvidence};
+use crate::attitude::likeness::likeness;
 use crate::attitude::spatial_errors::SpatialErrors;
 use crate::error::CloseError;
 use crate::evidence::Evidence;
@@ -158,8 +159,20 @@ pub(crate) fn search<'d>(
     }
 }
 
-/// How `first` compares with each housekeeping channel as the cause: alone, and
-/// beside the best of them. Groups of candidates with their out-of-fold gain over
+/// Whether it is a housekeeping channel without a cause.
+pub(crate) fn is_a_channel(candidate: &dyn Candidate) -> bool {
+    let selectors = candidate.selectors();
+    let variable = selectors.get("variable");
+    candidate.id() == EMPIRICAL && variable.is_some_and(|v| v.starts_with("housekeeping:"))
+}
+
+/// Whether it follows a housekeeping channel, with a cause or without.
+pub(crate) fn follows_a_channel(candidate: &dyn Candidate) -> bool {
+    is_a_channel(candidate) || candidate.selectors().contains_key("channel")
+}
+
+/// How what was chosen first compares with each rival of these as the cause: alone, and
+/// beside the best empirical one. Groups of candidates with their out-of-fold gain over
 /// the declared model, nats; the first entry is that model itself.
 pub(crate) fn rivals(
     with_noise: &WithNoise<'_>,
@@ -167,6 +180,7 @@ pub(crate) fn rivals(
     folds: &Folds,
     found: &Found,
     noise: [Coloured; 3],
+    is_rival: fn(&dyn Candidate) -> bool,
 ) -> Result<Vec<(Vec<usize>, f64)>, CloseError> {
     let candidates = &found.candidates;
     let binned = with_noise(noise).binned(&borrowed(candidates));
@@ -183,12 +197,7 @@ pub(crate) fn rivals(
     let mut sets: Vec<Vec<usize>> = vec![Vec::new()];
     sets.extend(found.selection.chosen.first().map(|&g| vec![g]));
     let channels = (0..candidates.len()).filter(|&g| {
-        candidates[g].id() == EMPIRICAL
-            && candidates[g]
-                .selectors()
-                .get("variable")
-                .is_some_and(|v| v.starts_with("housekeeping:"))
-            && !found.fitted.groups[g].columns.is_empty()
+        is_rival(candidates[g].as_ref()) && !found.fitted.groups[g].columns.is_empty()
     });
     sets.extend(channels.map(|g| vec![g]));
     let mut scored: Vec<(Vec<usize>, f64)> = sets
@@ -358,8 +367,23 @@ impl<'a, 'd> Trial<'a, 'd> {
         }
     }
 
-    /// Chance that step, line or orbit `g` of `set` is what the declared model makes: a change of stars, stars that
-    /// come by again, or that go on.
+    /// Chance that the declared errors along this motion explain as much as `g` does beside the others of `set`.
+    fn by_likeness(&self, set: &[usize], g: usize, scored: &Scored) -> f64 {
+        let imagined = self.changes.and_then(|c| c.imagined.as_deref());
+        let order: Vec<usize> = set.iter().copied().filter(|&c| c != g).chain([g]).collect();
+        let own = self.candidates[g].coefficients().len();
+        let evidence = (self.with_noise)(scored.noise);
+        let told = imagined.and_then(|i| likeness(i, &evidence, &self.columns(&order), own));
+        told.map_or(0.0, |told| {
+            let freedom = (told.columns + self.fitted.groups[g].choices) as f64;
+            let square = told.square / (told.excess * WIDENING);
+            let p = ChiSquared::new(freedom).map_or(1.0, |law| law.sf(square));
+            (p * self.cost[g]).min(1.0)
+        })
+    }
+
+    /// Chance that `g` of `set` is what the declared model makes: a change of stars, stars that come by again, or that
+    /// go on.
     fn as_declared(&self, set: &[usize], g: usize, scored: &Scored) -> f64 {
         let Some(changes) = self.changes else {
             return 0.0;
@@ -386,9 +410,10 @@ impl<'a, 'd> Trial<'a, 'd> {
             ABERRATION if self.fitted.groups[g].slopes > 0 => {
                 let amplitude = size(0) / SPEED_OF_LIGHT_M_S * ARCSEC_PER_RAD;
                 let slow = changes.slow_arcsec[0].max(changes.slow_arcsec[1]);
-                f64::from(u8::from(amplitude / std::f64::consts::SQRT_2 <= slow))
+                let little = amplitude / std::f64::consts::SQRT_2 <= slow;
+                f64::from(u8::from(little)).max(self.by_likeness(set, g, scored))
             }
-            _ => 0.0,
+            _ => self.by_likeness(set, g, scored),
         }
     }
 

@@ -114,6 +114,7 @@ impl SpatialErrors {
             t_s: t_s.to_vec(),
             turn: std::iter::once(Vector3::zeros()).chain(turn).collect(),
             drawn: OnceLock::new(),
+            sampled: OnceLock::new(),
         }))
     }
 

@@ -25,7 +25,6 @@ use telemetry::report::ConsideredEffect;
 
 use crate::error::CloseError;
 use crate::evidence::Evidence;
-use crate::search::empirical::EMPIRICAL;
 use crate::search::selection::columns_of;
 use crate::search::{Found, fit};
 use crate::unexplained::leftover::Track;
@@ -110,9 +109,13 @@ impl Look {
     }
 }
 
-/// Whether channels explain the same as the orbit that was found first, or nearly: `rivals` as sets of candidates
-/// with their gains, nats.
-pub(crate) fn a_channel_does(found: &Found, rivals: &[(Vec<usize>, f64)]) -> bool {
+/// Whether one of `others` explains the same as the orbit that was found first, or nearly: `rivals` as sets of
+/// candidates with their gains, nats.
+pub(crate) fn is_beaten(
+    found: &Found,
+    rivals: &[(Vec<usize>, f64)],
+    others: fn(&dyn Candidate) -> bool,
+) -> bool {
     let gain = |of: &dyn Fn(usize) -> bool| {
         let alone = rivals
             .iter()
@@ -122,8 +125,8 @@ pub(crate) fn a_channel_does(found: &Found, rivals: &[(Vec<usize>, f64)]) -> boo
             .fold(f64::NEG_INFINITY, f64::max)
     };
     let orbit = gain(&|g| found.fitted.groups[g].slopes > 0);
-    let channels = gain(&|g| found.candidates[g].id() == EMPIRICAL);
-    orbit.is_finite() && channels > orbit - OWN_SHAPE
+    let others = gain(&|g| others(found.candidates[g].as_ref()));
+    orbit.is_finite() && others > orbit - OWN_SHAPE
 }
 
 /// A rotation about one axis, in units of its noise.

@@ -113,7 +113,8 @@ fn what_a_wander_seems_to_accelerate_by_is_not_left() {
 }
 
 /// Attitudes alone: a tracker that drifts changes its stars, and jumps. Without counting them, 14 of
-/// 100 such runs named a step. Nearly at rest no star changes, and a step of twenty standard errors of the
+/// 100 such runs named a step; in the one of seed 21 two stars at once turn the roll by 15 arcsec, and held against no
+/// drawn skies that was a thermal bend of 30 nats. Nearly at rest no star changes, and a step of twenty standard errors of the
 /// attitude's mean (about 1.2 arcsec a frame, 200 frames a side) is one.
 #[test]
 fn a_change_of_stars_is_no_step() {
@@ -125,13 +126,13 @@ fn a_change_of_stars_is_no_step() {
     };
     let named =
         |report: &Report| -> Vec<String> { report.effects.iter().map(|e| e.id.clone()).collect() };
-    let alarms = (10..22)
+    let alarms: Vec<u64> = (10..22)
         .filter(|&seed| {
             let report = without_stars(&Case::new(Path::Drift, seed));
             !named(&report).is_empty() || report.unattributed.present
         })
-        .count();
-    assert!(alarms <= 1, "{alarms} of 12");
+        .collect();
+    assert!(alarms.len() <= 1 && !alarms.contains(&21), "{alarms:?}");
     let step = "at_s = 200.0\nx_arcsec = 3.0\ny_arcsec = -2.0";
     let still = Case::new(Path::Still, 3).with("step_misalignment", step);
     assert_eq!(named(&without_stars(&still)), ["step_misalignment"]);
