@@ -18,6 +18,7 @@ use telemetry::report::Report;
 use telemetry::{AttitudeResiduals, Bundle, DarkMap, Model, StarResiduals};
 
 use crate::attitude;
+use crate::conventions;
 use crate::declared;
 use crate::error::CloseError;
 use crate::questions::hypothesis::Questions;
@@ -77,6 +78,7 @@ pub fn close_asking(
     progress: &dyn Fn(&str),
 ) -> Result<Closed, CloseError> {
     let situation = Situation::join(model, bundle, questions)?;
+    conventions::check(&situation)?;
     declared::refuse_on_images(&situation)?;
     if bundle.stars.is_some() {
         star::run(&situation, progress)

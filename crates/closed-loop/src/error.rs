@@ -42,6 +42,32 @@ pub enum CloseError {
         /// Where the others went.
         why: &'static str,
     },
+    /// Nothing was measured while the reference was there.
+    #[error(
+        "table {what} spans {} to {} s and table reference {} to {} s: they have no time in common", measured_s[0], measured_s[1], reference_s[0], reference_s[1]
+    )]
+    NoOverlap {
+        /// The table of what was measured.
+        what: &'static str,
+        /// Its first and last time, s.
+        measured_s: [f64; 2],
+        /// Those of the reference, s.
+        reference_s: [f64; 2],
+    },
+    /// The reference's quaternions are in another convention.
+    #[error(
+        "table reference, columns qx, qy, qz, qw: these attitudes are {given_deg:.3} deg from table {what}; read as {are} they are {angle_deg:.3} deg from it; expected inertial to tracker, v_tracker = q v_inertial, with the scalar in qw"
+    )]
+    Convention {
+        /// The table of what was measured.
+        what: &'static str,
+        /// Median angle from it, deg.
+        given_deg: f64,
+        /// What they seem to be.
+        are: &'static str,
+        /// Median angle if they are, deg.
+        angle_deg: f64,
+    },
     /// A declared effect on raw images that are there.
     #[error(
         "the model declares `{id}`, and the bundle has raw images: centroids with a declared map or spot taken off cannot be formed yet; leave the entry out of the model, and it is estimated anew, or the table `images` out of the bundle, whose centroids then stand as they are"

@@ -8,6 +8,7 @@
 //!
 //! ```text
 //! close              the door: model and bundle joined (situation, declared), then stars or attitudes
+//! conventions        quaternions that are meant another way are refused before anything is made of them
 //! star  attitude     the two kinds of measurement, each with the order of its steps (run)
 //! evidence           what the search asks of either: sums over blocks, and residuals out of fold
 //! search             candidates, selection, refinement until it stands; terms without a cause
@@ -28,6 +29,7 @@ mod attitude;
 mod bins;
 mod causes;
 mod close;
+mod conventions;
 mod declared;
 mod error;
 mod evidence;

@@ -55,6 +55,48 @@ fn only_first(count: usize) -> impl Fn(&mut Bundle) {
     }
 }
 
+/// Attitudes the wrong way round, or with the scalar first, are told from those that err: of stars and of attitudes.
+#[test]
+fn quaternions_in_another_convention_are_refused() {
+    let first = |q: &UnitQuaternion<f64>| {
+        UnitQuaternion::new_normalize(nalgebra::Quaternion::new(q.k, q.w, q.i, q.j))
+    };
+    let said = [
+        "as the inverse rotations they",
+        "as rotations whose scalar stands first",
+        "as inverse rotations whose scalar",
+    ];
+    for (k, said) in said.into_iter().enumerate() {
+        let written = |q: &UnitQuaternion<f64>| match k {
+            0 => q.inverse(),
+            1 => first(q),
+            _ => first(&q.inverse()),
+        };
+        for stars in [true, false] {
+            let refused = after(&short(), |bundle| {
+                let reference = bundle.reference.as_mut().expect("it has one");
+                reference.q.iter_mut().for_each(|q| *q = written(&*q));
+                reference.rates_rad_s = None;
+                bundle.stars = bundle.stars.take().filter(|_| stars);
+            });
+            let words = refused.expect_err("it is refused").to_string();
+            let table = if stars {
+                "table stars"
+            } else {
+                "table attitude"
+            };
+            assert!(words.contains(said) && words.contains(table), "{words}");
+        }
+    }
+    // two degrees of misalignment are no convention
+    let turned = after(&short(), |bundle| {
+        let turn = UnitQuaternion::from_scaled_axis(Vector3::new(0.035, 0.0, 0.0));
+        let reference = bundle.reference.as_mut().expect("it has one");
+        reference.q.iter_mut().for_each(|q| *q = turn * *q);
+    });
+    assert!(!matches!(turned, Err(CloseError::Convention { .. })));
+}
+
 #[test]
 fn one_or_two_stars_against_a_reference() {
     for count in [1, 2] {
@@ -160,11 +202,9 @@ fn nothing_within_the_reference_is_an_error() {
             }
         }
     });
-    assert!(
-        matches!(late, Err(CloseError::TooFewFrames { frames: 0, .. })),
-        "{:?}",
-        late.err()
-    );
+    let words = late.expect_err("it is refused").to_string();
+    let spans = words.contains("table stars spans 0 to") && words.contains("reference 99");
+    assert!(spans, "{words}");
 }
 
 /// Fewer than ten frames: one is left out at a time.
