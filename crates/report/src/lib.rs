@@ -12,6 +12,7 @@ mod fit_text;
 mod html;
 mod number;
 mod scene_figures;
+mod set_aside;
 mod text;
 
 pub use assess_figures::assess_figures;

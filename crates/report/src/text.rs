@@ -6,13 +6,14 @@ use closed_loop::Closed;
 use telemetry::report::{Dependence, Errors, FoundEffect, RefusedSize, Report, Selector, Verdict};
 
 use crate::number::number;
+use crate::set_aside;
 
 /// The findings of a run in words and numbers, some 20 lines of at most 100 columns.
 #[must_use]
 pub fn summary(closed: &Closed) -> String {
     let mut out = String::new();
     let report = &closed.report;
-    verdict(&mut out, report);
+    verdict(&mut out, closed);
     figures(&mut out, report);
     effects(&mut out, report);
     hypotheses(&mut out, report);
@@ -47,7 +48,8 @@ pub(crate) fn sentence(report: &Report) -> String {
     }
 }
 
-fn verdict(out: &mut String, report: &Report) {
+fn verdict(out: &mut String, closed: &Closed) {
+    let report = &closed.report;
     let sentence = sentence(report);
     line!(out, "Verdict   {sentence}");
     line!(
@@ -58,6 +60,9 @@ fn verdict(out: &mut String, report: &Report) {
         report.rows.outside_reference,
         report.folds
     );
+    for star in set_aside::stars(closed.stars.as_ref()) {
+        line!(out, "          {star}");
+    }
     line!(out);
 }
 

@@ -8,6 +8,7 @@ use telemetry::{AttitudeResiduals, StarResiduals};
 use super::write::{Cell, count, escaped};
 use super::{Page, Run};
 use crate::number::short;
+use crate::set_aside;
 
 /// Longest model that is shown, bytes.
 const MODEL: usize = 20_000;
@@ -117,6 +118,9 @@ pub(super) fn in_a_line(page: &mut Page, run: &Run<'_>) {
         count("/rows/outside_reference", report.rows.outside_reference),
         count("/folds", report.folds),
     ));
+    for star in set_aside::stars(run.closed.stars.as_ref()) {
+        page.paragraph(&star);
+    }
 }
 
 /// Rows, folds and stars.
