@@ -377,6 +377,14 @@ pub(crate) fn follows(
             Some((entry, best.worth, term.of_many && best.columns < whole))
         })
         .collect();
+    // of two terms in the same variable the one that is worth more
+    judged.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let mut told: Vec<String> = Vec::new();
+    judged.retain(|(d, ..)| {
+        let new = !told.contains(&d.variable);
+        told.push(d.variable.clone());
+        new
+    });
     // one star never wins against one slope that explains the same
     let slopes: Vec<Dependence> = judged
         .iter()

@@ -243,11 +243,11 @@ pub(crate) fn offer(
     terms: Vec<Empirical>,
     surroundings: &Surroundings<'_>,
 ) -> Result<(), CloseError> {
-    let certain = left.depends_on.iter().filter(|d| figures::certain(d));
-    let Some(term) = certain
-        .filter_map(|d| terms.iter().find(|t| t.name() == d.variable))
-        .find(|t| t.is_declarable(surroundings))
-    else {
+    let mut certain = left.depends_on.iter().filter(|d| figures::certain(d));
+    let Some(term) = certain.find_map(|d| {
+        let mut of_name = terms.iter().filter(|t| t.name() == d.variable);
+        of_name.find(|t| t.is_declarable(surroundings))
+    }) else {
         return Ok(());
     };
     found.candidates.push(Arc::new(term.clone()));
@@ -361,8 +361,10 @@ pub(crate) fn terms(
     };
     for axis in 0..2 {
         terms.extend(one(&position[axis]));
+        terms.extend(one(&(Variable::Half(axis), [-1.0, 1.0])));
         terms.extend(one(&phase[axis]));
     }
+    terms.extend(one(&(Variable::Quarter, [-1.0, 1.0])));
     for single in [&time, &rate, &mag, &colour] {
         terms.extend(one(single));
     }

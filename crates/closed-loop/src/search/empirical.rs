@@ -17,6 +17,8 @@
 //! P_1(a) times the first columns of b, of a motion those of its size, too
 //! ```
 //!
+//! A half or a quarter of the detector that is shifted as a whole, for its output or its mosaic, has two values.
+//!
 //! Such a term predicts; it never explains.
 //!
 //! Source: ordinary least squares on Legendre polynomials; the fields are the
@@ -49,6 +51,9 @@ const AT_REST: f64 = 0.02;
 pub(crate) enum Variable {
     /// Detector position along one axis (0 = x).
     Position(usize),
+    /// The half of the detector along one axis, and the quarter: each may have an output of its own.
+    Half(usize),
+    Quarter,
     /// Pixel phase along one axis.
     Phase(usize),
     Time,
@@ -76,8 +81,9 @@ impl Variable {
     /// The name in `unattributed.depends_on`.
     pub(crate) fn name(&self) -> String {
         match self {
-            Self::Position(0) => "x_px".into(),
-            Self::Position(_) => "y_px".into(),
+            Self::Position(0) | Self::Half(0) => "x_px".into(),
+            Self::Position(_) | Self::Half(_) => "y_px".into(),
+            Self::Quarter => "x_px*y_px".into(),
             Self::Phase(0) => "pixel_phase_x".into(),
             Self::Phase(_) => "pixel_phase_y".into(),
             Self::Time => "time".into(),
@@ -126,7 +132,8 @@ impl Variable {
     /// Place among the names, for pairs.
     fn rank(&self) -> usize {
         match self {
-            Self::Position(axis) => *axis,
+            Self::Position(axis) | Self::Half(axis) => *axis,
+            Self::Quarter => 0,
             Self::Phase(axis) => 2 + axis,
             Self::Time => 4,
             Self::Rate => 5,
@@ -154,6 +161,8 @@ impl Variable {
             Self::Rate => rows.vx_px_s[i].hypot(rows.vy_px_s[i]),
             Self::Acceleration => rows.ax_px_s2[i].hypot(rows.ay_px_s2[i]),
             Self::Housekeeping(_, series) => series.at(rows.t_s[i]).unwrap_or(f64::NAN),
+            Self::Half(axis) => [rows.x_px, rows.y_px][*axis][i].signum(),
+            Self::Quarter => (rows.x_px[i] * rows.y_px[i]).signum(),
             Self::Phase(_) | Self::Star(_) | Self::Slot(_) | Self::Window => f64::NAN,
         }
     }
@@ -212,6 +221,7 @@ impl Empirical {
             Variable::Slot(slots) => 2 * slots.len(),
             Variable::Phase(_) => 2 * HARMONICS,
             Variable::Position(_) | Variable::Window => 2 * ORDERS,
+            Variable::Half(_) | Variable::Quarter => 2,
             // A polynomial in time is only good outside its fold if it is straight.
             Variable::Time if stars => 4,
             Variable::Time => 3,
@@ -472,6 +482,10 @@ impl Candidate for Empirical {
                     put(16, a / speed, b / speed);
                     put(17, -b / speed, a / speed);
                 }
+                Variable::Half(_) | Variable::Quarter => {
+                    put(0, values[i], 0.0);
+                    put(1, 0.0, values[i]);
+                }
                 Variable::Star(ids) => {
                     if let Some(k) = ids.iter().position(|&id| id == rows.star_id[i]) {
                         put(2 * k, 1.0, 0.0);
@@ -538,6 +552,13 @@ impl Candidate for Empirical {
         values: &[f64],
         surroundings: &Surroundings<'_>,
     ) -> Result<Box<dyn Effect>, EffectError> {
+        if matches!(self.variable, Variable::Half(_) | Variable::Quarter) {
+            return Err(EffectError::WrongType {
+                effect: EMPIRICAL,
+                name: "variable".to_owned(),
+                expected: "a place, not a half of the detector",
+            });
+        }
         let parameters = effects::empirical_parameters(
             &self.name(),
             !self.stars,
@@ -557,128 +578,4 @@ impl Candidate for Empirical {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn camera() -> Camera {
-        let model = telemetry::Model::parse(
-            "format = \"boresight-model/1\"\n[tracker]\npixels = [1024, 1024]\nfov_deg = [20.0, 20.0]\n",
-            "model.toml",
-            &[],
-        )
-        .unwrap();
-        model.camera().unwrap().unwrap()
-    }
-
-    /// Columns of `term` in two rows, x then y.
-    fn columns(term: &Empirical) -> [Vec<f64>; 2] {
-        let nan = [f64::NAN; 2];
-        let rows = StarRows {
-            t_s: &[1.0, 4.0],
-            x_px: &[-100.3, 200.2],
-            y_px: &[50.7, -300.1],
-            landed_px: [&[-100.3, 200.2], &[50.7, -300.1]],
-            landed_variance_px2: [&[0.0; 2]; 2],
-            vx_px_s: &[1.0, 0.0],
-            vy_px_s: &[2.0, -1.0],
-            ax_px_s2: &[0.0; 2],
-            ay_px_s2: &[0.0; 2],
-            mag: &[3.0, f64::NAN],
-            bv: &nan,
-            log_flux: &nan,
-            window_px: [&[-100.0, 200.0], &[51.0, -300.0]],
-            slot: &[0, 1],
-            star_id: &[7, 9],
-            attitude: None,
-        };
-        let all = 2 * term.coefficients().len();
-        let (mut x, mut y) = (vec![0.0; all], vec![0.0; all]);
-        let out = PointsMut {
-            x: &mut x,
-            y: &mut y,
-        };
-        assert!(term.star_columns(&camera(), &rows, out));
-        [x, y]
-    }
-
-    #[test]
-    fn a_pair_is_the_first_columns_of_one_times_the_other() {
-        let (whole, range) = ([-2.0, 2.0], [0.0, 4.0]);
-        let one = Empirical::new(Variable::Rate, whole, true).unwrap();
-        let two = Empirical::pair(Variable::Rate, whole, Variable::Time, range).unwrap();
-        // the order of formats.md, whichever multiplies
-        assert_eq!(two.name(), "time*rate");
-        assert_eq!(two.coefficients().len(), OF_A_PAIR);
-        let z = [-0.5, 1.0];
-        for (one, two) in columns(&one).iter().zip(columns(&two)) {
-            for (k, value) in two.iter().enumerate() {
-                assert!((value - z[k % 2] * one[k]).abs() < 1e-15);
-            }
-        }
-        // what is not known shifts nothing
-        let by = Empirical::pair(Variable::Rate, whole, Variable::Magnitude, range).unwrap();
-        let [x, y] = columns(&by);
-        assert!(x[0] != 0.0 && x[1] == 0.0 && y[1] == 0.0);
-        let still = Empirical::pair(Variable::Rate, whole, Variable::Time, [3.0, 3.0]);
-        assert!(still.is_none());
-    }
-
-    /// A rate of 1 and 2 px/s of at most 2, and one of -1: by its size alone, and in a pair with the place.
-    #[test]
-    fn a_motion_drives_by_its_size() {
-        let (whole, range) = ([-2.0, 2.0], [-400.0, 400.0]);
-        let unit = camera().arcsec_per_px()[0].recip();
-        let sizes = [1.25_f64.sqrt(), 0.5];
-        for variable in [Variable::Rate, Variable::Acceleration] {
-            let alone = Empirical::new(variable.clone(), whole, true).unwrap();
-            let pair = Empirical::pair(variable, whole, Variable::Position(0), range).unwrap();
-            for (term, at) in [(&alone, SIZE), (&pair, OF_A_PAIR)] {
-                assert!(term.parts().contains(&vec![at, at + 1]), "{term:?}");
-            }
-        }
-        let alone = Empirical::new(Variable::Rate, whole, true).unwrap();
-        let pair = Empirical::pair(Variable::Rate, whole, Variable::Position(0), range).unwrap();
-        let ([x, y], [px, py]) = (columns(&alone), columns(&pair));
-        for (row, size) in sizes.into_iter().enumerate() {
-            let place = [-100.3, 200.2][row] / 400.0;
-            let first = 2 * SIZE + row;
-            assert!((x[first] - size * unit).abs() < 1e-14 && y[first].abs() < 1e-14);
-            let second = 2 * (OF_A_PAIR + 1) + row;
-            assert!((py[second] - place * size * unit).abs() < 1e-14 && px[second].abs() < 1e-14);
-        }
-    }
-
-    #[test]
-    fn harmonics_are_those_of_the_phase() {
-        let term = Empirical::new(Variable::Phase(0), [0.0, 1.0], true).unwrap();
-        let [x, y] = columns(&term);
-        let camera = camera();
-        for (row, at) in [-100.3, 200.2].into_iter().enumerate() {
-            let phase = camera.phase_rad(at);
-            for k in 0..HARMONICS {
-                let (sin, cos) = ((k + 1) as f64 * phase).sin_cos();
-                let unit = camera.arcsec_per_px()[0].recip();
-                // six products of numbers near 1
-                assert!((x[4 * k + row] - unit * sin).abs() < 1e-14);
-                assert!((x[4 * k + 2 + row] - unit * cos).abs() < 1e-14);
-            }
-        }
-        assert!(y.iter().all(|v| *v == 0.0));
-    }
-
-    #[test]
-    fn single_stars_are_tried_and_all() {
-        let term = Empirical::new(Variable::Star(vec![7, 9]), [0.0, 1.0], true).unwrap();
-        assert_eq!(term.parts(), [vec![0, 1], vec![2, 3], vec![0, 1, 2, 3]]);
-        let line = Empirical::new(Variable::Magnitude, [3.0, 5.0], true).unwrap();
-        let counts: Vec<usize> = line.parts().iter().map(Vec::len).collect();
-        // a straight line, what bends alone, everything
-        assert_eq!(counts, [2, 4, 2, 4, 12]);
-        let window = Empirical::new(Variable::Window, [-0.5, 0.5], true).unwrap();
-        let [x, y] = columns(&window);
-        let unit = camera().arcsec_per_px()[0].recip();
-        // 0.3 px left of the middle along x, and along y
-        assert!((x[0] + 0.6 * unit).abs() < 1e-12 && x[2] == 0.0);
-        assert!((y[2] + 0.6 * unit).abs() < 1e-12 && y[0] == 0.0);
-    }
-}
+mod tests;
