@@ -199,11 +199,15 @@ fn all_of(
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
 
     /// Ten minutes at 2 Hz about X, by what `path` tells in rad.
-    fn imagined(lsf_arcsec: f64, peak_arcsec: f64, path: impl Fn(f64) -> f64) -> Imagined {
+    pub(in crate::attitude) fn imagined(
+        lsf_arcsec: f64,
+        peak_arcsec: f64,
+        path: impl Fn(f64) -> f64,
+    ) -> Imagined {
         let t_s: Vec<f64> = (0..1200).map(|k| 0.5 * f64::from(k)).collect();
         let turn = t_s
             .windows(2)

@@ -103,40 +103,17 @@ const LEAST: f64 = 1e-6;
 #[cfg(test)]
 mod tests {
     use std::f64::consts::TAU;
-    use std::sync::OnceLock;
 
     use block_regression::Folds;
-    use centroid::{CentroidError, Triangle};
     use coloured_noise::Coloured;
-    use focal_plane::Camera;
-    use nalgebra::Vector3;
 
     use super::*;
     use crate::attitude::data::AttitudeData;
+    use crate::attitude::imagined::tests::imagined;
     use crate::bins::{Bins, MOST};
 
     const FRAMES: usize = 1200;
     const SWING_HZ: f64 = 0.01;
-
-    /// Ten minutes at 2 Hz on a swing by 1 degree about X.
-    fn swing(lsf_arcsec: f64) -> Imagined {
-        let t_s: Vec<f64> = (0..FRAMES).map(|k| 0.5 * k as f64).collect();
-        let path = |t: f64| 0.0175 * (TAU * SWING_HZ * t).sin();
-        let turn = t_s
-            .windows(2)
-            .map(|t| Vector3::x() * (path(t[1]) - path(t[0])));
-        Imagined {
-            camera: Camera::from_fov_deg([1024, 1024], [20.0, 20.0]).expect("a camera"),
-            stars: 12,
-            lsf_arcsec,
-            order: 7,
-            centroid: CentroidError::Triangle(Triangle::from_peak(0.0)),
-            turn: std::iter::once(Vector3::zeros()).chain(turn).collect(),
-            t_s,
-            drawn: OnceLock::new(),
-            sampled: OnceLock::new(),
-        }
-    }
 
     /// Attitudes of as many frames, of which nothing counts but where they are.
     fn data(t_s: &[f64]) -> AttitudeData {
@@ -155,13 +132,14 @@ mod tests {
         data
     }
 
-    /// A line about X at the swing's own frequency and white noise of 0.5 arcsec: an amplitude a is a gain of
+    /// Ten minutes on a swing by 1 degree about X. A line about X at the swing's own frequency and white noise of 0.5 arcsec: an amplitude a is a gain of
     /// a^2 N / 2 over the variance, by two columns. At thirteen times it there is a hundredth of that, and without a
     /// distortion nothing.
     #[test]
     fn a_swing_makes_its_own_line() {
         let of = |lsf: f64, times: f64| {
-            let (imagined, white) = (swing(lsf), 0.5);
+            let swing = |t: f64| 0.0175 * (TAU * SWING_HZ * t).sin();
+            let (imagined, white) = (imagined(lsf, 0.0, swing), 0.5);
             let data = data(&imagined.t_s);
             let evidence = AttitudeEvidence {
                 data: &data,
