@@ -12,7 +12,7 @@
 //!
 //! Source: the expected value of a quadratic form.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 use rand_core::Rng;
 use star_tracker::{Purpose, stream};
 
@@ -21,6 +21,8 @@ use crate::attitude::imagined::Imagined;
 
 /// Series of white noise that its share is the mean of: known to 1/sqrt(12 p) or better.
 const WHITE: usize = 24;
+/// Share of a column below which it has nothing of its own.
+const LEAST: f64 = 1e-6;
 
 /// What an effect explains under the fitted noise, as a square of so many columns, and how many times too large the
 /// declared errors make it.
@@ -31,7 +33,7 @@ pub(crate) struct Likeness {
     pub(crate) excess: f64,
 }
 
-/// Of the last `own` of the columns `binned`; `None` where they show nothing.
+/// Of the last `own` of the columns `binned` ([`AttitudeEvidence::binned`]); `None` where they show nothing.
 pub(crate) fn likeness(
     imagined: &Imagined,
     evidence: &AttitudeEvidence<'_>,
@@ -75,7 +77,7 @@ pub(crate) fn likeness(
 
 /// What the last `own` of `columns` have of their own, orthonormal.
 fn orthonormal(columns: &DMatrix<f64>, own: usize) -> DMatrix<f64> {
-    let mut kept: Vec<nalgebra::DVector<f64>> = Vec::new();
+    let mut kept: Vec<DVector<f64>> = Vec::new();
     let mut first = 0;
     for (k, column) in columns.column_iter().enumerate() {
         let mut left = column.into_owned();
@@ -96,9 +98,6 @@ fn orthonormal(columns: &DMatrix<f64>, own: usize) -> DMatrix<f64> {
     }
     DMatrix::from_columns(&kept[first..])
 }
-
-/// Share of a column below which it is none of its own.
-const LEAST: f64 = 1e-6;
 
 #[cfg(test)]
 mod tests {
