@@ -40,9 +40,14 @@ const ORDERS: usize = 3;
 pub(crate) const HARMONICS: usize = 6;
 /// Columns of a variable that another one may multiply.
 const OF_A_PAIR: usize = 2;
-/// The first of a motion's two columns of its size, and how many it has up to these: all that an acceleration has.
+/// Where the columns of a motion start that are of its squares, of its size (the last that an acceleration has), along
+/// it and bent, and of its direction alone.
+const SQUARES: usize = 6;
 const SIZE: usize = 12;
-const UP_TO_SIZE: usize = SIZE + 2;
+const BENT: usize = SIZE + 2;
+const DIRECTION: usize = BENT + 2;
+/// Columns of a rate.
+const OF_A_RATE: usize = DIRECTION + 2;
 /// Share of the largest rate below which a direction fades: it has none at rest.
 const AT_REST: f64 = 0.02;
 
@@ -225,8 +230,8 @@ impl Empirical {
             // A polynomial in time is only good outside its fold if it is straight.
             Variable::Time if stars => 4,
             Variable::Time => 3,
-            Variable::Rate => UP_TO_SIZE + 4,
-            Variable::Acceleration => UP_TO_SIZE,
+            Variable::Rate => OF_A_RATE,
+            Variable::Acceleration => BENT,
             _ if stars => 4 * orders(&variable),
             _ => 3 * orders(&variable),
         };
@@ -254,8 +259,8 @@ impl Empirical {
         if !term.is_of_many() {
             // a size that hardly changes, times the time, is the time
             let has_size = term.is_of_motion() && !matches!(by, Variable::Time);
-            term.coefficients
-                .truncate(if has_size { OF_A_PAIR + 2 } else { OF_A_PAIR });
+            let of_size = if has_size { BENT - SIZE } else { 0 };
+            term.coefficients.truncate(OF_A_PAIR + of_size);
         }
         term.by = Some((by, scale));
         Some(term)
@@ -323,15 +328,16 @@ impl Empirical {
         };
         if self.is_of_motion() {
             // its square, its squares, its size
-            parts.extend([vec![6, 7], (6..10).collect(), (6..12).collect()]);
-            parts.push(vec![SIZE, SIZE + 1]);
-            if n > UP_TO_SIZE {
+            let squares = |count: usize| (SQUARES..SQUARES + count).collect();
+            parts.extend([squares(2), squares(4), squares(6), vec![SIZE, SIZE + 1]]);
+            if n == OF_A_RATE {
                 // along the motion, bent; its direction alone
-                parts.extend([vec![0, 14], vec![16], vec![16, 17]]);
+                let [along, across] = [DIRECTION, DIRECTION + 1];
+                parts.extend([vec![0, BENT], vec![along], vec![along, across]]);
             }
         } else if self.has_size() {
             parts.push((OF_A_PAIR..n).collect());
-        } else if n == 4 * ORDERS {
+        } else if n == 4 * ORDERS && !matches!(self.variable, Variable::Phase(_)) {
             // what bends alone
             parts.extend([vec![4, 5], (4..8).collect()]);
         }
@@ -414,7 +420,7 @@ impl Candidate for Empirical {
             let mut put = |k: usize, dx: f64, dy: f64| {
                 let k = if !in_pair || k < OF_A_PAIR {
                     k
-                } else if (SIZE..UP_TO_SIZE).contains(&k) {
+                } else if (SIZE..BENT).contains(&k) {
                     k - SIZE + OF_A_PAIR
                 } else {
                     count
@@ -469,18 +475,18 @@ impl Candidate for Empirical {
                     put(4, y * a, y * b);
                     put(5, x * a, x * b);
                     for (k, square) in [square, a * a - b * b, a * b].into_iter().enumerate() {
-                        put(6 + 2 * k, square, 0.0);
-                        put(7 + 2 * k, 0.0, square);
+                        put(SQUARES + 2 * k, square, 0.0);
+                        put(SQUARES + 2 * k + 1, 0.0, square);
                     }
                     let size = square.sqrt();
                     let more = size - self.scale.middle / self.scale.half;
                     put(SIZE, more, 0.0);
                     put(SIZE + 1, 0.0, more);
-                    put(14, size * a, size * b);
-                    put(15, -size * b, size * a);
+                    put(BENT, size * a, size * b);
+                    put(BENT + 1, -size * b, size * a);
                     let speed = (square + AT_REST * AT_REST).sqrt();
-                    put(16, a / speed, b / speed);
-                    put(17, -b / speed, a / speed);
+                    put(DIRECTION, a / speed, b / speed);
+                    put(DIRECTION + 1, -b / speed, a / speed);
                 }
                 Variable::Half(_) | Variable::Quarter => {
                     put(0, values[i], 0.0);
