@@ -377,8 +377,8 @@ pub(crate) fn follows(
             Some((entry, best.worth, term.of_many && best.columns < whole))
         })
         .collect();
-    // of two terms in the same variable the one that is worth more
-    judged.sort_by(|a, b| b.1.total_cmp(&a.1));
+    // of two terms in the same variable the one that is certain, or worth more
+    judged.sort_by(|a, b| (certain(&b.0).cmp(&certain(&a.0))).then(b.1.total_cmp(&a.1)));
     let mut told: Vec<String> = Vec::new();
     judged.retain(|(d, ..)| {
         let new = !told.contains(&d.variable);
