@@ -373,7 +373,8 @@ pub(crate) fn terms(
         terms.extend(one(&acceleration));
         terms.extend(
             [&mag, &colour]
-                .iter()
+                .into_iter()
+                .chain(&position)
                 .filter_map(|by| two(&acceleration, by)),
         );
     }
