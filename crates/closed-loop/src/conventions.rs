@@ -14,6 +14,7 @@
 use focal_plane::{Pixel, StarFrames};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use spectra::robust::{median, median_step};
+use telemetry::{AttitudeTable, Bundle};
 
 use crate::error::CloseError;
 use crate::situation::Situation;
@@ -53,25 +54,46 @@ fn scalar_first_inverse(q: &UnitQuaternion<f64>) -> UnitQuaternion<f64> {
     scalar_first(q).inverse()
 }
 
+/// The table that is held against the reference.
+#[derive(Clone, Copy)]
+enum Measured<'a> {
+    Stars(&'a StarFrames),
+    Attitude(&'a AttitudeTable),
+}
+
+impl<'a> Measured<'a> {
+    fn of(bundle: &'a Bundle) -> Option<Self> {
+        let stars = bundle.stars.as_ref().map(Self::Stars);
+        stars.or_else(|| bundle.attitude.as_ref().map(Self::Attitude))
+    }
+
+    /// Its name, and the times of its frames.
+    fn times(self) -> (&'static str, &'a [f64]) {
+        match self {
+            Self::Stars(stars) => ("stars", &stars.t_s),
+            Self::Attitude(attitude) => ("attitude", &attitude.t_s),
+        }
+    }
+}
+
 /// Refuses a reference that does not overlap what was measured, or is in another convention.
 pub(crate) fn check(situation: &Situation<'_>) -> Result<(), CloseError> {
     let bundle = situation.bundle;
     let Some(reference) = &bundle.reference else {
         return Ok(());
     };
-    let (what, t_s) = match (&bundle.stars, &bundle.attitude) {
-        (Some(stars), _) => ("stars", &stars.t_s),
-        (None, Some(attitude)) => ("attitude", &attitude.t_s),
-        (None, None) => return Ok(()),
-    };
-    let ends = |t_s: &[f64]| Some([*t_s.first()?, *t_s.last()?]);
-    let (Some(measured), Some(known)) = (ends(t_s), ends(&reference.t_s)) else {
+    let Some(measured) = Measured::of(bundle) else {
         return Ok(());
     };
-    if measured[1] < known[0] || known[1] < measured[0] {
+    let (what, t_s) = measured.times();
+    let ends = |t_s: &[f64]| Some([*t_s.first()?, *t_s.last()?]);
+    let (Some(taken), Some(known)) = (ends(t_s), ends(&reference.t_s)) else {
+        return Ok(());
+    };
+    if taken[1] < known[0] || known[1] < taken[0] {
         return Err(CloseError::NoOverlap {
             what,
-            measured_s: measured,
+            measured_s: taken,
             reference_s: known,
         });
     }
@@ -80,10 +102,9 @@ pub(crate) fn check(situation: &Situation<'_>) -> Result<(), CloseError> {
         let mut angles = Vec::new();
         for &(k, at) in &pairs {
             let q = read(&reference.q[at]);
-            match (&bundle.stars, &bundle.attitude) {
-                (Some(stars), _) => angles.extend(of_stars(situation, stars, k, &q)),
-                (None, Some(attitude)) => angles.push(attitude.q[k].angle_to(&q)),
-                (None, None) => {}
+            match measured {
+                Measured::Stars(stars) => angles.extend(of_stars(situation, stars, k, &q)),
+                Measured::Attitude(attitude) => angles.push(attitude.q[k].angle_to(&q)),
             }
         }
         median(&mut angles)

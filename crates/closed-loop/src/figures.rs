@@ -9,7 +9,7 @@
 //!
 //! Source: formats.md of the design notes (report.json).
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use block_regression::Fits;
 use effects::Surroundings;
@@ -379,12 +379,7 @@ pub(crate) fn follows(
         .collect();
     // of two terms in the same variable the one that is certain, or worth more
     judged.sort_by(|a, b| (certain(&b.0).cmp(&certain(&a.0))).then(b.1.total_cmp(&a.1)));
-    let mut told: Vec<String> = Vec::new();
-    judged.retain(|(d, ..)| {
-        let new = !told.contains(&d.variable);
-        told.push(d.variable.clone());
-        new
-    });
+    judged = first_of_each(judged, |(d, ..)| &d.variable);
     // one star never wins against one slope that explains the same
     let slopes: Vec<Dependence> = judged
         .iter()
@@ -432,6 +427,15 @@ pub(crate) fn follows(
         depends_on,
         ..Unattributed::default()
     }
+}
+
+/// Of entries in order those that are the first of their variable.
+pub(crate) fn first_of_each<T>(entries: Vec<T>, variable: impl Fn(&T) -> &String) -> Vec<T> {
+    let mut told = BTreeSet::new();
+    let first = entries.into_iter();
+    first
+        .filter(|entry| told.insert(variable(entry).clone()))
+        .collect()
 }
 
 /// Whether that is beyond chance.

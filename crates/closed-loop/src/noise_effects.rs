@@ -13,6 +13,7 @@
 //!
 //! Source: effects.md of the design notes (`magnitude_noise`, `rate_noise`, `outliers`).
 
+mod bursts;
 mod follows;
 mod judge;
 mod rows;

@@ -79,9 +79,7 @@ impl Imagined {
     fn line_arcsec(&self, f: f64, axis: usize) -> f64 {
         let drawn = self.drawn.get_or_init(|| {
             let frames = self.turn.len().min(MOST_FRAMES);
-            all_of(&self.turn[..frames], |turn, k| {
-                self.draw(turn, Place::Heap, k)
-            })
+            self.all(&self.turn[..frames], Place::Heap)
         });
         let frames = self.t_s.len().min(MOST_FRAMES);
         let waves: Vec<[f64; 3]> = self.t_s[..frames]
@@ -114,7 +112,7 @@ impl Imagined {
         let sampled = self.sampled.get_or_init(|| {
             let steps = self.turn.chunks(stride);
             let turn: Vec<Vector3<f64>> = steps.map(|step| step.iter().sum()).collect();
-            all_of(&turn, |turn, k| self.draw(turn, Place::Whole, k))
+            self.all(&turn, Place::Whole)
         });
         let mean = |values: &[f64], bin: &Range<usize>| {
             let first = bin.start / stride;
@@ -128,7 +126,13 @@ impl Imagined {
             .collect()
     }
 
-    /// Errors along these turns from frame to frame.
+    /// Errors of all skies and fields along these turns. Those that leave an attitude undetermined are left out.
+    fn all(&self, turns: &[Vector3<f64>], place: Place) -> Vec<Errors> {
+        let draws = (0..DRAWS).into_par_iter();
+        draws.filter_map(|k| self.draw(turns, place, k)).collect()
+    }
+
+    /// Errors of sky and field `k` along these turns from frame to frame.
     fn draw(&self, turns: &[Vector3<f64>], place: Place, k: u64) -> Option<Errors> {
         let sigma = LsfSigma::Circular(Angle::from_arcsec(self.lsf_arcsec));
         let mut rng = stream(0, k, Purpose::Distortion);
@@ -188,14 +192,6 @@ enum Place {
     Whole,
     /// All of them in a part of it.
     Heap,
-}
-
-fn all_of(
-    turns: &[Vector3<f64>],
-    draw: impl Fn(&[Vector3<f64>], u64) -> Option<Errors> + Sync,
-) -> Vec<Errors> {
-    let draws = (0..DRAWS).into_par_iter();
-    draws.filter_map(|k| draw(turns, k)).collect()
 }
 
 #[cfg(test)]

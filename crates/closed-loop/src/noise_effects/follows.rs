@@ -22,9 +22,11 @@ use rayon::prelude::*;
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor, StudentsT};
 use telemetry::report::{Dependence, Unattributed};
 
+use super::bursts::burst;
 use super::rows::{Row, Source};
 use super::{NoiseEffects, declared_variance, quick};
 use crate::error::CloseError;
+use crate::figures::first_of_each;
 use crate::search::empirical::Variable;
 use crate::situation::Situation;
 use crate::star::evidence::StarEvidence;
@@ -43,8 +45,6 @@ const MIN_USUAL_STARS: usize = 5;
 /// A star with fewer rows than this part of the most is not compared.
 const SELDOM: usize = 20;
 const MIN_BLOCKS: usize = 10;
-/// Parts of the time that a burst of noise may last.
-const STRETCHES: [u32; 3] = [5, 10, 20];
 /// Most odd stars.
 const MOST_ODD: usize = 3;
 /// By how much stars differ for no reason (logarithm of the variance), and how many that is known from.
@@ -147,65 +147,30 @@ pub(crate) fn noise_follows(
     }
     found.retain(|d| d.p_value < ALPHA);
     found.sort_by(|a, b| a.p_value.total_cmp(&b.p_value));
-    let mut seen: Vec<String> = Vec::new();
-    found.retain(|d| {
-        let new = !seen.contains(&d.variable);
-        seen.push(d.variable.clone());
-        new
-    });
-    Ok(NoiseFollows(found))
-}
-
-/// The stretch of time in which the noise differs most from all other times, which pays for all that are tried: of
-/// each length as many as there are, twice as dense.
-fn burst(
-    [all, fast]: [&Table; 2],
-    t_s: impl Fn(&Row) -> f64 + Sync,
-    [from, to]: [f64; 2],
-) -> Option<Judged> {
-    let stretches: Vec<[f64; 2]> = STRETCHES
-        .iter()
-        .flat_map(|&n| {
-            let length = (to - from) / f64::from(n);
-            (0..2 * n - 1).map(move |k| {
-                let start = from + 0.5 * length * f64::from(k);
-                [start, start + length]
-            })
-        })
-        .collect();
-    let judged = stretches.par_iter().filter_map(|[start, end]| {
-        let column = |row: &Row| {
-            let t = t_s(row);
-            [f64::from(u8::from(*start <= t && t < *end)), 0.0]
-        };
-        let within = |table: &Table| table.within(&Columns::of(table, column), 1);
-        both(within(all), within(fast))
-    });
-    let [p, share] = judged.min_by(|a, b| a[0].total_cmp(&b[0]))?;
-    Some([(p * stretches.len() as f64).min(1.0), share])
+    Ok(NoiseFollows(first_of_each(found, |d| &d.variable)))
 }
 
 /// A chance, and the rms share of the variance that changes.
-type Judged = [f64; 2];
+pub(super) type Judged = [f64; 2];
 
 /// What all residuals tell, as far as what changes from frame to frame tells the same.
-fn both(all: Option<Judged>, fast: Option<Judged>) -> Option<Judged> {
+pub(super) fn both(all: Option<Judged>, fast: Option<Judged>) -> Option<Judged> {
     let (all, fast) = (all?, fast?);
     Some([all[0].max(fast[0]), all[1]])
 }
 
 /// Squares over their usual size.
-struct Table {
-    rows: Vec<Row>,
+pub(super) struct Table {
+    pub(super) rows: Vec<Row>,
     /// Of each row, over the level of its star.
-    relative: Vec<f64>,
+    pub(super) relative: Vec<f64>,
     /// Level of each star over the declared one, its rows, and magnitude - 5.
-    stars: Vec<(f64, usize, f64)>,
-    blocks: usize,
+    pub(super) stars: Vec<(f64, usize, f64)>,
+    pub(super) blocks: usize,
 }
 
 /// A variable in the rows of a table.
-struct Columns {
+pub(super) struct Columns {
     rows: Vec<[f64; 2]>,
     /// Over the rows of each star.
     mean: Vec<[f64; 2]>,
@@ -222,6 +187,22 @@ impl Columns {
             }
         }
         Self { rows, mean }
+    }
+}
+
+/// u and N of some columns.
+#[derive(Clone)]
+pub(super) struct Scores {
+    pub(super) score: DVector<f64>,
+    pub(super) normal: DMatrix<f64>,
+}
+
+impl Scores {
+    pub(super) fn zeros(count: usize) -> Self {
+        Self {
+            score: DVector::zeros(count),
+            normal: DMatrix::zeros(count, count),
+        }
     }
 }
 
@@ -283,13 +264,10 @@ impl Table {
 
     /// A variable that changes while a star is seen, by the first `count` of its columns.
     fn within(&self, columns: &Columns, count: usize) -> Option<Judged> {
-        // scores and their normal matrix, block by block
-        let zeros = || (DVector::zeros(count), DMatrix::zeros(count, count));
-        let mut of_block = vec![zeros(); self.blocks];
-        let mut square = 0.0;
+        let mut of_block = vec![Scores::zeros(count); self.blocks];
         for ((row, f), z) in self.rows.iter().zip(&columns.rows).zip(&self.relative) {
             let mean = columns.mean[row.star];
-            let (score, normal) = &mut of_block[row.block];
+            let Scores { score, normal } = &mut of_block[row.block];
             for i in 0..count {
                 let own = f[i] - mean[i];
                 score[i] += own * z;
@@ -297,17 +275,25 @@ impl Table {
                     normal[(i, j)] += own * (f[j] - mean[j]);
                 }
             }
-            square += z * z;
         }
-        of_block.retain(|(score, _)| score.norm_squared() > 0.0);
-        let (score, normal) = of_block
-            .iter()
-            .fold(zeros(), |(u, m), (score, normal)| (u + score, m + normal));
+        self.judge(of_block, count)
+    }
+
+    /// What the blocks of time tell of `count` columns.
+    pub(super) fn judge(&self, mut of_block: Vec<Scores>, count: usize) -> Option<Judged> {
+        of_block.retain(|b| b.score.norm_squared() > 0.0);
+        let mut all = Scores::zeros(count);
+        for block in &of_block {
+            all.score += &block.score;
+            all.normal += &block.normal;
+        }
+        let Scores { score, normal } = all;
         let n = self.rows.len() as f64;
         if (0..count).any(|k| normal[(k, k)] < n * LEAST_CHANGE * LEAST_CHANGE) {
             return None;
         }
         let beta = Cholesky::new(normal)?.solve(&score);
+        let square = self.relative.iter().map(|z| z * z).sum::<f64>();
         let white = beta.dot(&score) / (square / n).max(1.0);
         let k = count as f64;
         let p_white = ChiSquared::new(k).ok()?.sf(white);
@@ -318,7 +304,7 @@ impl Table {
         // what the fit leaves of the blocks: what it takes is no scatter
         let spread: DMatrix<f64> = of_block
             .iter()
-            .map(|(score, normal)| score - normal * &beta)
+            .map(|b| &b.score - &b.normal * &beta)
             .map(|left| &left * left.transpose())
             .fold(DMatrix::zeros(count, count), |a, b| a + b);
         let covariance = spread * (blocks / (blocks - k));
@@ -418,7 +404,7 @@ fn beside_line(y: &[f64], f: &[f64], mag: &[f64], usual: Option<f64>) -> Option<
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
 
     /// Eleven stars of 10 000 rows, whose levels are known to 1 %, and one of `rows` at `level`.
@@ -471,7 +457,7 @@ mod tests {
     }
 
     /// One star over twelve blocks of 200 rows, whose level goes with the time from -1 to 1, which is in the columns.
-    fn in_time(level: impl Fn(f64) -> f64) -> (Table, Columns) {
+    pub(in crate::noise_effects) fn in_time(level: impl Fn(f64) -> f64) -> (Table, Columns) {
         let mut state = 7_u64;
         let mut table = Table {
             rows: Vec::new(),
@@ -510,25 +496,6 @@ mod tests {
     fn chance_in_time(rise: f64) -> f64 {
         let (table, columns) = in_time(|t| 1.0 + rise * t);
         table.within(&columns, 1).unwrap()[0]
-    }
-
-    /// Twice the variance in an eighth of the time, 300 rows: known to 1/sqrt(300), 17 sigma, of which a slope and a
-    /// parabola take next to nothing. Without it 67 stretches are tried for nothing.
-    #[test]
-    fn a_burst_of_noise_is_seen() {
-        let chance = |more: f64| {
-            let (table, _) = in_time(|t| {
-                if (0.1..0.35).contains(&t) {
-                    1.0 + more
-                } else {
-                    1.0
-                }
-            });
-            let time = |row: &Row| row.at as f64 / 1200.0 - 1.0;
-            burst([&table, &table], time, [-1.0, 1.0]).unwrap()[0]
-        };
-        assert!(chance(1.0) < 1e-6, "{}", chance(1.0));
-        assert!(chance(0.0) > 0.01, "{}", chance(0.0));
     }
 
     /// Twelve stars of 1000 rows across the field, noisier at both edges: no slope, and a parabola.
