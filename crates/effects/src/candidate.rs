@@ -226,6 +226,10 @@ pub trait Candidate: Debug + Send + Sync {
     fn turns_camera(&self) -> bool {
         false
     }
+    /// Whether it tells what something follows and not why: a thousandth of its size is nothing to it.
+    fn describes(&self) -> bool {
+        false
+    }
     /// Star columns, px per unit: `out` holds coefficient after coefficient, each `rows.len()` long.
     /// Returns false, leaving `out` unspecified, when it does not act on stars or lacks what it needs.
     ///

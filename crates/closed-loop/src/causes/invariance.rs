@@ -110,6 +110,9 @@ impl Candidate for Changing<'_> {
     fn coefficients(&self) -> &[Coefficient] {
         &self.coefficients
     }
+    fn describes(&self) -> bool {
+        true
+    }
     fn acts_on_stars(&self) -> bool {
         true
     }

@@ -395,6 +395,10 @@ impl Candidate for Empirical {
         &self.coefficients
     }
 
+    fn describes(&self) -> bool {
+        true
+    }
+
     fn acts_on_stars(&self) -> bool {
         true
     }

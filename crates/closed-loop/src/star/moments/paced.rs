@@ -12,7 +12,8 @@
 //! The first is exact where a and b lie (n^2 - 1)/12 in square from the middle, which of whole numbers 7 and 26
 //! frames allow. So these are the products of a design whose slow columns are straight within each group: no
 //! row is left out and nothing of the residual is averaged away. An effect of z sigma in a slow column loses
-//! at most `LOST` z^2 of its square; which columns are slow is judged by themselves, on part of the run.
+//! at most `LOST` z^2 of its square, and a description `ROUGHLY` z^2; which columns are slow is judged by
+//! themselves, on part of the run.
 //!
 //! Source: Gauss quadrature over points that are equally spaced (Abramowitz & Stegun, Section 25.4).
 
@@ -33,6 +34,8 @@ use crate::star::nuisance::StarNuisance;
 const SIZES: [(usize, [usize; 2]); 2] = [(26, [5, 20]), (7, [1, 5])];
 /// Share of its square by which a slow column may differ from its lines.
 const LOST: f64 = 3e-5;
+/// The same where a column only describes.
+const ROUGHLY: f64 = 3e-3;
 /// Of so many groups one tells which columns are slow; how many of these are gone through at once.
 const JUDGED: usize = 24;
 const TOGETHER: usize = 8;
@@ -354,7 +357,8 @@ fn judge(columns: &StarColumns<'_>, nodes: &[Node], size: usize) -> Option<(Vec<
             let own = *at..*at + p;
             *at = own.end;
             let mut seen = lost[own].iter().filter(|l| !l.is_nan()).peekable();
-            let fast = seen.peek().is_none() || seen.any(|l| *l > LOST);
+            let most = if candidate.describes() { ROUGHLY } else { LOST };
+            let fast = seen.peek().is_none() || seen.any(|l| *l > most);
             often += if fast { p } else { 0 };
             fast
         })
