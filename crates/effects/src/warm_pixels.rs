@@ -11,7 +11,7 @@
 //!
 //! Source: the score of a linear coefficient at zero (Rao 1948).
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 
 use focal_plane::{Camera, Pixel};
 
@@ -56,8 +56,7 @@ struct Sums {
     cc: f64,
 }
 
-/// Of the star that was seen last in a slot of the table: its pixel, and where the sums of it and of the
-/// pixels around are.
+/// The pixel that a star was seen in last, and where the sums of it and of the pixels around are.
 #[derive(Clone, Copy)]
 struct Last {
     pixel: [i64; 2],
@@ -78,9 +77,18 @@ impl WarmPixels {
     ) -> Self {
         assert!(left_px.iter().all(|l| l.len() == rows.len()), "residuals");
         assert_eq!(weight.len(), rows.len(), "weights");
-        let mut visits: HashMap<[i64; 2], u32> = HashMap::new();
+        // star by star, for which hardly any row lies in another pixel than the one before
+        let mut of_star: BTreeMap<i64, Vec<usize>> = BTreeMap::new();
         for i in (0..rows.len()).filter(|&i| weight[i] > 0.0) {
-            *visits.entry(pixel_of(camera, rows.landed(i))).or_default() += 1;
+            of_star.entry(rows.star_id[i]).or_default().push(i);
+        }
+        let mut visits: HashMap<[i64; 2], u32> = HashMap::new();
+        for own in of_star.values() {
+            let pixel = |&i: &usize| pixel_of(camera, rows.landed(i));
+            for visit in own.chunk_by(|a, b| pixel(a) == pixel(b)) {
+                let count = u32::try_from(visit.len()).unwrap_or(u32::MAX);
+                *visits.entry(pixel(&visit[0])).or_default() += count;
+            }
         }
         let near = |[x, y]: [i64; 2]| -> u32 {
             let of = |[i, j]: &[i64; 2]| visits.get(&[x + i, y + j]).copied();
@@ -92,35 +100,34 @@ impl WarmPixels {
         let index: HashMap<[i64; 2], usize> =
             pixels.iter().enumerate().map(|(k, p)| (p.0, k)).collect();
         let mut sums: Vec<(usize, Sums)> = Vec::new();
-        let mut place: HashMap<(usize, i64), usize> = HashMap::new();
-        let mut last: HashMap<i64, Last> = HashMap::new();
-        for i in (0..rows.len()).filter(|&i| weight[i] > 0.0) {
-            let star = rows.star_id[i];
-            let at = rows.landed(i);
-            let pixel = pixel_of(camera, at);
-            let mut find = || Last {
-                pixel,
-                sums: NEAR.map(|[x, y]| {
-                    let near = [pixel[0] + x, pixel[1] + y];
-                    index.get(&near).map_or(NOWHERE, |&p| {
-                        *place.entry((p, star)).or_insert_with(|| {
-                            sums.push((p, Sums::default()));
-                            sums.len() - 1
+        for own in of_star.values() {
+            let mut place: HashMap<usize, usize> = HashMap::new();
+            let mut last: Option<Last> = None;
+            for &i in own {
+                let at = rows.landed(i);
+                let pixel = pixel_of(camera, at);
+                let seen = last.take().filter(|l| l.pixel == pixel);
+                let seen = seen.unwrap_or_else(|| Last {
+                    pixel,
+                    sums: NEAR.map(|[x, y]| {
+                        let near = [pixel[0] + x, pixel[1] + y];
+                        index.get(&near).map_or(NOWHERE, |&p| {
+                            *place.entry(p).or_insert_with(|| {
+                                sums.push((p, Sums::default()));
+                                sums.len() - 1
+                            })
                         })
-                    })
-                }),
-            };
-            let seen = last.entry(star).or_insert_with(&mut find);
-            if seen.pixel != pixel {
-                *seen = find();
-            }
-            for &k in seen.sums.iter().filter(|&&k| k != NOWHERE) {
-                let (p, sums) = &mut sums[k];
-                let middle = middle_of(camera, pixels[*p].0);
-                let c = [middle.x - at.x, middle.y - at.y];
-                if c.iter().all(|c| c.abs() <= HALF_WIDTH_PX) {
-                    sums.add(c, left_px.map(|l| l[i]), weight[i] * weight[i]);
+                    }),
+                });
+                for &k in seen.sums.iter().filter(|&&k| k != NOWHERE) {
+                    let (p, sums) = &mut sums[k];
+                    let middle = middle_of(camera, pixels[*p].0);
+                    let c = [middle.x - at.x, middle.y - at.y];
+                    if c.iter().all(|c| c.abs() <= HALF_WIDTH_PX) {
+                        sums.add(c, left_px.map(|l| l[i]), weight[i] * weight[i]);
+                    }
                 }
+                last = Some(seen);
             }
         }
         let mut whole = vec![[Sums::default(); 2]; pixels.len()];
