@@ -49,11 +49,15 @@ mod pixel_phase;
 mod tests;
 mod transform;
 mod turn;
+mod waves;
 
 pub(crate) use turn::Turned;
+use waves::{RAW, RawSums, wave};
 
 /// Peaks of the transform that are refined.
 const REFINED: usize = 6;
+/// How often the middle of three points moves before they come closer, at most.
+const MOST_MOVES: usize = 4;
 /// Chances of a top for each independent wave vector.
 const CHANCES: f64 = 8.0;
 /// Waves fewer than this times the distortion's order across the detector are its own.
@@ -191,8 +195,6 @@ struct Sums {
     score: [Vector2<f64>; 2],
 }
 
-/// Sums over the rows of a star before the means are taken out.
-const RAW: usize = 11;
 /// Rows that are summed in one go.
 const PIECE: usize = 16_384;
 
@@ -204,36 +206,6 @@ fn pieces(rows: &Range<usize>) -> impl Iterator<Item = Range<usize>> + use<> {
 
 fn pieces_of(rows: usize) -> usize {
     rows.div_ceil(PIECE)
-}
-
-/// Cosine and sine of a number of cycles, to 1e-11: of half the angle, which lies within a right angle,
-/// by their series, and doubled.
-#[inline(always)]
-fn wave(cycles: f64) -> [f64; 2] {
-    // adding and taking off 1.5 2^52 rounds to a whole number
-    const WHOLE: f64 = 6_755_399_441_055_744.0;
-    let h = PI * (cycles - ((cycles + WHOLE) - WHOLE));
-    let z = h * h;
-    let series = |coefficients: [f64; 9]| coefficients.into_iter().fold(0.0, |sum, c| sum * z + c);
-    let sin = h * series(SIN);
-    let cos = series(COS);
-    [1.0 - 2.0 * sin * sin, 2.0 * sin * cos]
-}
-
-/// `(-1)^k / (2k + 1)!` and `(-1)^k / (2k)!`, last first.
-const SIN: [f64; 9] = factorials(1);
-const COS: [f64; 9] = factorials(0);
-
-const fn factorials(first: u32) -> [f64; 9] {
-    let mut out = [1.0; 9];
-    let (mut k, mut value) = (1, 1.0);
-    while k < 9 {
-        let n = (2 * k + first) as f64;
-        value *= -1.0 / (n * (n - 1.0));
-        out[8 - k as usize] = value;
-        k += 1;
-    }
-    out
 }
 
 impl Sums {
@@ -370,9 +342,9 @@ impl Field {
         let best = peaks
             .into_iter()
             .take(REFINED)
-            .map(|peak| climb(&power, peak, step, 2))
+            .map(|peak| climb(&power, peak, step, 1))
             .max_by(|a, b| a.0.total_cmp(&b.0))?;
-        let best = climb(&power, best, step.map(|s| 0.25 * s), 7);
+        let best = climb(&power, best, step.map(|s| 0.25 * s), 3);
         let wave = best.1;
         if own.excludes(wave) {
             return None;
@@ -425,52 +397,11 @@ impl Field {
 
     /// Sums of cos and sin, of their products, and of both with the residuals.
     fn raw_sums(&self, rows: &Range<usize>, k: [f64; 2]) -> [f64; RAW] {
-        // with the widest registers that the machine has
-        Arch::new().dispatch(|| self.raw_sums_here(rows, k))
-    }
-
-    #[inline(always)]
-    fn raw_sums_here(&self, rows: &Range<usize>, k: [f64; 2]) -> [f64; RAW] {
-        // side by side
-        const LANES: usize = 8;
-        let of = |x: f64, y: f64, [rx, ry]: [f64; 2]| {
-            let [c, s] = wave(k[0] * x + k[1] * y);
-            [
-                c,
-                s,
-                c * c,
-                c * s,
-                s * s,
-                c * rx,
-                s * rx,
-                c * ry,
-                s * ry,
-                rx,
-                ry,
-            ]
-        };
-        let mut sums = [[0.0; LANES]; RAW];
-        let (x, y) = (&self.x_px[rows.clone()], &self.y_px[rows.clone()]);
-        let [rx, ry] = self.residual.each_ref().map(|r| &r[rows.clone()]);
-        let whole = rows.len() - rows.len() % LANES;
-        for at in (0..whole).step_by(LANES) {
-            let part = at..at + LANES;
-            let (x, y) = (&x[part.clone()], &y[part.clone()]);
-            let (rx, ry) = (&rx[part.clone()], &ry[part]);
-            for l in 0..LANES {
-                let values = of(x[l], y[l], [rx[l], ry[l]]);
-                for n in 0..RAW {
-                    sums[n][l] += values[n];
-                }
-            }
-        }
-        for i in whole..rows.len() {
-            let values = of(x[i], y[i], [rx[i], ry[i]]);
-            for n in 0..RAW {
-                sums[n][0] += values[n];
-            }
-        }
-        sums.map(|lanes| lanes.iter().sum())
+        Arch::new().dispatch(RawSums {
+            at: [&self.x_px[rows.clone()], &self.y_px[rows.clone()]],
+            residual: self.residual.each_ref().map(|r| &r[rows.clone()]),
+            k,
+        })
     }
 
     fn sums_of(&self, first: usize, columns: &[[f64; 2]], counts: impl Fn(usize) -> bool) -> Sums {
@@ -583,30 +514,43 @@ impl Field {
     }
 }
 
-/// The top of `power` near a wave vector, by steps that are halved where none leads higher.
+/// The top of `power` near a wave vector: axis by axis that of a parabola through three points, a `step` apart, which
+/// is then a quarter as long; where the highest of the three is at an end, that is the next middle.
 fn climb(
     power: &impl Fn([f64; 2]) -> f64,
     mut best: (f64, [f64; 2]),
     mut step: [f64; 2],
-    halvings: usize,
+    rounds: usize,
 ) -> (f64, [f64; 2]) {
-    let mut halved = 0;
-    for _ in 0..4 * halvings {
-        let (start, centre) = best;
-        for (dx, dy) in [(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)] {
-            let k = [centre[0] + dx * step[0], centre[1] + dy * step[1]];
-            let at = power(k);
-            if at > best.0 {
-                best = (at, k);
+    for _ in 0..rounds {
+        for _ in 0..MOST_MOVES {
+            let mut inside = true;
+            for axis in 0..2 {
+                let (middle, mut k) = best;
+                let mut at = |offset: f64| {
+                    k[axis] = best.1[axis] + offset;
+                    (power(k), k)
+                };
+                let [low, high] = [at(-step[axis]), at(step[axis])];
+                let bend = 2.0 * middle - low.0 - high.0;
+                let end = if high.0 > low.0 { high } else { low };
+                let found = if end.0 > middle {
+                    inside = false;
+                    end
+                } else if bend > 0.0 {
+                    at(0.5 * step[axis] * (high.0 - low.0) / bend)
+                } else {
+                    best
+                };
+                if found.0 > best.0 {
+                    best = found;
+                }
+            }
+            if inside {
+                break;
             }
         }
-        if best.0 <= start {
-            step = step.map(|s| 0.5 * s);
-            halved += 1;
-        }
-        if halved == halvings {
-            break;
-        }
+        step = step.map(|s| 0.25 * s);
     }
     best
 }

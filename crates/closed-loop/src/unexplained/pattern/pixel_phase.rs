@@ -18,9 +18,11 @@ use std::ops::Range;
 
 use block_regression::add_products;
 use nalgebra::{DMatrix, MatrixXx2, RowDVector};
+use pulp::Arch;
 use rayon::prelude::*;
 
-use super::{Field, pieces, wave};
+use super::waves::Waves;
+use super::{Field, pieces};
 use crate::search::empirical::HARMONICS;
 
 /// Waves along one axis, and all.
@@ -145,12 +147,15 @@ impl Field {
     /// Cosines and sines at some rows, not less their means, and room for more columns.
     fn waves_at(&self, waves: &[[f64; 2]], rows: &Range<usize>, more: usize) -> DMatrix<f64> {
         let mut out = DMatrix::zeros(rows.len(), 2 * waves.len() + more);
-        for (h, k) in waves.iter().enumerate() {
-            for (j, row) in rows.clone().enumerate() {
-                let [cos, sin] = wave(k[0] * self.x_px[row] + k[1] * self.y_px[row]);
-                out[(j, 2 * h)] = cos;
-                out[(j, 2 * h + 1)] = sin;
-            }
+        let pairs = out.as_mut_slice().chunks_exact_mut(2 * rows.len());
+        for (pair, k) in pairs.zip(waves) {
+            let (cos, sin) = pair.split_at_mut(rows.len());
+            Arch::new().dispatch(Waves {
+                at: [&self.x_px[rows.clone()], &self.y_px[rows.clone()]],
+                k: *k,
+                cos,
+                sin,
+            });
         }
         out
     }
