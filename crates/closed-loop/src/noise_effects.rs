@@ -25,6 +25,7 @@ use std::collections::BTreeMap;
 
 use block_regression::Folds;
 use focal_plane::Pixel;
+use rayon::prelude::*;
 use star_tracker::StarView;
 use telemetry::report::{ConsideredEffect, Estimate, FoundEffect};
 use telemetry::{EffectEntry, EffectValue};
@@ -268,13 +269,12 @@ fn quick(data: &StarData, residual: &[Vec<f64>]) -> Vec<Vec<f64>> {
     }
     let scale = (2.0_f64 / 3.0).sqrt();
     let mut out = vec![vec![f64::NAN; data.t_s.len()]; residual.len()];
-    for rows in &of_star {
-        for w in rows.windows(3) {
-            for (out, residual) in out.iter_mut().zip(residual) {
-                out[w[1]] = scale * (residual[w[1]] - 0.5 * (residual[w[0]] + residual[w[2]]));
-            }
+    let axes = out.par_iter_mut().zip(residual);
+    axes.for_each(|(out, residual)| {
+        for w in of_star.iter().flat_map(|rows| rows.windows(3)) {
+            out[w[1]] = scale * (residual[w[1]] - 0.5 * (residual[w[0]] + residual[w[2]]));
         }
-    }
+    });
     out
 }
 

@@ -14,6 +14,7 @@
 use std::collections::{BTreeMap, HashMap};
 
 use focal_plane::{Camera, Pixel};
+use rayon::prelude::*;
 
 use crate::StarRows;
 use crate::hot_pixel::{HALF_WIDTH_PX, middle_of, pixel_of};
@@ -82,13 +83,17 @@ impl WarmPixels {
         for i in (0..rows.len()).filter(|&i| weight[i] > 0.0) {
             of_star.entry(rows.star_id[i]).or_default().push(i);
         }
+        let stars: Vec<Vec<usize>> = of_star.into_values().collect();
+        let look = Look {
+            camera,
+            rows,
+            left_px,
+            weight,
+        };
+        let each: Vec<_> = stars.par_iter().map(|own| look.visits(own)).collect();
         let mut visits: HashMap<[i64; 2], u32> = HashMap::new();
-        for own in of_star.values() {
-            let pixel = |&i: &usize| pixel_of(camera, rows.landed(i));
-            for visit in own.chunk_by(|a, b| pixel(a) == pixel(b)) {
-                let count = u32::try_from(visit.len()).unwrap_or(u32::MAX);
-                *visits.entry(pixel(&visit[0])).or_default() += count;
-            }
+        for (pixel, count) in each.into_iter().flatten() {
+            *visits.entry(pixel).or_default() += count;
         }
         let near = |[x, y]: [i64; 2]| -> u32 {
             let of = |[i, j]: &[i64; 2]| visits.get(&[x + i, y + j]).copied();
@@ -99,39 +104,12 @@ impl WarmPixels {
         pixels.sort_unstable();
         let index: HashMap<[i64; 2], usize> =
             pixels.iter().enumerate().map(|(k, p)| (p.0, k)).collect();
-        let mut sums: Vec<(usize, Sums)> = Vec::new();
-        for own in of_star.values() {
-            let mut place: HashMap<usize, usize> = HashMap::new();
-            let mut last: Option<Last> = None;
-            for &i in own {
-                let at = rows.landed(i);
-                let pixel = pixel_of(camera, at);
-                let seen = last.take().filter(|l| l.pixel == pixel);
-                let seen = seen.unwrap_or_else(|| Last {
-                    pixel,
-                    sums: NEAR.map(|[x, y]| {
-                        let near = [pixel[0] + x, pixel[1] + y];
-                        index.get(&near).map_or(NOWHERE, |&p| {
-                            *place.entry(p).or_insert_with(|| {
-                                sums.push((p, Sums::default()));
-                                sums.len() - 1
-                            })
-                        })
-                    }),
-                });
-                for &k in seen.sums.iter().filter(|&&k| k != NOWHERE) {
-                    let (p, sums) = &mut sums[k];
-                    let middle = middle_of(camera, pixels[*p].0);
-                    let c = [middle.x - at.x, middle.y - at.y];
-                    if c.iter().all(|c| c.abs() <= HALF_WIDTH_PX) {
-                        sums.add(c, left_px.map(|l| l[i]), weight[i] * weight[i]);
-                    }
-                }
-                last = Some(seen);
-            }
-        }
+        let sums: Vec<_> = stars
+            .par_iter()
+            .map(|own| look.sums(own, &pixels, &index))
+            .collect();
         let mut whole = vec![[Sums::default(); 2]; pixels.len()];
-        for (p, own) in &sums {
+        for (p, own) in sums.iter().flatten() {
             whole[*p][0].join(own);
             whole[*p][1].join(&own.centred());
         }
@@ -155,6 +133,67 @@ impl WarmPixels {
                 .collect(),
             looked_at: pixels.len(),
         }
+    }
+}
+
+/// What is looked at.
+struct Look<'a> {
+    camera: &'a Camera,
+    rows: &'a StarRows<'a>,
+    left_px: [&'a [f64]; 2],
+    weight: &'a [f64],
+}
+
+impl Look<'_> {
+    /// The pixels that a star is in, in these rows, and in how many; a pixel comes again where the star does.
+    fn visits(&self, own: &[usize]) -> Vec<([i64; 2], u32)> {
+        let pixel = |&i: &usize| pixel_of(self.camera, self.rows.landed(i));
+        own.chunk_by(|a, b| pixel(a) == pixel(b))
+            .map(|visit| {
+                let count = u32::try_from(visit.len()).unwrap_or(u32::MAX);
+                (pixel(&visit[0]), count)
+            })
+            .collect()
+    }
+
+    /// Sums of a star over these rows of it, for those of `pixels` that it comes near, whose places are in `index`.
+    fn sums(
+        &self,
+        own: &[usize],
+        pixels: &[([i64; 2], u32)],
+        index: &HashMap<[i64; 2], usize>,
+    ) -> Vec<(usize, Sums)> {
+        let mut out: Vec<(usize, Sums)> = Vec::new();
+        let mut place: HashMap<usize, usize> = HashMap::new();
+        let mut last: Option<Last> = None;
+        for &i in own {
+            let at = self.rows.landed(i);
+            let pixel = pixel_of(self.camera, at);
+            let seen = last.take().filter(|l| l.pixel == pixel);
+            let seen = seen.unwrap_or_else(|| Last {
+                pixel,
+                sums: NEAR.map(|[x, y]| {
+                    let near = [pixel[0] + x, pixel[1] + y];
+                    index.get(&near).map_or(NOWHERE, |&p| {
+                        *place.entry(p).or_insert_with(|| {
+                            out.push((p, Sums::default()));
+                            out.len() - 1
+                        })
+                    })
+                }),
+            });
+            for &k in seen.sums.iter().filter(|&&k| k != NOWHERE) {
+                let (p, sums) = &mut out[k];
+                let middle = middle_of(self.camera, pixels[*p].0);
+                let c = [middle.x - at.x, middle.y - at.y];
+                if c.iter().all(|c| c.abs() <= HALF_WIDTH_PX) {
+                    let weight = self.weight[i] * self.weight[i];
+                    sums.add(c, self.left_px.map(|l| l[i]), weight);
+                }
+            }
+            last = Some(seen);
+        }
+        out
     }
 }
 

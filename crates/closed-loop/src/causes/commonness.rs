@@ -207,22 +207,25 @@ pub(crate) fn slow(
     let t_s = &data.frames.t_s;
     let near = |now: f64, before: f64| now - before <= (lags as f64 + 0.5) * step;
     let asked: Vec<usize> = (0..3).filter(|&a| axes[a]).collect();
-    let (mut rotation, mut of_rotation) = (0.0, 0.0);
-    for (k, now) in parts.iter().enumerate() {
-        let Some(now) = now else { continue };
+    // products with the frames before, and how many
+    let with_others = |(k, now): (usize, &Option<Parts>)| {
+        let mut sum = (0.0, 0.0);
+        let Some(now) = now else { return sum };
         for before in (k.saturating_sub(lags)..k).rev() {
             if !near(t_s[k], t_s[before]) {
                 break;
             }
             if let Some(before) = &parts[before] {
-                rotation += asked
-                    .iter()
-                    .map(|&a| now.turn[a] * before.turn[a])
-                    .sum::<f64>();
-                of_rotation += asked.len() as f64;
+                let products = asked.iter().map(|&a| now.turn[a] * before.turn[a]);
+                sum.0 += products.sum::<f64>();
+                sum.1 += asked.len() as f64;
             }
         }
-    }
+        sum
+    };
+    let each: Vec<(f64, f64)> = parts.par_iter().enumerate().map(with_others).collect();
+    let rotation = each.iter().map(|e| e.0).sum::<f64>();
+    let of_rotation = each.iter().map(|e| e.1).sum::<f64>();
     let each: Vec<Products> = rows_of
         .par_iter()
         .map(|rows| {

@@ -15,6 +15,8 @@
 //!
 //! Source: an analysis of variance within and between (Fisher 1925); Student 1908.
 
+use rayon::prelude::*;
+
 use crate::star::data::StarData;
 
 /// Bins of a pixel phase.
@@ -37,7 +39,7 @@ pub(crate) fn comes_back(
     tau_s: f64,
 ) -> Option<usize> {
     let each = [0, 1].map(|axis| -> Vec<f64> {
-        let stars = rows_of.iter();
+        let stars = rows_of.par_iter();
         stars
             .filter_map(|rows| of_star(data, rows, axis, left, tau_s))
             .collect()
