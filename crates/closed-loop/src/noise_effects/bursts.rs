@@ -84,6 +84,7 @@ impl<'a> Cells<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::noise_effects::follows::Columns;
     use crate::noise_effects::follows::tests::in_time;
 
     /// Twice the variance in an eighth of the time, 300 rows: known to 1/sqrt(300), 17 sigma, of which a slope and a
@@ -103,5 +104,22 @@ mod tests {
         };
         assert!(chance(1.0) < 1e-6, "{}", chance(1.0));
         assert!(chance(0.0) > 0.01, "{}", chance(0.0));
+    }
+
+    /// Sums over fortieths are those of a column of ones and noughts over the rows.
+    #[test]
+    fn a_stretch_is_judged_as_its_column() {
+        let (table, _) = in_time(|t| 1.0 + 0.3 * t);
+        // 2400 rows: 60 to a fortieth
+        let cells = Cells::of(&table, |row| row.at / 60);
+        for stretch in [[0, 8], [22, 26], [38, 40]] {
+            let rows = 60 * stretch[0]..60 * stretch[1];
+            let column = |row: &Row| [f64::from(u8::from(rows.contains(&row.at))), 0.0];
+            let known = table.within(&Columns::of(&table, column), 1).unwrap();
+            let judged = cells.judge(stretch).unwrap();
+            for (judged, known) in judged.iter().zip(known) {
+                assert!((judged - known).abs() < 1e-9 * known, "{judged} {known}");
+            }
+        }
     }
 }

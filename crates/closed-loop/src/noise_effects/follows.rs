@@ -177,7 +177,7 @@ pub(super) struct Columns {
 }
 
 impl Columns {
-    fn of(table: &Table, column: impl Fn(&Row) -> [f64; 2]) -> Self {
+    pub(super) fn of(table: &Table, column: impl Fn(&Row) -> [f64; 2]) -> Self {
         let rows: Vec<[f64; 2]> = table.rows.iter().map(column).collect();
         let mut mean = vec![[0.0; 2]; table.stars.len()];
         for (row, f) in table.rows.iter().zip(&rows) {
@@ -263,7 +263,7 @@ impl Table {
     }
 
     /// A variable that changes while a star is seen, by the first `count` of its columns.
-    fn within(&self, columns: &Columns, count: usize) -> Option<Judged> {
+    pub(super) fn within(&self, columns: &Columns, count: usize) -> Option<Judged> {
         let mut of_block = vec![Scores::zeros(count); self.blocks];
         for ((row, f), z) in self.rows.iter().zip(&columns.rows).zip(&self.relative) {
             let mean = columns.mean[row.star];

@@ -1,11 +1,17 @@
 //! Two paces against every row.
 
+use std::f64::consts::PI;
+use std::sync::Arc;
+
 use block_regression::Folds;
-use focal_plane::{ARCSEC_PER_RAD, AttitudeSeries, Camera, StarFrames, rotation_from_vector};
+use focal_plane::{
+    ARCSEC_PER_RAD, AttitudeSeries, Camera, Series, StarFrames, rotation_from_vector,
+};
 use nalgebra::{DMatrix, Vector3};
 use telemetry::Model;
 
 use super::*;
+use crate::causes::description::Kept;
 use crate::search::empirical::{Empirical, Variable};
 use crate::star::harness::seen;
 
@@ -57,7 +63,6 @@ fn model() -> Model {
 /// Hands over the columns of the declared unknowns, of a fast term, of two slow ones, and the residual.
 fn with_columns(check: impl Fn(&StarColumns<'_>)) {
     let data = data();
-    let nuisance = StarNuisance::declared(&model(), &data);
     let span = [data.t_s[0], data.t_s[data.t_s.len() - 1]];
     let ids = data.stars.iter().map(|s| s.id).collect();
     let terms = [
@@ -65,12 +70,20 @@ fn with_columns(check: impl Fn(&StarColumns<'_>)) {
         Empirical::new(Variable::Time, span, true).unwrap(),
         Empirical::new(Variable::Star(ids), [0.0, 1.0], true).unwrap(),
     ];
-    let candidates = terms.each_ref().map(|t| t as &dyn Candidate);
+    with_candidates(&data, &terms.each_ref().map(|t| t as &dyn Candidate), check);
+}
+
+fn with_candidates(
+    data: &StarData,
+    candidates: &[&dyn Candidate],
+    check: impl Fn(&StarColumns<'_>),
+) {
+    let nuisance = StarNuisance::declared(&model(), data);
     let weight: Vec<f64> = data.star.iter().map(|&s| 0.8 + 0.1 * s as f64).collect();
     check(&StarColumns {
-        data: &data,
+        data,
         nuisance: &nuisance,
-        candidates: &candidates,
+        candidates,
         residuals: &[data.measured_residual()],
         motion: None,
         weight: &weight,
@@ -164,5 +177,27 @@ fn products_are_those_of_every_frame() {
             .map(|i| off(i, width - 1))
             .fold(0.0, f64::max);
         assert!(exact < 1e-12, "straight columns are exact: {exact}");
+    });
+}
+
+/// A channel that swings in 20 s, by up to its third power: of its third harmonic, 0.94 rad/s, an arc of 2 h = 0.7 s
+/// lies off the line through two frames by (0.94 h)^2 / (3 sqrt 5) = 0.016 of itself. The square, 3e-4, is nothing to a
+/// description, and too much for an effect.
+#[test]
+fn descriptions_may_be_rough() {
+    let data = data();
+    let t_s: Vec<f64> = (0..500).map(|k| 0.1 * f64::from(k)).collect();
+    let swing = t_s.iter().map(|t| (t * 2.0 * PI / 20.0).sin()).collect();
+    let channel = Series::new(t_s, swing).unwrap();
+    let variable = Variable::Housekeeping("swing_c".to_owned(), channel);
+    let term = Empirical::new(variable, [-1.0, 1.0], true).unwrap();
+    let all = (0..term.coefficients().len()).collect();
+    let effect = Kept::new(Arc::new(term.clone()), all);
+    let time = Empirical::new(Variable::Time, [0.0, 40.0], true).unwrap();
+    let candidates: [&dyn Candidate; 3] = [&term, &effect, &time];
+    with_candidates(&data, &candidates, |columns| {
+        let folds = Folds::whole(FRAMES);
+        let paced = Paced::of(columns, &folds.blocks).unwrap();
+        assert_eq!(paced.fast, [false, true, false]);
     });
 }
