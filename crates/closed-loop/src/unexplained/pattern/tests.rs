@@ -1,4 +1,4 @@
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 
 use block_regression::Folds;
 use rand_core::{Rng, SeedableRng};
@@ -6,7 +6,7 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use telemetry::report::{Dependence, Unattributed};
 
-use super::{Field, Pattern};
+use super::{Field, Pattern, climb};
 
 const STARS: usize = 12;
 const FRAMES: usize = 400;
@@ -66,6 +66,34 @@ fn search(field: &Field) -> Option<Pattern> {
 
 fn wave(k: [f64; 2], size: f64) -> impl Fn(f64, f64) -> f64 {
     move |x, y| size * (TAU * (k[0] * x + k[1] * y) + 0.7).sin()
+}
+
+/// The top of a wave over 200 px, sinc^2 on both axes, from up to 0.7 cycles off: outside of the first three points,
+/// too. A parabola's top is off by (pi step)^2 / 5 of the way at most, 0.12 of it at a quarter of a cycle and a
+/// sixteenth of that each round: 0.7 x 0.12 x 0.008 x 0.0005 cycles, and what rounding makes of a flat top, 1e-8.
+#[test]
+fn a_top_is_climbed_to_the_middle() {
+    let top = [0.137, -0.291];
+    let sinc = |v: f64| {
+        if v.abs() < 1e-9 {
+            1.0
+        } else {
+            (PI * v).sin() / (PI * v)
+        }
+    };
+    let power = |k: [f64; 2]| {
+        let off = [0, 1].map(|a| sinc(200.0 * (k[a] - top[a])).powi(2));
+        off[0] * off[1]
+    };
+    for off in [[0.2, -0.1], [0.7, 0.4], [0.0, -0.6]] {
+        let start = [0, 1].map(|a| top[a] + off[a] / 200.0);
+        let (at, k) = climb(&power, (power(start), start), [0.25 / 200.0; 2], 3);
+        for axis in 0..2 {
+            let left: f64 = 200.0 * (k[axis] - top[axis]);
+            assert!(left.abs() < 1e-6, "{left} {off:?}");
+        }
+        assert!((at - 1.0).abs() < 1e-9);
+    }
 }
 
 /// A fringe of 1.5 arcsec has sqrt(4800 / 2) * 1.5 / 7.35 = 10 sigma in 4800 rows. Its wave vector is known
