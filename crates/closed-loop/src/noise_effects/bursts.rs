@@ -7,6 +7,8 @@
 //! n and Z are rows and the sum of their z, m the share of the star's rows that lies in the stretch: `follows.rs` with
 //! a column of ones and noughts. Every stretch begins and ends at a fortieth of the time, so that sums over those
 //! do for all.
+//!
+//! Source: a scan over stretches (Naus 1965); what each is worth, as in `follows.rs`.
 
 use std::collections::BTreeMap;
 
