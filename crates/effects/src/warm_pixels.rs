@@ -36,7 +36,6 @@ const NEAR: [[i64; 2]; 9] = [
     [0, 1],
     [1, 1],
 ];
-const NOWHERE: usize = usize::MAX;
 
 /// The pixels that are proposed, best first.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -57,11 +56,10 @@ struct Sums {
     cc: f64,
 }
 
-/// The pixel that a star was seen in last, and where the sums of it and of the pixels around are.
-#[derive(Clone, Copy)]
-struct Last {
+/// Rows that follow one another in which a star is in the same pixel.
+struct Visit<'a> {
     pixel: [i64; 2],
-    sums: [usize; NEAR.len()],
+    rows: &'a [usize],
 }
 
 impl WarmPixels {
@@ -90,10 +88,11 @@ impl WarmPixels {
             left_px,
             weight,
         };
-        let each: Vec<_> = stars.par_iter().map(|own| look.visits(own)).collect();
+        let each: Vec<Vec<Visit<'_>>> = stars.par_iter().map(|own| look.visits(own)).collect();
         let mut visits: HashMap<[i64; 2], u32> = HashMap::new();
-        for (pixel, count) in each.into_iter().flatten() {
-            *visits.entry(pixel).or_default() += count;
+        for visit in each.iter().flatten() {
+            let count = u32::try_from(visit.rows.len()).unwrap_or(u32::MAX);
+            *visits.entry(visit.pixel).or_default() += count;
         }
         let near = |[x, y]: [i64; 2]| -> u32 {
             let of = |[i, j]: &[i64; 2]| visits.get(&[x + i, y + j]).copied();
@@ -104,7 +103,7 @@ impl WarmPixels {
         pixels.sort_unstable();
         let index: HashMap<[i64; 2], usize> =
             pixels.iter().enumerate().map(|(k, p)| (p.0, k)).collect();
-        let sums: Vec<_> = stars
+        let sums: Vec<_> = each
             .par_iter()
             .map(|own| look.sums(own, &pixels, &index))
             .collect();
@@ -145,53 +144,46 @@ struct Look<'a> {
 }
 
 impl Look<'_> {
-    /// The pixels that a star is in, in these rows, and in how many; a pixel comes again where the star does.
-    fn visits(&self, own: &[usize]) -> Vec<([i64; 2], u32)> {
+    /// Where a star is in these rows of it.
+    fn visits<'a>(&self, own: &'a [usize]) -> Vec<Visit<'a>> {
         let pixel = |&i: &usize| pixel_of(self.camera, self.rows.landed(i));
         own.chunk_by(|a, b| pixel(a) == pixel(b))
-            .map(|visit| {
-                let count = u32::try_from(visit.len()).unwrap_or(u32::MAX);
-                (pixel(&visit[0]), count)
+            .map(|rows| Visit {
+                pixel: pixel(&rows[0]),
+                rows,
             })
             .collect()
     }
 
-    /// Sums of a star over these rows of it, for those of `pixels` that it comes near, whose places are in `index`.
+    /// Sums of a star over its visits, for those of `pixels` that it comes near, whose places are in `index`.
     fn sums(
         &self,
-        own: &[usize],
+        own: &[Visit<'_>],
         pixels: &[([i64; 2], u32)],
         index: &HashMap<[i64; 2], usize>,
     ) -> Vec<(usize, Sums)> {
         let mut out: Vec<(usize, Sums)> = Vec::new();
         let mut place: HashMap<usize, usize> = HashMap::new();
-        let mut last: Option<Last> = None;
-        for &i in own {
-            let at = self.rows.landed(i);
-            let pixel = pixel_of(self.camera, at);
-            let seen = last.take().filter(|l| l.pixel == pixel);
-            let seen = seen.unwrap_or_else(|| Last {
-                pixel,
-                sums: NEAR.map(|[x, y]| {
-                    let near = [pixel[0] + x, pixel[1] + y];
-                    index.get(&near).map_or(NOWHERE, |&p| {
-                        *place.entry(p).or_insert_with(|| {
-                            out.push((p, Sums::default()));
-                            out.len() - 1
-                        })
-                    })
-                }),
+        for Visit { pixel, rows } in own {
+            let near = NEAR.map(|[x, y]| {
+                let p = *index.get(&[pixel[0] + x, pixel[1] + y])?;
+                Some(*place.entry(p).or_insert_with(|| {
+                    out.push((p, Sums::default()));
+                    out.len() - 1
+                }))
             });
-            for &k in seen.sums.iter().filter(|&&k| k != NOWHERE) {
-                let (p, sums) = &mut out[k];
-                let middle = middle_of(self.camera, pixels[*p].0);
-                let c = [middle.x - at.x, middle.y - at.y];
-                if c.iter().all(|c| c.abs() <= HALF_WIDTH_PX) {
-                    let weight = self.weight[i] * self.weight[i];
-                    sums.add(c, self.left_px.map(|l| l[i]), weight);
+            for &i in *rows {
+                let at = self.rows.landed(i);
+                for k in near.into_iter().flatten() {
+                    let (p, sums) = &mut out[k];
+                    let middle = middle_of(self.camera, pixels[*p].0);
+                    let c = [middle.x - at.x, middle.y - at.y];
+                    if c.iter().all(|c| c.abs() <= HALF_WIDTH_PX) {
+                        let weight = self.weight[i] * self.weight[i];
+                        sums.add(c, self.left_px.map(|l| l[i]), weight);
+                    }
                 }
             }
-            last = Some(seen);
         }
         out
     }

@@ -79,7 +79,7 @@ impl<'a> Cells<'a> {
             of_block[block].score[0] += f * z;
             of_block[block].normal[(0, 0)] += f * f * rows as f64;
         }
-        self.table.judge(of_block, 1)
+        self.table.judge(of_block)
     }
 }
 

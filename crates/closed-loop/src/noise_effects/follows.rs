@@ -276,12 +276,13 @@ impl Table {
                 }
             }
         }
-        self.judge(of_block, count)
+        self.judge(of_block)
     }
 
-    /// What the blocks of time tell of `count` columns.
-    pub(super) fn judge(&self, mut of_block: Vec<Scores>, count: usize) -> Option<Judged> {
+    /// What the blocks of time tell of some columns.
+    pub(super) fn judge(&self, mut of_block: Vec<Scores>) -> Option<Judged> {
         of_block.retain(|b| b.score.norm_squared() > 0.0);
+        let count = of_block.first()?.score.len();
         let mut all = Scores::zeros(count);
         for block in &of_block {
             all.score += &block.score;

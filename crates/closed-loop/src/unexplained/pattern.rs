@@ -395,10 +395,15 @@ impl Field {
         })
     }
 
+    /// Where some rows lie, x and y.
+    fn places(&self, rows: &Range<usize>) -> [&[f64]; 2] {
+        [&self.x_px[rows.clone()], &self.y_px[rows.clone()]]
+    }
+
     /// Sums of cos and sin, of their products, and of both with the residuals.
     fn raw_sums(&self, rows: &Range<usize>, k: [f64; 2]) -> [f64; RAW] {
         Arch::new().dispatch(RawSums {
-            at: [&self.x_px[rows.clone()], &self.y_px[rows.clone()]],
+            at: self.places(rows),
             residual: self.residual.each_ref().map(|r| &r[rows.clone()]),
             k,
         })

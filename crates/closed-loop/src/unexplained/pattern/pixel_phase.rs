@@ -151,7 +151,7 @@ impl Field {
         for (pair, k) in pairs.zip(waves) {
             let (cos, sin) = pair.split_at_mut(rows.len());
             Arch::new().dispatch(Waves {
-                at: [&self.x_px[rows.clone()], &self.y_px[rows.clone()]],
+                at: self.places(rows),
                 k: *k,
                 cos,
                 sin,
