@@ -105,16 +105,20 @@ pub fn compare(
     let truth = Residual::reference(bundle)?;
     let mut notes = first_notes(&residual);
     let models: Vec<&Model> = std::iter::once(model).chain(others).collect();
+    let prepared: Vec<Result<_, ComparisonError>> = models
+        .par_iter()
+        .map(|model| {
+            let mut said = vec![];
+            let (t_s, seed) = (&residual.t_s, settings.seed);
+            let flight = Flight::new(model, bundle, &truth, t_s, seed, &mut said)?;
+            Ok((flight, said))
+        })
+        .collect();
     let mut flights = vec![];
-    for model in &models {
-        flights.push(Flight::new(
-            model,
-            bundle,
-            &truth,
-            &residual.t_s,
-            settings.seed,
-            &mut notes,
-        )?);
+    for prepared in prepared {
+        let (flight, said) = prepared?;
+        flights.push(flight);
+        notes.extend(said);
     }
     let first: Vec<[Vec<f64>; 3]> = flights
         .par_iter()

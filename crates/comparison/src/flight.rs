@@ -12,13 +12,16 @@
 //! Source: \[M23\] Fig. 4, Fig. 5 and Section 4.2.1 (100 randomly drawn model variants).
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 use std::sync::Arc;
 
 use effects::{Effect, FrameGeometry, ReferenceWander, Surroundings, VectorFrame};
 use focal_plane::{
-    ARCSEC_PER_RAD, AttitudeSeries, AttitudeSource, Camera, Series, Vectors, rotation_vector,
+    ARCSEC_PER_RAD, AttitudeSeries, AttitudeSource, Camera, Points, PointsMut, Series, Vectors,
+    rotation_vector,
 };
 use fogm_fit::{Fogm, FogmWhite};
+use rayon::prelude::*;
 use scenarios::{Declared, effect_parameters};
 use spectra::robust;
 use star_tracker::{Disturbance, HemState, Measured, NoiseStreams, Purpose, Rows, Scratch, stream};
@@ -42,6 +45,9 @@ pub(crate) struct Flight<'a> {
     /// None where the model needs none.
     stars: Option<Stars>,
     effects: Vec<Arc<dyn Effect>>,
+    /// Ideal x and y of the stars of each batch of frames, px: the same in every draw. None of a hybrid
+    /// model, which flies its stars once in a draw and adds processes.
+    ideal: Option<Vec<[Vec<f64>; 2]>>,
 }
 
 impl<'a> Flight<'a> {
@@ -73,7 +79,7 @@ impl<'a> Flight<'a> {
             // without stars nothing is projected: any camera does
             (Camera::from_focal_length_px([2, 2], 1.0)?, vec![], None)
         };
-        Ok(Self {
+        let mut flight = Self {
             t_s,
             truth,
             model,
@@ -81,7 +87,55 @@ impl<'a> Flight<'a> {
             camera,
             stars,
             effects,
-        })
+            ideal: None,
+        };
+        if !hybrid {
+            flight.ideal = Some(flight.ideal()?);
+        }
+        Ok(flight)
+    }
+
+    fn disturbances(&self) -> Vec<Arc<dyn Disturbance>> {
+        let all = self.effects.iter();
+        all.map(|effect| Arc::clone(effect) as Arc<dyn Disturbance>)
+            .collect()
+    }
+
+    fn ideal(&self) -> Result<Vec<[Vec<f64>; 2]>, ComparisonError> {
+        let any = Declared::draw(self.model, &self.camera, &self.disturbances(), self.seed, 0)?;
+        let batches: Vec<Range<usize>> = self.batches().collect();
+        let of = |scratch: &mut Scratch, frames: Range<usize>| {
+            let mut first_row = vec![];
+            let rows = self.rows(frames, &mut first_row);
+            let [mut x, mut y] = [(); 2].map(|()| vec![0.0; rows.len()]);
+            let out = PointsMut {
+                x: &mut x,
+                y: &mut y,
+            };
+            any.pbm.ideal_into(self.truth, rows, scratch, out);
+            [x, y]
+        };
+        Ok(batches
+            .into_par_iter()
+            .map_init(Scratch::default, of)
+            .collect())
+    }
+
+    fn batches(&self) -> impl Iterator<Item = Range<usize>> {
+        let frames = self.t_s.len();
+        (0..frames)
+            .step_by(BATCH)
+            .map(move |from| from..(from + BATCH).min(frames))
+    }
+
+    /// Rows of some frames: `first_row` is the caller's, and is filled.
+    fn rows<'r>(&'r self, frames: Range<usize>, first_row: &'r mut Vec<usize>) -> Rows<'r> {
+        if let Some(stars) = &self.stars {
+            return stars.rows(self.t_s, frames, first_row);
+        }
+        first_row.clear();
+        first_row.resize(frames.len() + 1, 0);
+        starless(&self.t_s[frames], first_row)
     }
 
     /// Where its stars come from.
@@ -96,11 +150,7 @@ impl<'a> Flight<'a> {
     ///
     /// Numbers of the model outside their range.
     pub(crate) fn draw(&self, draw: u64) -> Result<[Vec<f64>; 3], ComparisonError> {
-        let mut disturbances: Vec<Arc<dyn Disturbance>> = vec![];
-        for effect in &self.effects {
-            disturbances.push(effect.clone());
-        }
-        self.of(self.model, &disturbances, draw)
+        self.of(self.model, &self.disturbances(), draw)
     }
 
     /// The same of a hybrid model's processes alone, without distortion and effects.
@@ -148,16 +198,10 @@ impl<'a> Flight<'a> {
         let mut state = HemState::new(self.seed, draw);
         let (mut scratch, mut out, mut first_row) =
             (Scratch::default(), Measured::default(), vec![]);
-        let none = vec![0; BATCH + 1];
-        let mut from = 0;
-        while from < self.t_s.len() {
-            let to = (from + BATCH).min(self.t_s.len());
-            let rows = match &self.stars {
-                Some(stars) => stars.rows(self.t_s, from..to, &mut first_row),
-                None => starless(&self.t_s[from..to], &none[..=to - from]),
-            };
-            match &declared.hem {
-                Some(hem) => hem.measure_into(
+        for (batch, frames) in self.batches().enumerate() {
+            let rows = self.rows(frames.clone(), &mut first_row);
+            match (&declared.hem, &self.ideal) {
+                (Some(hem), _) => hem.measure_into(
                     self.truth,
                     rows,
                     &mut state,
@@ -165,21 +209,28 @@ impl<'a> Flight<'a> {
                     &mut scratch,
                     &mut out,
                 ),
-                None => {
-                    let pbm = &declared.pbm;
-                    pbm.measure_into(self.truth, rows, &mut streams, &mut scratch, &mut out);
+                (None, Some(ideal)) => {
+                    let [x, y] = &ideal[batch];
+                    declared.pbm.measure_at_into(
+                        self.truth,
+                        rows,
+                        Points { x, y },
+                        &mut streams,
+                        &mut scratch,
+                        &mut out,
+                    );
                 }
+                (None, None) => unreachable!("only a hybrid model has no ideal positions"),
             }
-            for k in from..to {
+            for k in frames.clone() {
                 let truth = self.truth.attitude(self.t_s[k]);
-                if let (Some(q), Some(truth)) = (out.attitude(k - from), truth) {
+                if let (Some(q), Some(truth)) = (out.attitude(k - frames.start), truth) {
                     let error = rotation_vector(&q, &truth) * ARCSEC_PER_RAD;
                     for axis in 0..3 {
                         theta[axis][k] = error[axis];
                     }
                 }
             }
-            from = to;
         }
         theta
     }

@@ -49,22 +49,30 @@ pub fn html(run: &Run<'_>) -> String {
         escaped(title),
         escaped(run.input)
     ));
-    verdict(&mut page, run);
-    findings::numbers(&mut page, &run.closed.report);
-    spectrum::residual(&mut page, run);
-    spectrum::models(&mut page, run);
-    series::over_time(&mut page, run);
-    field::focal_plane(&mut page, run);
-    field::pixel_phase(&mut page, run);
-    dark::map(&mut page, run);
-    findings::effects(&mut page, &run.closed.report);
-    asked::apart(&mut page, &run.closed.report);
-    asked::hypotheses(&mut page, &run.closed.report);
-    findings::rivals(&mut page, run.closed);
-    findings::considered(&mut page, &run.closed.report);
-    findings::leftover(&mut page, &run.closed.report);
-    data::rows(&mut page, run);
-    data::model(&mut page, run);
+    let report = &run.closed.report;
+    page.parts(&[
+        &|page| verdict(page, run),
+        &|page| findings::numbers(page, report),
+        &|page| spectrum::residual(page, run),
+        &|page| spectrum::models(page, run),
+        &|page| series::over_time(page, run),
+        &|page| field::focal_plane(page, run),
+        &|page| field::pixel_phase(page, run),
+        &|page| dark::map(page, run),
+        &|page| findings::effects(page, report),
+        &|page| asked::apart(page, report),
+        &|page| asked::hypotheses(page, report),
+        &|page| findings::rivals(page, run.closed),
+        &|page| findings::considered(page, report),
+        &|page| findings::leftover(page, report),
+        &|page| data::rows(page, run),
+        &|page| data::model(page, run),
+        &reading,
+    ]);
+    page.finish()
+}
+
+fn reading(page: &mut Page) {
     page.section("reading", "How to read this page", |page| {
         page.paragraph(READING);
         page.raw(&format!(
@@ -72,7 +80,6 @@ pub fn html(run: &Run<'_>) -> String {
             env!("CARGO_PKG_VERSION")
         ));
     });
-    page.finish()
 }
 
 const READING: &str = "Before is the declared model at its best: all that it declares unknown (misalignment, directions, distortion within its prior) is estimated too. After adds only the effects listed. Every residual, rms, gain and share is out of fold: each block of time is predicted from the others, so nothing here is the quality of a fit to its own data. Gains are differences of log-likelihood in nats; p-values have paid for the whole search; ± is 1σ. Detectable is the size that this data would have shown at 5σ, needed the size that would explain the residual by itself.";

@@ -19,28 +19,19 @@
 //! Source: \[M23\] Section 2.6 and Fig. 4. Eq. 12 is minimised (Eq. 13 has the frames reversed,
 //! erratum E3).
 
+mod ideal;
+
 use std::sync::Arc;
 
 use centroid::CentroidError;
 use distortion::{DistortionField, PixelDistortion};
-use focal_plane::{
-    ARCSEC_PER_RAD, AttitudeSource, Camera, Pixel, Points, PointsMut, VectorsMut, rotate_into,
-    rotation_from_vector,
-};
-use nalgebra::{UnitQuaternion, Vector3};
+use focal_plane::{ARCSEC_PER_RAD, AttitudeSource, Camera, Pixel, Points, PointsMut, VectorsMut};
 use quest::{ProfileBatch, QuaternionsMut, solve_batch_into};
 use rand_core::Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use crate::quadrature::GAUSS_LEGENDRE_8;
 use crate::star_field::uniform;
-use crate::{Disturbance, Measured, NoiseStreams, Rows, Stages, StarView, TemporalNoise};
-
-/// Substitutions after which the instant of a row is taken as found. Each shrinks the error by
-/// `line_time x speed`, 4e-4 for 12 px/s and 30 us, so three are the rule.
-const INSTANT_STEPS: u32 = 30;
-/// An instant is found when it moves by less, s.
-const INSTANT_TOLERANCE_S: f64 = 1e-13;
+use crate::{Disturbance, Measured, NoiseStreams, Rows, Stages, TemporalNoise};
 
 /// The physics-based model of one tracker.
 #[derive(Clone, Debug)]
@@ -63,8 +54,7 @@ pub struct Scratch {
     vx: Vec<f64>,
     vy: Vec<f64>,
     vz: Vec<f64>,
-    ideal_x: Vec<f64>,
-    ideal_y: Vec<f64>,
+    ideal: [Vec<f64>; 2],
     weight: Vec<f64>,
     normal: Vec<f64>,
     profiles: ProfileBatch,
@@ -72,14 +62,7 @@ pub struct Scratch {
 
 impl Scratch {
     fn resize(&mut self, rows: usize) {
-        for column in [
-            &mut self.vx,
-            &mut self.vy,
-            &mut self.vz,
-            &mut self.ideal_x,
-            &mut self.ideal_y,
-            &mut self.weight,
-        ] {
+        for column in [&mut self.vx, &mut self.vy, &mut self.vz, &mut self.weight] {
             column.resize(rows, 0.0);
         }
         self.normal.resize(2 * rows, 0.0);
@@ -187,24 +170,24 @@ impl Pbm {
         truth: &dyn AttitudeSource,
         rows: Rows<'_>,
         scratch: &mut Scratch,
+        out: PointsMut<'_>,
+    ) -> usize {
+        self.with_ideal(truth, rows, scratch, |ideal, scratch| {
+            self.distorted_into(rows, ideal, scratch, out)
+        })
+    }
+
+    /// Steps 2 and 3; returns how many rows are NaN.
+    fn distorted_into(
+        &self,
+        rows: Rows<'_>,
+        ideal: Points<'_>,
+        scratch: &mut Scratch,
         mut out: PointsMut<'_>,
     ) -> usize {
-        rows.check();
         assert_eq!(out.len(), rows.len(), "one position for each row");
         scratch.resize(rows.len());
-        if self.stages.instant || self.stages.exposure {
-            self.ideal_row_by_row(truth, rows, scratch);
-        } else {
-            self.ideal_frame_by_frame(truth, rows, scratch);
-        }
-        if self.stages.image {
-            self.shift_images(rows, scratch);
-        }
-        // the directions are done with: their columns hold the distorted positions
-        let ideal = Points {
-            x: &scratch.ideal_x,
-            y: &scratch.ideal_y,
-        };
+        // nothing else needs the columns of the directions meanwhile
         self.lens.distort_into(
             ideal,
             PointsMut {
@@ -241,12 +224,29 @@ impl Pbm {
         scratch: &mut Scratch,
         out: &mut Measured,
     ) {
+        self.with_ideal(truth, rows, scratch, |ideal, scratch| {
+            self.measure_at_into(truth, rows, ideal, streams, scratch, out);
+        });
+    }
+
+    /// The same for rows whose ideal positions, px, are known: those of
+    /// [`ideal_into`](Self::ideal_into) with the same motion, stars, camera and disturbances.
+    ///
+    /// # Panics
+    ///
+    /// If the columns of `rows` do not fit together, or `ideal` differs in length.
+    pub fn measure_at_into(
+        &self,
+        truth: &dyn AttitudeSource,
+        rows: Rows<'_>,
+        ideal: Points<'_>,
+        streams: &mut NoiseStreams,
+        scratch: &mut Scratch,
+        out: &mut Measured,
+    ) {
+        rows.check();
         out.resize(rows.frames(), rows.len());
-        let noise_free = PointsMut {
-            x: &mut out.noise_free_x_px,
-            y: &mut out.noise_free_y_px,
-        };
-        out.rows_left_out = self.positions_into(truth, rows, scratch, noise_free);
+        out.rows_left_out = self.distorted_into(rows, ideal, scratch, out.noise_free());
         self.add_noise(truth, rows, streams, scratch, out);
         self.solve(rows, scratch, out);
     }
@@ -262,11 +262,7 @@ impl Pbm {
         out: &mut Measured,
     ) {
         out.resize(rows.frames(), rows.len());
-        let noise_free = PointsMut {
-            x: &mut out.noise_free_x_px,
-            y: &mut out.noise_free_y_px,
-        };
-        out.rows_left_out = self.positions_into(truth, rows, scratch, noise_free);
+        out.rows_left_out = self.positions_into(truth, rows, scratch, out.noise_free());
         out.x_px.copy_from_slice(&out.noise_free_x_px);
         out.y_px.copy_from_slice(&out.noise_free_y_px);
         for (weight, x) in scratch.weight.iter_mut().zip(&out.x_px) {
@@ -276,151 +272,6 @@ impl Pbm {
             self.add_spikes(rows, &mut streams.spikes, out);
         }
         self.solve(rows, scratch, out);
-    }
-
-    /// Step 1 where no row needs its own instant: one attitude a frame.
-    fn ideal_frame_by_frame(
-        &self,
-        truth: &dyn AttitudeSource,
-        rows: Rows<'_>,
-        scratch: &mut Scratch,
-    ) {
-        let Scratch {
-            vx,
-            vy,
-            vz,
-            ideal_x,
-            ideal_y,
-            ..
-        } = scratch;
-        let mut v = VectorsMut {
-            x: vx,
-            y: vy,
-            z: vz,
-        };
-        for (k, &t_s) in rows.t_s.iter().enumerate() {
-            let of = rows.of(k);
-            let Some(q) = truth.attitude(t_s) else {
-                for column in [&mut *v.x, &mut *v.y, &mut *v.z] {
-                    column[of.clone()].fill(f64::NAN);
-                }
-                continue;
-            };
-            let q = self.misaligned(t_s, q);
-            rotate_into(&q, rows.direction.range(of.clone()), v.range(of.clone()));
-            if self.stages.direction || self.stages.tracker_direction {
-                for row in of {
-                    let star = rows.view(k, row, Pixel::default());
-                    let seen =
-                        self.in_tracker(&star, q * self.apparent(&star, rows.direction(row)));
-                    v.x[row] = seen.x;
-                    v.y[row] = seen.y;
-                    v.z[row] = seen.z;
-                }
-            }
-        }
-        self.camera.project_into(
-            v.as_shared(),
-            PointsMut {
-                x: ideal_x,
-                y: ideal_y,
-            },
-        );
-    }
-
-    /// Step 1 where rows are exposed at their own instants or over a time.
-    fn ideal_row_by_row(&self, truth: &dyn AttitudeSource, rows: Rows<'_>, scratch: &mut Scratch) {
-        let mut hint = 0;
-        for k in 0..rows.frames() {
-            for row in rows.of(k) {
-                let star = rows.view(k, row, Pixel::default());
-                let at = self.exposed(truth, star, rows.direction(row), &mut hint);
-                let Pixel { x, y } = at.unwrap_or(Pixel {
-                    x: f64::NAN,
-                    y: f64::NAN,
-                });
-                scratch.ideal_x[row] = x;
-                scratch.ideal_y[row] = y;
-            }
-        }
-    }
-
-    /// Mean of the star's path over the exposure of its row.
-    fn exposed(
-        &self,
-        truth: &dyn AttitudeSource,
-        mut star: StarView,
-        u: Vector3<f64>,
-        hint: &mut usize,
-    ) -> Option<Pixel> {
-        let u = self.apparent(&star, u);
-        let mut t_s = self.instant_s(&star);
-        let mut last_s = f64::INFINITY;
-        for _ in 0..INSTANT_STEPS {
-            star.at = self.seen_at(truth, t_s, &star, &u, hint)?;
-            let step_s = self.instant_s(&star) - t_s;
-            // steps shrink by one factor: their sum (Aitken 1926)
-            let shrinks = step_s / last_s;
-            t_s += if shrinks.abs() < 0.5 {
-                step_s / (1.0 - shrinks)
-            } else {
-                step_s
-            };
-            last_s = step_s;
-            if step_s.abs() <= INSTANT_TOLERANCE_S {
-                break;
-            }
-        }
-        if self.exposure_s <= 0.0 {
-            return Some(star.at);
-        }
-        let half_s = 0.5 * self.exposure_s;
-        let [first_s, last_s] = truth.span_s();
-        if t_s - half_s < first_s || t_s + half_s > last_s {
-            return None;
-        }
-        let mut mean = Pixel::default();
-        for (node, weight) in GAUSS_LEGENDRE_8 {
-            let at = self.seen_at(truth, t_s + half_s * node, &star, &u, hint)?;
-            mean.x += 0.5 * weight * at.x;
-            mean.y += 0.5 * weight * at.y;
-        }
-        Some(mean)
-    }
-
-    fn seen_at(
-        &self,
-        truth: &dyn AttitudeSource,
-        t_s: f64,
-        star: &StarView,
-        u: &Vector3<f64>,
-        hint: &mut usize,
-    ) -> Option<Pixel> {
-        let q = self.misaligned(t_s, truth.attitude_near(t_s, hint)?);
-        self.camera.project(&self.in_tracker(star, q * u))
-    }
-
-    fn instant_s(&self, star: &StarView) -> f64 {
-        star.t_s
-            + self
-                .at_stage(|s| s.instant)
-                .map(|d| d.time_shift_s(star))
-                .sum::<f64>()
-    }
-
-    fn misaligned(&self, t_s: f64, q: UnitQuaternion<f64>) -> UnitQuaternion<f64> {
-        self.at_stage(|s| s.attitude)
-            .fold(q, |q, d| rotation_from_vector(&d.misalignment_rad(t_s)) * q)
-    }
-
-    fn apparent(&self, star: &StarView, u: Vector3<f64>) -> Vector3<f64> {
-        self.at_stage(|s| s.direction)
-            .fold(u, |u, d| d.direction(star, u))
-    }
-
-    fn in_tracker(&self, star: &StarView, v: Vector3<f64>) -> Vector3<f64> {
-        self.at_stage(|s| s.tracker_direction)
-            .fold(v, |v, d| d.tracker_direction(star, v))
     }
 
     /// Disturbances that act at a stage; none are asked when no disturbance acts there.
@@ -434,23 +285,6 @@ impl Pbm {
         all.iter()
             .map(AsRef::as_ref)
             .filter(move |d| stage(d.stages()))
-    }
-
-    fn shift_images(&self, rows: Rows<'_>, scratch: &mut Scratch) {
-        for k in 0..rows.frames() {
-            for row in rows.of(k) {
-                let at = Pixel {
-                    x: scratch.ideal_x[row],
-                    y: scratch.ideal_y[row],
-                };
-                let star = rows.view(k, row, at);
-                for disturbance in self.at_stage(|s| s.image) {
-                    let [dx, dy] = disturbance.image_shift_px(&star);
-                    scratch.ideal_x[row] += dx;
-                    scratch.ideal_y[row] += dy;
-                }
-            }
-        }
     }
 
     fn shift_centroids(&self, rows: Rows<'_>, distorted: Points<'_>, out: PointsMut<'_>) {

@@ -9,7 +9,7 @@
 
 use core::ops::Range;
 
-use focal_plane::{Pixel, Vectors};
+use focal_plane::{Pixel, PointsMut, Vectors};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use quest::FrameStatus;
 
@@ -143,6 +143,14 @@ impl Measured {
     pub fn attitude(&self, k: usize) -> Option<UnitQuaternion<f64>> {
         let q = Quaternion::new(self.qw[k], self.qx[k], self.qy[k], self.qz[k]);
         (self.status[k] == FrameStatus::Solved).then(|| UnitQuaternion::new_unchecked(q))
+    }
+
+    /// The columns of the noise-free positions.
+    pub(crate) fn noise_free(&mut self) -> PointsMut<'_> {
+        PointsMut {
+            x: &mut self.noise_free_x_px,
+            y: &mut self.noise_free_y_px,
+        }
     }
 
     pub(crate) fn resize(&mut self, frames: usize, rows: usize) {

@@ -40,8 +40,7 @@ pub(crate) fn run(options: &Close, console: &Console) -> anyhow::Result<()> {
             let _ = std::fs::remove_dir_all(&partial);
             interrupted();
         });
-        write(&closed, &text, &output)?;
-        let page = html(&Run {
+        let run = Run {
             closed: &closed,
             bundle: &bundle,
             input: &title,
@@ -50,7 +49,9 @@ pub(crate) fn run(options: &Close, console: &Console) -> anyhow::Result<()> {
                 Some(Err(reason)) => Err(reason),
                 None => Err("it was not asked for"),
             },
-        });
+        };
+        let (written, page) = rayon::join(|| write(&closed, &text, &output), || html(&run));
+        written?;
         output.write("report.html", |to| to.write_all(page.as_bytes()))?;
         output.commit()?;
     }

@@ -1,6 +1,7 @@
 //! The residual against time.
 
 use figures::{Axis, Colour, Envelope, Figure, Mark, Panel};
+use rayon::prelude::*;
 
 use super::data::View;
 use super::{Page, Run};
@@ -28,28 +29,13 @@ fn one(page: &mut Page, view: &View<'_>, added: bool) {
         _ => ("s", 1.0),
     };
     let t: Vec<f64> = view.t_s.iter().map(|t| t / seconds).collect();
-    let mut said = vec![];
-    let mut panels = vec![];
-    for (axis, name) in view.axes.iter().enumerate() {
-        let kept = [0, 1].map(|when| view.kept(when, axis));
-        let swing = kept.each_ref().map(|values| swing(&t, values));
-        said.push(if added {
-            format!("{} to {} arcsec {name}", short(swing[0]), short(swing[1]))
-        } else {
-            format!("{} arcsec {name}", short(swing[0]))
-        });
-        let y = Axis::linear("residual, arcsec");
-        let mut panel = Panel::new(name, Axis::linear(&format!("time, {unit}")), y);
-        let looks: &[(usize, Colour, &str)] = if added {
-            &[(0, Colour::BEFORE, "before"), (1, Colour::AFTER, "after")]
-        } else {
-            &[(0, Colour::MEASURED, "measured")]
-        };
-        for &(when, colour, label) in looks {
-            panel = drawn(panel, &t, &kept[when], colour, label);
-        }
-        panels.push(panel);
-    }
+    let axes: Vec<(String, Panel)> = view
+        .axes
+        .par_iter()
+        .enumerate()
+        .map(|(axis, name)| one_axis(view, added, (axis, name), (unit, &t)))
+        .collect();
+    let (said, panels): (Vec<_>, Vec<_>) = axes.into_iter().unzip();
     let verb = if added { "go from" } else { "are" };
     let figure = Figure::new(
         &format!(
@@ -73,6 +59,33 @@ fn one(page: &mut Page, view: &View<'_>, added: bool) {
             view.outliers()
         ),
     );
+}
+
+/// What there is to say of an axis, and its panel.
+fn one_axis(
+    view: &View<'_>,
+    added: bool,
+    (axis, name): (usize, &str),
+    (unit, t): (&str, &[f64]),
+) -> (String, Panel) {
+    let kept = [0, 1].map(|when| view.kept(when, axis));
+    let swing = kept.each_ref().map(|values| swing(t, values));
+    let said = if added {
+        format!("{} to {} arcsec {name}", short(swing[0]), short(swing[1]))
+    } else {
+        format!("{} arcsec {name}", short(swing[0]))
+    };
+    let y = Axis::linear("residual, arcsec");
+    let mut panel = Panel::new(name, Axis::linear(&format!("time, {unit}")), y);
+    let looks: &[(usize, Colour, &str)] = if added {
+        &[(0, Colour::BEFORE, "before"), (1, Colour::AFTER, "after")]
+    } else {
+        &[(0, Colour::MEASURED, "measured")]
+    };
+    for &(when, colour, label) in looks {
+        panel = drawn(panel, t, &kept[when], colour, label);
+    }
+    (said, panel)
 }
 
 /// Before is an area or points, after lies over it as lines or points.

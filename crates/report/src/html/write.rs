@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use figures::Figure;
+use rayon::prelude::*;
 
 use crate::number::short;
 
@@ -71,6 +72,16 @@ impl Page {
     pub(super) fn finish(mut self) -> String {
         self.out.push_str("</body></html>\n");
         self.out
+    }
+
+    /// Parts of the page that know nothing of each other, in this order, each by the next free thread.
+    pub(super) fn parts(&mut self, parts: &[&(dyn Fn(&mut Self) + Sync)]) {
+        let written = parts.par_iter().with_max_len(1).map(|part| {
+            let mut page = Self { out: String::new() };
+            part(&mut page);
+            page.out
+        });
+        self.out.extend(written.collect::<Vec<_>>());
     }
 
     /// Elements as they are.

@@ -26,6 +26,9 @@ const GZIP_LEVEL: Compression = Compression::new(3);
 const BATCH: usize = 8192;
 /// Rows of a row group: what is held in memory, encoded.
 const GROUP: usize = 1 << 17;
+/// Bytes of the distinct values of a column in a row group, up to which they are listed once: the times
+/// and stars of frames are, measured values, of which hardly two are alike, cost no search for long.
+const LISTED: usize = 1 << 17;
 
 /// The cells of a column, by row.
 pub(crate) enum Cells<'a> {
@@ -221,6 +224,7 @@ impl<'w> Form<'w> {
                 let properties = WriterProperties::builder()
                     .set_compression(ParquetCompression::SNAPPY)
                     .set_max_row_group_row_count(Some(GROUP))
+                    .set_dictionary_page_size_limit(LISTED)
                     .build();
                 let writer = ArrowWriter::try_new(to, schema(table), Some(properties));
                 writer.map(Self::Parquet).map_err(io::Error::other)
