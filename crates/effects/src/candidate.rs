@@ -230,6 +230,11 @@ pub trait Candidate: Debug + Send + Sync {
     fn describes(&self) -> bool {
         false
     }
+    /// Whether each of its columns is, number for number, the one of that name in every candidate of its
+    /// effect that says the same: such a column need be formed only once.
+    fn columns_by_name(&self) -> bool {
+        false
+    }
     /// Star columns, px per unit: `out` holds coefficient after coefficient, each `rows.len()` long.
     /// Returns false, leaving `out` unspecified, when it does not act on stars or lacks what it needs.
     ///

@@ -174,6 +174,10 @@ impl Shift for Phase {
         }
         all
     }
+    // a wave of an order and an axis has one form
+    fn columns_by_name(&self) -> bool {
+        true
+    }
     fn terms(&self, star: &StarView, out: &mut [[f64; 2]]) {
         let [scale_x, scale_y] = self.camera.arcsec_per_px();
         let (phi_x, phi_y) = (

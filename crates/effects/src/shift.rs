@@ -69,6 +69,10 @@ pub(crate) trait Shift: Clone + Debug + Send + Sync + 'static {
     fn stands_for(&self) -> f64 {
         1.0
     }
+    /// See [`Candidate::columns_by_name`].
+    fn columns_by_name(&self) -> bool {
+        false
+    }
 }
 
 /// A shift with its values.
@@ -152,6 +156,9 @@ impl<S: Shift> Candidate for ShiftCandidate<S> {
     }
     fn stands_for(&self) -> f64 {
         self.shift.stands_for()
+    }
+    fn columns_by_name(&self) -> bool {
+        self.shift.columns_by_name()
     }
     fn acts_on_stars(&self) -> bool {
         true

@@ -204,8 +204,11 @@ fn with_pass(
             .collect()
     });
     let residuals = [residual];
-    let (one, two): ([&dyn Candidate; 2], [&dyn Candidate; 2]) =
-        ([&whole, &sparse], [&rowwise, &sparse]);
+    // the columns of the second order stand twice
+    let [second, both] =
+        [&[2][..], &[1, 2]].map(|orders| effects::harmonics_of(&data.camera, orders));
+    let one: [&dyn Candidate; 4] = [&whole, &*second, &sparse, &*both];
+    let two: [&dyn Candidate; 4] = [&rowwise, &*second, &sparse, &*both];
     let weight = weights(&data);
     let columns = |candidates| StarColumns {
         data: &data,
