@@ -24,7 +24,7 @@ use std::collections::BTreeMap;
 use focal_plane::{AttitudeSource, Camera, PointsMut, VectorsMut};
 use nalgebra::{DMatrix, DMatrixView};
 
-use crate::{Effect, EffectError, Parameter, Surroundings};
+use crate::{Effect, EffectError, Parameter, PixelWaves, Surroundings};
 
 /// Star rows at which regressors are evaluated: structure of arrays, all of one length.
 #[derive(Clone, Copy)]
@@ -60,6 +60,8 @@ pub struct StarRows<'a> {
     pub slot: &'a [i32],
     /// Star identities.
     pub star_id: &'a [i64],
+    /// Where waves in the pixel phase of these rows are kept once they are evaluated.
+    pub waves: Option<&'a PixelWaves>,
     /// The attitude that the modelled positions follow. With it, shifts in time are evaluated on the
     /// path itself, not from velocity and acceleration; without it, inertial effects have no columns.
     pub attitude: Option<&'a dyn AttitudeSource>,

@@ -270,6 +270,7 @@ impl Bench {
             window_px: [&unknown, &unknown],
             slot: &self.slot,
             star_id: &self.star_id,
+            waves: None,
             attitude: Some(&self.truth),
         })
     }

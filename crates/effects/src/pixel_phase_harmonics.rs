@@ -14,12 +14,11 @@
 //! Source: \[M23\] Eq. 9-11, Step 3, with another periodic function in place of the triangle; the
 //! characteristic function of a Gaussian.
 
-use core::f64::consts::PI;
-
 use focal_plane::Camera;
 use star_tracker::{Stages, StarView};
 
 use crate::parameters::Reader;
+use crate::pixel_wave::PixelWave;
 use crate::shift::{Shift, ShiftCandidate, Shifted};
 use crate::{
     ActsOn, Candidate, Coefficient, Effect, EffectError, EffectKind, Parameter, Parameters, Scene,
@@ -27,9 +26,6 @@ use crate::{
 };
 
 const ID: &str = "pixel_phase_harmonics";
-
-/// A wave of which less than this is left cannot be seen at all.
-const FADED: f64 = 0.01;
 
 /// Highest order.
 const ORDERS: u32 = 4;
@@ -137,19 +133,24 @@ struct Phase {
     orders: Vec<u32>,
 }
 
-/// What is to be expected of a wave of `order` cycles a pixel at a position known to
-/// `variance_px2`: exp(-2 pi^2 order^2 variance) of it.
-pub fn left_of_wave(order: u32, variance_px2: f64) -> f64 {
-    if variance_px2 <= 0.0 {
-        return 1.0;
+impl Phase {
+    /// The terms at a position known to these variances.
+    fn expected(&self, at_px: [f64; 2], variance_px2: [f64; 2], out: &mut [[f64; 2]]) {
+        let [scale_x, scale_y] = self.camera.arcsec_per_px();
+        let wave = |axis: usize| {
+            let phase_rad = self.camera.phase_rad(at_px[axis]);
+            PixelWave::at(phase_rad, variance_px2[axis]).orders()
+        };
+        for (order, (x, y)) in (1..=ORDERS).zip(wave(0).zip(wave(1))) {
+            let chunks = self.orders.iter().zip(out.chunks_exact_mut(4));
+            for (_, terms) in chunks.filter(|(k, _)| **k == order) {
+                terms[0] = [x[0] / scale_x, 0.0];
+                terms[1] = [x[1] / scale_x, 0.0];
+                terms[2] = [0.0, y[0] / scale_y];
+                terms[3] = [0.0, y[1] / scale_y];
+            }
+        }
     }
-    let left = (-2.0 * (PI * f64::from(order)).powi(2) * variance_px2).exp();
-    if left < FADED { 0.0 } else { left }
-}
-
-/// Sine and cosine of a sum of two angles.
-fn turned((sin, cos): (f64, f64), (by_sin, by_cos): (f64, f64)) -> (f64, f64) {
-    (sin * by_cos + cos * by_sin, cos * by_cos - sin * by_sin)
 }
 
 impl Shift for Phase {
@@ -179,39 +180,10 @@ impl Shift for Phase {
         true
     }
     fn terms(&self, star: &StarView, out: &mut [[f64; 2]]) {
-        let [scale_x, scale_y] = self.camera.arcsec_per_px();
-        let (phi_x, phi_y) = (
-            self.camera.phase_rad(star.at.x),
-            self.camera.phase_rad(star.at.y),
-        );
-        // each order is one turn from the one before
-        let [first_x, first_y] = [phi_x, phi_y].map(f64::sin_cos);
-        let (mut x, mut y, mut at) = (first_x, first_y, 1);
-        for (terms, &k) in out.chunks_exact_mut(4).zip(&self.orders) {
-            if k < at {
-                (x, y, at) = (first_x, first_y, 1);
-            }
-            while at < k {
-                (x, y, at) = (turned(x, first_x), turned(y, first_y), at + 1);
-            }
-            let ((sin_x, cos_x), (sin_y, cos_y)) = (x, y);
-            terms[0] = [sin_x / scale_x, 0.0];
-            terms[1] = [cos_x / scale_x, 0.0];
-            terms[2] = [0.0, sin_y / scale_y];
-            terms[3] = [0.0, cos_y / scale_y];
-        }
+        self.expected([star.at.x, star.at.y], [0.0; 2], out);
     }
-    fn average(&self, variance_px2: [f64; 2], terms: &mut [[f64; 2]]) {
-        if variance_px2.iter().all(|v| *v <= 0.0) {
-            return;
-        }
-        for (terms, &k) in terms.chunks_exact_mut(4).zip(&self.orders) {
-            let faded = variance_px2.map(|v| left_of_wave(k, v));
-            for term in terms {
-                term[0] *= faded[0];
-                term[1] *= faded[1];
-            }
-        }
+    fn expected_terms(&self, star: &StarView, variance_px2: [f64; 2], out: &mut [[f64; 2]]) {
+        self.expected([star.at.x, star.at.y], variance_px2, out);
     }
     fn parameters(&self, values: &[f64]) -> Vec<Parameter> {
         let mut all = Vec::new();
@@ -227,6 +199,8 @@ impl Shift for Phase {
 
 #[cfg(test)]
 mod tests {
+    use core::f64::consts::PI;
+
     use super::*;
     use crate::StarRows;
     use crate::harness::Bench;

@@ -44,10 +44,11 @@ pub(crate) trait Shift: Clone + Debug + Send + Sync + 'static {
     }
     /// Shift per unit of each coefficient, px.
     fn terms(&self, star: &StarView, out: &mut [[f64; 2]]);
-    /// Makes `terms` at a position what is to be expected of them where it is known to these
-    /// variances of x and of y, px^2.
-    fn average(&self, variance_px2: [f64; 2], terms: &mut [[f64; 2]]) {
-        let _ = (variance_px2, terms);
+    /// What is to be expected of the terms where the position is known to these variances of x and of
+    /// y, px^2.
+    fn expected_terms(&self, star: &StarView, variance_px2: [f64; 2], out: &mut [[f64; 2]]) {
+        let _ = variance_px2;
+        self.terms(star, out);
     }
     /// Reported parameters of these values.
     fn parameters(&self, values: &[f64]) -> Vec<Parameter> {
@@ -179,10 +180,11 @@ impl<S: Shift> Candidate for ShiftCandidate<S> {
                 continue;
             }
             let star = StarView { at, ..rows.view(i) };
-            self.shift.terms(&star, &mut terms[..p]);
             if centroid {
                 let variance = rows.landed_variance_px2.map(|v| v[i]);
-                self.shift.average(variance, &mut terms[..p]);
+                self.shift.expected_terms(&star, variance, &mut terms[..p]);
+            } else {
+                self.shift.terms(&star, &mut terms[..p]);
             }
             for (j, term) in terms[..p].iter().enumerate() {
                 out.x[j * n + i] = term[0];

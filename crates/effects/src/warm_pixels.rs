@@ -289,6 +289,7 @@ mod tests {
             window_px: [&none, &none],
             slot: &slot,
             star_id: &star,
+            waves: None,
             attitude: None,
         };
         let look = |left: [&[f64]; 2]| WarmPixels::look(&camera, &rows, left, &vec![1.0; n]);

@@ -188,6 +188,15 @@ impl Builder {
         Err(self.cell_error(column, place, expected, &shown(cell)))
     }
 
+    /// One cell of a column of whole numbers; false where it is no such column.
+    pub(crate) fn whole(&mut self, column: usize, cell: i64) -> bool {
+        let Store::Integers(cells) = &mut self.stores[column] else {
+            return false;
+        };
+        cells.push(cell);
+        true
+    }
+
     /// Whether the numbers of a column should be kept as text, so that nothing of them is lost.
     pub(crate) fn is_extra(&self, column: usize) -> bool {
         matches!(self.stores[column], Store::Extra(_))

@@ -104,7 +104,7 @@ pub(crate) fn noise_follows(
     let [all, fast] = tables.as_slice() else {
         return Ok(NoiseFollows::default());
     };
-    let rows = data.rows(0..data.t_s.len(), None);
+    let rows = data.rows(0..data.t_s.len(), None, None);
     let each = |(variable, [low, high]): &(Variable, [f64; 2])| -> Vec<Judged> {
         let column = |row: &Row| -> [f64; 2] {
             if let Variable::Phase(axis) = variable {

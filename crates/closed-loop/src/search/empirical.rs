@@ -24,6 +24,7 @@
 //! Source: ordinary least squares on Legendre polynomials; the fields are the
 //! first-order terms of a similarity transformation of the image.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 use effects::{AttitudeRows, Candidate, Coefficient, Effect, EffectError, StarRows, Surroundings};
@@ -418,6 +419,10 @@ impl Candidate for Empirical {
         let by = self.by.as_ref();
         let by = by.map(|(by, scale)| (by.values(rows), scale));
         let values = self.variable.values(rows);
+        let waves = match self.variable {
+            Variable::Phase(axis) => rows.pixel_waves(camera, axis),
+            _ => Cow::default(),
+        };
         let in_pair = self.has_size();
         for i in 0..n {
             let times = by.as_ref().map_or(1.0, |(by, scale)| scale.of(by[i]));
@@ -444,16 +449,11 @@ impl Candidate for Empirical {
                     }
                 }
                 Variable::Phase(axis) => {
-                    let (sin, cos) = camera.phase_rad(rows.landed_px[*axis][i]).sin_cos();
-                    let along = [1.0 - *axis as f64, *axis as f64];
-                    let variance = rows.landed_variance_px2[*axis][i];
-                    let (mut s, mut c) = (sin, cos);
-                    for (k, order) in (1..).enumerate().take(HARMONICS.min(count.div_ceil(2))) {
-                        let left = effects::left_of_wave(order, variance);
-                        let [x, y] = along.map(|a| a * left);
-                        put(2 * k, s * x, s * y);
-                        put(2 * k + 1, c * x, c * y);
-                        (s, c) = (s * cos + c * sin, c * cos - s * sin);
+                    let [along_x, along_y] = [1.0 - *axis as f64, *axis as f64];
+                    let orders = waves[i].orders().enumerate();
+                    for (k, [sin, cos]) in orders.take(HARMONICS.min(count.div_ceil(2))) {
+                        put(2 * k, sin * along_x, sin * along_y);
+                        put(2 * k + 1, cos * along_x, cos * along_y);
                     }
                 }
                 Variable::Window => {

@@ -15,7 +15,7 @@
 
 use std::ops::Range;
 
-use effects::{AttitudeRows, Candidate, StarRows};
+use effects::{AttitudeRows, Candidate, PixelWaves, StarRows};
 use focal_plane::{ARCSEC_PER_RAD, AttitudeSource, Camera, PointsMut, VectorsMut};
 use nalgebra::{DMatrix, DVector, Vector3};
 use rayon::prelude::*;
@@ -170,7 +170,8 @@ impl StarColumns<'_> {
         out.reset(n, frames.len(), layout, column);
         self.nuisance.fill(data, frames.clone(), out);
         self.fill_turns(&data.frames.t_s[frames], layout, &mut out.turn);
-        let seen = data.rows(rows.clone(), self.motion);
+        let waves = PixelWaves::default();
+        let seen = data.rows(rows.clone(), self.motion, Some(&waves));
         let scale = data.camera.arcsec_per_px();
         let [x, y] = &mut out.own;
         for (c, candidate) in self.candidates.iter().enumerate() {
@@ -287,7 +288,7 @@ impl StarColumns<'_> {
                 let end = ((chunk + 1) * CHUNK_FRAMES).min(frames);
                 let first_row = &data.frames.first_row;
                 let rows = first_row[chunk * CHUNK_FRAMES]..first_row[end];
-                let seen = data.rows(rows.clone(), self.motion);
+                let seen = data.rows(rows.clone(), self.motion, None);
                 let both = [0, 1].map(|k| star_columns_of(self.candidates[k], &data.camera, &seen));
                 let [Some(one), Some(other)] = &both else {
                     return f64::INFINITY;

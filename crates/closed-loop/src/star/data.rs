@@ -22,7 +22,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use centroid::CentroidError;
-use effects::{Effect, StarRows};
+use effects::{Effect, PixelWaves, StarRows};
 use focal_plane::{
     ARCSEC_PER_RAD, AttitudeSeries, AttitudeSource, Camera, Pixel, Points, PointsMut, StarFrames,
     Vectors,
@@ -561,11 +561,12 @@ impl StarData {
         self.landed.each_ref().map(Vec::as_slice)
     }
 
-    /// Some rows, as candidates see them.
+    /// Some rows, as candidates see them; the waves that these share are kept in `waves`.
     pub(crate) fn rows<'a>(
         &'a self,
         rows: Range<usize>,
         motion: Option<&'a dyn AttitudeSource>,
+        waves: Option<&'a PixelWaves>,
     ) -> StarRows<'a> {
         StarRows {
             t_s: &self.t_s[rows.clone()],
@@ -583,6 +584,7 @@ impl StarData {
             window_px: (self.window_px.each_ref()).map(|w| w.get(rows.clone()).unwrap_or_default()),
             slot: &self.frames.slot[rows.clone()],
             star_id: &self.frames.star_id[rows],
+            waves,
             attitude: motion,
         }
     }

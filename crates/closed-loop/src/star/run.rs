@@ -196,7 +196,7 @@ fn explain(
     progress("searching for causes");
     let (facts, warm) = {
         let pointed = Pointed::of(data, &settled.before, &measured.weight);
-        let rows = data.rows(0..data.t_s.len(), source(motion));
+        let rows = data.rows(0..data.t_s.len(), source(motion), None);
         (pointed.stars(), pointed.pixels(&rows))
     };
     let scene = scene(situation, data, &facts, &warm);

@@ -158,18 +158,23 @@ fn numbers<T: ArrowPrimitiveType>(
     Ok(())
 }
 
-/// Whole numbers go through their digits, so that long ids stay exact.
+/// Whole numbers stay such, so that long ids are exact; where the column is of another kind, or they are
+/// too long for it, their digits are read.
 fn integers<T: ArrowPrimitiveType>(
     builder: &mut Builder,
     column: usize,
     array: &ArrayRef,
 ) -> Result<(), TelemetryError>
 where
-    T::Native: std::fmt::Display,
+    T::Native: std::fmt::Display + TryInto<i64>,
 {
     use std::io::Write as _;
     let mut digits = Vec::new();
     for (ahead, cell) in array.as_primitive::<T>().iter().enumerate() {
+        let whole = cell.and_then(|cell| cell.try_into().ok());
+        if whole.is_some_and(|whole| builder.whole(column, whole)) {
+            continue;
+        }
         digits.clear();
         if let Some(cell) = cell {
             // writing to memory does not fail

@@ -29,6 +29,7 @@ fn columns(term: &Empirical) -> [Vec<f64>; 2] {
         window_px: [&[-100.0, 200.0], &[51.0, -300.0]],
         slot: &[0, 1],
         star_id: &[7, 9],
+        waves: None,
         attitude: None,
     };
     let all = 2 * term.coefficients().len();
