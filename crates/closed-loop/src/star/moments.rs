@@ -42,6 +42,9 @@ pub(crate) const MOST_BINS: usize = 1200;
 /// Rows from which on slow columns are not taken at every frame: with a fortieth of them it saves nothing.
 const PACED_ROWS: usize = 300_000;
 
+/// Blocks whose sums are added by one thread.
+const ADDED: usize = 16;
+
 /// A pivot below this share of its diagonal is rounding.
 const SINGULAR: f64 = 1e-12;
 
@@ -229,14 +232,23 @@ impl StarMoments {
     /// The sum over the blocks of the products under white noise, of some of the columns.
     pub(crate) fn white_in_all(&self, columns: &[usize]) -> BlockGrams {
         let white = self.white.get_or_init(|| {
-            let mut sum = self.rest().clone();
-            let all: Vec<usize> = (0..self.width()).collect();
-            for block in &self.blocks {
-                if let Some(lost) = &block.lost {
-                    sum += lost;
+            let width = self.width();
+            let all: Vec<usize> = (0..width).collect();
+            let some = self.blocks.par_chunks(ADDED);
+            let parts = some.map(|blocks| {
+                let mut sum = DMatrix::zeros(width, width);
+                for block in blocks {
+                    if let Some(lost) = &block.lost {
+                        sum += lost;
+                    }
+                    add_products(1.0, &block.whitened(&all), &mut sum);
                 }
-                add_products(1.0, &block.whitened(&all), &mut sum);
-            }
+                sum
+            });
+            let parts: Vec<DMatrix<f64>> = parts.collect();
+            let mut sum = parts
+                .iter()
+                .fold(self.rest().clone(), |sum, part| sum + part);
             sum.fill_upper_triangle_with_lower_triangle();
             sum
         });
@@ -389,9 +401,15 @@ impl StarMoments {
 
 /// Rows and columns `columns` of a matrix.
 fn pick(matrix: &DMatrix<f64>, columns: &[usize]) -> DMatrix<f64> {
-    DMatrix::from_fn(columns.len(), columns.len(), |i, j| {
-        matrix[(columns[i], columns[j])]
-    })
+    let n = columns.len();
+    let mut out = DMatrix::zeros(n, n);
+    for (mut out, &from) in out.column_iter_mut().zip(columns) {
+        let from = matrix.column(from);
+        out.iter_mut()
+            .zip(columns)
+            .for_each(|(out, &i)| *out = from[i]);
+    }
+    out
 }
 
 fn is_all(columns: &[usize], width: usize) -> bool {
