@@ -75,6 +75,8 @@ pub(crate) struct Quest<'a> {
 pub(crate) struct Named<'a> {
     pub(crate) searched: Searched<'a>,
     pub(crate) described: Described,
+    /// What is left in sample, where that is known, arcsec.
+    pub(crate) inside: Option<Vec<Vec<f64>>>,
     /// What is left of the stars themselves, and slow.
     pub(crate) slow: Option<Slow>,
     /// What the first search refused by size alone: a description that is kept since takes its place.
@@ -166,7 +168,8 @@ pub(crate) fn run<'a>(
                 continue;
             }
         }
-        let slow = slow_left(level, &searched);
+        let inside = noise_effects::in_sample(level, &searched.found);
+        let slow = slow_left(level, inside.as_deref());
         if let Some(slow) = slow.filter(|_| !last) {
             let doubtful = doubtful(&described, &searched.found, slow.inflation(), &may);
             if refuse(&mut refused, doubtful, Refusal::SlowStars) {
@@ -217,6 +220,7 @@ pub(crate) fn run<'a>(
             return Ok(Named {
                 searched,
                 described,
+                inside,
                 slow,
                 oversize,
                 refused,
@@ -258,9 +262,11 @@ pub(crate) fn run<'a>(
             evidence: evidence.clone(),
             wander,
         };
+        let inside = noise_effects::in_sample(level, &searched.found);
         return Ok(Named {
-            slow: slow_left(level, &searched),
+            slow: slow_left(level, inside.as_deref()),
             described,
+            inside,
             searched,
             oversize,
             refused,
@@ -393,10 +399,9 @@ fn in_place_of_wander(coloured: &Described, plain: &Described, axes: usize) -> O
 }
 
 /// Slow noise that is left of the stars themselves.
-fn slow_left(level: &StarEvidence<'_>, searched: &Searched<'_>) -> Option<Slow> {
-    let residual = noise_effects::in_sample(level, &searched.found)?;
+fn slow_left(level: &StarEvidence<'_>, inside: Option<&[Vec<f64>]>) -> Option<Slow> {
     let span = level.data.frames.t_s.last()? - level.data.frames.t_s.first()?;
-    commonness::slow(level.data, &residual, [true; 3], SLOW_SHARE * span)
+    commonness::slow(level.data, inside?, [true; 3], SLOW_SHARE * span)
 }
 
 /// Families of chosen effects that slow noise of the stars makes as well.

@@ -27,6 +27,7 @@
 
 use focal_plane::{AttitudeSeries, AttitudeSource, rotation_from_vector, rotation_vector};
 use nalgebra::{UnitQuaternion, Vector3};
+use rayon::prelude::*;
 use spectra::robust::median_step;
 
 use super::rates::{divide, integrated, is_finite, slope};
@@ -80,7 +81,7 @@ impl Around {
         let step = median_step(series.t_s()).unwrap_or(f64::INFINITY);
         let resolved = stencil.is_some();
         let pieces = t_s
-            .iter()
+            .par_iter()
             .map(|&t| Piece::new(series, step, t, stencil))
             .collect();
         let mut around = Self {

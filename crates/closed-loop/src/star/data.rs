@@ -168,6 +168,9 @@ impl StarData {
     /// star is where it was in the frame before. Then nothing that changes slowly over
     /// the detector or with time makes the noise of neighbouring frames alike.
     pub(crate) fn frames_are_unrelated(&self) -> bool {
+        if !self.free_attitude {
+            return false;
+        }
         let near = NEAR_SHARE * 2.0 * self.camera.half_size_px()[0];
         let (mut same, mut all) = (0_usize, 0_usize);
         let mut last = vec![[f64::INFINITY; 2]; self.stars.len()];
@@ -189,7 +192,7 @@ impl StarData {
                 last[self.star[r]] = [self.modelled[0][r], self.modelled[1][r]];
             }
         }
-        self.free_attitude && (same as f64) < SAME_SHARE * all as f64
+        (same as f64) < SAME_SHARE * all as f64
     }
 
     /// Measured fluxes, see [`log_flux`](Self::log_flux).
@@ -383,12 +386,19 @@ impl StarData {
 
     /// Projected positions.
     fn project(&mut self) {
-        for k in 0..self.frames.frames() {
-            for row in self.frames.rows_of(k) {
-                let u = self.stars[self.star[row]].direction;
-                let centre = self.position(&self.attitude[k], &u);
-                self.projected[0][row] = centre[0];
-                self.projected[1][row] = centre[1];
+        let known = &*self;
+        let of_frame = |k: usize| {
+            let rows = known.frames.rows_of(k);
+            rows.map(move |row| {
+                let u = known.stars[known.star[row]].direction;
+                known.position(&known.attitude[k], &u)
+            })
+        };
+        let frames = (0..self.frames.frames()).into_par_iter();
+        let at: Vec<[f64; 2]> = frames.flat_map_iter(of_frame).collect();
+        for (row, at) in at.into_iter().enumerate() {
+            for axis in 0..2 {
+                self.projected[axis][row] = at[axis];
             }
         }
     }
@@ -399,25 +409,32 @@ impl StarData {
         // Short against any motion that the samples resolve, long against the
         // rounding of a difference of positions.
         let h = 0.05 * robust::median_step(&self.frames.t_s).unwrap_or(1.0);
-        for k in 0..self.frames.frames() {
-            let t = self.frames.t_s[k];
+        let known = &*self;
+        let of_frame = |k: usize| {
+            let t = known.frames.t_s[k];
             let around =
                 motion.and_then(|m| Some([m.attitude(t - h)?, m.attitude(t)?, m.attitude(t + h)?]));
-            for row in self.frames.rows_of(k) {
-                let u = self.stars[self.star[row]].direction;
+            known.frames.rows_of(k).map(move |row| {
+                let u = known.stars[known.star[row]].direction;
                 let path = around
                     .as_ref()
-                    .map(|a| a.each_ref().map(|q| self.position(q, &u)));
-                for axis in 0..2 {
-                    let [v, a] = path.as_ref().map_or([0.0; 2], |[p, c, q]| {
+                    .map(|a| a.each_ref().map(|q| known.position(q, &u)));
+                path.map_or([[0.0; 2]; 2], |[p, c, q]| {
+                    [0, 1].map(|axis| {
                         [
                             (q[axis] - p[axis]) / (2.0 * h),
                             (q[axis] - 2.0 * c[axis] + p[axis]) / (h * h),
                         ]
-                    });
-                    self.velocity[axis][row] = v;
-                    self.acceleration[axis][row] = a;
-                }
+                    })
+                })
+            })
+        };
+        let frames = (0..self.frames.frames()).into_par_iter();
+        let moves: Vec<[[f64; 2]; 2]> = frames.flat_map_iter(of_frame).collect();
+        for (row, moves) in moves.into_iter().enumerate() {
+            for (axis, [velocity, acceleration]) in moves.into_iter().enumerate() {
+                self.velocity[axis][row] = velocity;
+                self.acceleration[axis][row] = acceleration;
             }
         }
     }

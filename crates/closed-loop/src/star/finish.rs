@@ -141,13 +141,15 @@ pub(crate) fn finish(
     let chosen = &f.found.selection.chosen;
     let whole = f.power(&f.settled.before);
     let mut explained = Vec::new();
-    let mut last = f.power(&f.residuals(&[])?);
+    let power_of = |first: usize| -> Result<f64, CloseError> {
+        if first == chosen.len() {
+            return Ok(f.power(&plain));
+        }
+        Ok(f.power(&f.residuals(&chosen[..first])?))
+    };
+    let mut last = power_of(0)?;
     for k in 1..=chosen.len() {
-        let now = if k == chosen.len() {
-            f.power(&plain)
-        } else {
-            f.power(&f.residuals(&chosen[..k])?)
-        };
+        let now = power_of(k)?;
         explained.push((last - now) / whole);
         last = now;
     }

@@ -21,7 +21,6 @@ use crate::declared;
 use crate::error::CloseError;
 use crate::image_level::{self, Side};
 use crate::motion::{self, Around, gyro::with_rates, source};
-use crate::noise_effects;
 use crate::search::orbits::{self, Look};
 use crate::situation::Situation;
 use crate::star::data::{Inputs, Star, StarData};
@@ -236,14 +235,14 @@ fn explain(
         };
         causes::run(level, folds, &quest)
     };
-    let left = |searched: &Searched<'_>| {
-        let level = searched.evidence.as_ref().unwrap_or(level);
-        let residual = noise_effects::in_sample(level, &searched.found)?;
+    let left = |named: &mut Named<'_>| {
+        let level = named.searched.evidence.as_ref().unwrap_or(level);
+        let residual = named.inside.take()?;
         let series = Series::of(&leftover::star_tracks(data, &residual, &level.weight));
         Some((residual, series))
     };
     let mut outcome = named(&[])?;
-    let mut inside = left(&outcome.searched);
+    let mut inside = left(&mut outcome);
     let line = inside.as_ref().and_then(|(_, series)| series.shared_line());
     let mut put_forward: Vec<_> = line
         .map(|line| line.candidate(&scene))
@@ -257,14 +256,14 @@ fn explain(
     }
     if !put_forward.is_empty() {
         progress("searching again with the line or orbit that is left");
-        let again = named(&put_forward)?;
+        let mut again = named(&put_forward)?;
         // what was put forward in vain changes nothing
         if again
             .searched
             .found
             .names_one_of_the_last(put_forward.len())
         {
-            inside = left(&again.searched);
+            inside = left(&mut again);
             outcome = again;
         }
     }
@@ -282,6 +281,7 @@ fn explain(
     let Named {
         mut searched,
         described,
+        inside: _,
         slow,
         oversize,
         refused,
