@@ -10,6 +10,11 @@ use telemetry::report::{ConsideredEffect, Report, Verdict};
 /// Stars drift over three pixels.
 const DRIFT: &str = "kind = \"hold\"\ndrift_arcsec_s = [0.35, -0.27, 0.02]";
 
+/// A swing of two arcsec in twenty minutes.
+const HOLD: &str = "kind = \"slews\"\nstart = { ra_deg = 83.0, dec_deg = 0.0 }\n\
+    [[motion.slew]]\naxis = [0.6, 0.7, 0.4]\nangle_deg = 0.0006\nduration_s = 300.0\n\
+    [[motion.slew]]\naxis = [0.6, 0.7, 0.4]\nangle_deg = -0.0006\nduration_s = 300.0\n";
+
 /// To and fro, fast and four times as slowly.
 const SLEWS: &str = "kind = \"slews\"\nstart = { ra_deg = 83.0, dec_deg = 0.0 }\nrepeat = 3\n\
     [[motion.slew]]\naxis = [0.0, 1.0, 0.0]\nangle_deg = 1.6\nduration_s = 50.0\n\
@@ -125,6 +130,31 @@ fn an_s_curve_that_grows_is_none() {
         "{:?}",
         left(&report)
     );
+}
+
+/// The same in the middle of the run alone, 0.5 arcsec for three tenths of it: its mean is seen as well as above,
+/// and as much before the middle as after.
+#[test]
+fn an_s_curve_of_the_middle_of_a_run_is_none() {
+    let report = report_on(|stars, row, k| {
+        let there = (420..780).contains(&k);
+        s_curve(stars, row, if there { 0.5 } else { 0.0 })
+    });
+    assert_eq!(named(&report), [""; 0], "{report:?}");
+    assert_eq!(report.verdict, Verdict::Unexplained);
+}
+
+/// The scale of a part of a run, while the camera hardly moves: 0.4 arcsec at the corners would yield to an
+/// acceleration of 1e-4 arcsec/s^2 by 4000 s^2, what swings once in six minutes.
+#[test]
+fn what_hardly_moves_yields_to_no_acceleration() {
+    let report = report_along(HOLD, |stars, row, k| {
+        let there = (420..720).contains(&k);
+        [stars.x_px[row], stars.y_px[row]].map(|p| if there { 0.4 * p / 512.0 } else { 0.0 })
+    });
+    let left = left(&report);
+    assert!(left[0].contains("time"), "{left:?}");
+    assert!(!left.iter().any(|v| v.contains("acceleration")), "{left:?}");
 }
 
 /// One star moves away for half of the time: what it does at all times would be its catalogue position.

@@ -34,6 +34,10 @@ const MOST_OF_OWN_SIZE: usize = 24;
 const BESIDE_A_LINE: f64 = 1e-4;
 /// Spread of a motion's size over its mean below which it is steady: such a size is nothing beside what it multiplies.
 const STEADY: f64 = 0.25;
+/// Most that yields to an acceleration, s^2: a swing of 0.16 Hz.
+const YIELDS_S2: f64 = 1.0;
+/// Sizes show from so many of their sigmas.
+const SHOWS: f64 = 5.0;
 /// Channels beyond which none is paired with another variable: all pairs are paid for.
 const MOST_CHANNELS: usize = 6;
 
@@ -267,6 +271,7 @@ pub(crate) fn ways(situation: &Situation<'_>, data: &StarData) -> Vec<Way> {
     let rate: Vec<f64> = vx.iter().zip(vy).map(|(x, y)| x.hypot(*y)).collect();
     let mut ways = vec![
         Way::With(Variable::Time, range(&data.t_s)),
+        Way::Bent(Variable::Time, range(&data.t_s)),
         Way::With(Variable::Rate, range(&rate)),
         Way::With(Variable::Magnitude, range(&data.mag)),
         Way::With(Variable::Colour, range(&data.bv)),
@@ -281,7 +286,7 @@ pub(crate) fn ways(situation: &Situation<'_>, data: &StarData) -> Vec<Way> {
         ));
     }
     ways.retain(|w| match w {
-        Way::With(_, [low, high]) => high > low,
+        Way::With(_, [low, high]) | Way::Bent(_, [low, high]) => high > low,
         Way::Star(_) => true,
     });
     if data.stars.len() <= MOST_OF_OWN_SIZE {
@@ -296,7 +301,7 @@ pub(crate) fn of_noise(situation: &Situation<'_>, data: &StarData) -> Vec<(Varia
         .into_iter()
         .filter_map(|way| match way {
             // the catalogue has an effect for a slope in magnitude
-            Way::With(Variable::Magnitude, _) | Way::Star(_) => None,
+            Way::With(Variable::Magnitude, _) | Way::Bent(..) | Way::Star(_) => None,
             Way::With(variable, range) => Some((variable, range)),
         })
         .collect();
@@ -310,7 +315,7 @@ pub(crate) fn of_noise(situation: &Situation<'_>, data: &StarData) -> Vec<(Varia
 }
 
 /// Every variable that the bundle gives values of, and the pairs that matter; without `acceleration` where
-/// that is none.
+/// that is none, or is too small for anything to show that yields to it: a function of time like any other.
 pub(crate) fn terms(
     situation: &Situation<'_>,
     data: &StarData,
@@ -368,8 +373,10 @@ pub(crate) fn terms(
     for single in [&time, &rate, &mag, &colour] {
         terms.extend(one(single));
     }
-    if acceleration {
-        let acceleration = (Variable::Acceleration, motion(&data.acceleration));
+    let acceleration = Some((Variable::Acceleration, motion(&data.acceleration))).filter(|of| {
+        acceleration && 0.5 * (of.1[1] - of.1[0]) >= least_acceleration(situation, data)
+    });
+    if let Some(acceleration) = acceleration {
         terms.extend(one(&acceleration));
         terms.extend(
             [&mag, &colour]
@@ -419,6 +426,16 @@ pub(crate) fn terms(
         );
     }
     terms
+}
+
+/// The acceleration, px/s^2, of which what gives way to it could show: a structure that swings at f yields
+/// 1/(2 pi f)^2 of it, an exposure of T seconds takes T^2/24.
+fn least_acceleration(situation: &Situation<'_>, data: &StarData) -> f64 {
+    let noise = situation.model.noise.temporal_arcsec.unwrap_or(0.0);
+    let row_px = noise / std::f64::consts::SQRT_2 / data.camera.arcsec_per_px()[0];
+    let shows_px = SHOWS * row_px / (2.0 * data.t_s.len() as f64).sqrt();
+    let exposure_s = situation.exposure_s().unwrap_or(0.0);
+    shows_px / YIELDS_S2.max(exposure_s * exposure_s)
 }
 
 /// The slots, where they are not just the stars under another name.

@@ -10,7 +10,8 @@
 //! r = sum_j c_j column_j + g z(v) sum_j c_j column_j,     z = (v - middle) / half
 //! ```
 //!
-//! and beside it also a part g of its own for every star. An effect is not constant if g is
+//! in the middle of the span against both ends, `P_2(z)` for z of the time, and beside it also a part g of its own
+//! for every star. An effect is not constant if g is
 //! beyond chance (all tests of one bundle are paid for) and the part that changes holds at
 //! least a tenth of the effect's own square: a third of its size. What a second effect of the
 //! catalogue does beside it changes it, too: where the change does not gain more by far than
@@ -42,6 +43,8 @@ const LEAST_SHARE: f64 = 0.1;
 pub(crate) enum Way {
     /// A variable of one number, and its range.
     With(Variable, [f64; 2]),
+    /// The same, in the middle against both ends.
+    Bent(Variable, [f64; 2]),
     /// Each star has a size of its own.
     Star(Vec<i64>),
 }
@@ -49,7 +52,7 @@ pub(crate) enum Way {
 impl Way {
     fn columns(&self) -> usize {
         match self {
-            Self::With(..) => 1,
+            Self::With(..) | Self::Bent(..) => 1,
             Self::Star(ids) => ids.len(),
         }
     }
@@ -139,15 +142,17 @@ impl Candidate for Changing<'_> {
         out.y.fill(0.0);
         for (way, columns) in self.ways() {
             let values = match way {
-                Way::With(variable, _) => variable.values(rows),
+                Way::With(variable, _) | Way::Bent(variable, _) => variable.values(rows),
                 Way::Star(_) => Vec::new(),
             };
             for i in 0..n {
+                let within = |[low, high]: &[f64; 2]| {
+                    let z = (2.0 * values[i] - low - high) / (high - low);
+                    if z.is_finite() { z } else { 0.0 }
+                };
                 let (k, z) = match way {
-                    Way::With(_, [low, high]) => {
-                        let z = (2.0 * values[i] - low - high) / (high - low);
-                        (columns.start, if z.is_finite() { z } else { 0.0 })
-                    }
+                    Way::With(_, range) => (columns.start, within(range)),
+                    Way::Bent(_, range) => (columns.start, 1.5 * within(range).powi(2) - 0.5),
                     Way::Star(ids) => match ids.iter().position(|&id| id == rows.star_id[i]) {
                         Some(k) => (columns.start + k, 1.0),
                         None => continue,
@@ -202,7 +207,7 @@ pub(crate) fn changing(described: &Described, instead: f64) -> Option<Change> {
         for (way, columns) in ways {
             // the effect itself is one of the sizes of its stars
             let free = match way {
-                Way::With(..) => columns.len(),
+                Way::With(..) | Way::Bent(..) => columns.len(),
                 Way::Star(_) => columns.len().saturating_sub(1),
             };
             let mut with = set.clone();
