@@ -95,15 +95,18 @@ impl Named<'_> {
 }
 
 /// The slow error that was found, if it is not the reference's.
-fn slow_of_stars(level: &StarEvidence<'_>, searched: &Searched<'_>) -> Option<Slow> {
+fn slow_of_stars(
+    level: &StarEvidence<'_>,
+    searched: &Searched<'_>,
+    inside: Option<&[Vec<f64>]>,
+) -> Option<Slow> {
     let wander = searched.wander.as_ref()?;
     let axes = wander.axes();
-    let residual = noise_effects::in_sample(level, &searched.found)?;
     let claimed = (0..3).filter(|&a| axes[a]);
     let tau_s = claimed
         .map(|a| wander.noise.reference[a].tau_s)
         .fold(0.0, f64::max);
-    let slow = commonness::slow(level.data, &residual, axes, tau_s)?;
+    let slow = commonness::slow(level.data, inside?, axes, tau_s)?;
     Some(slow).filter(Slow::is_of_the_stars)
 }
 
@@ -147,7 +150,8 @@ pub(crate) fn run<'a>(
             continue;
         }
         let level = searched.evidence.as_ref().unwrap_or(&beside);
-        if slow_of_stars(level, &searched).is_some() {
+        let inside = noise_effects::in_sample(level, &searched.found);
+        if slow_of_stars(level, &searched, inside.as_deref()).is_some() {
             start = None;
             reinstated(&mut refused);
             continue;
@@ -168,7 +172,6 @@ pub(crate) fn run<'a>(
                 continue;
             }
         }
-        let inside = noise_effects::in_sample(level, &searched.found);
         let slow = slow_left(level, inside.as_deref());
         if let Some(slow) = slow.filter(|_| !last) {
             let doubtful = doubtful(&described, &searched.found, slow.inflation(), &may);

@@ -39,6 +39,7 @@ mod moments;
 pub(crate) mod nuisance;
 mod outliers;
 mod own_attitude;
+mod placing;
 mod pointed;
 mod reference_noise;
 mod reference_wander;

@@ -10,7 +10,7 @@ use telemetry::report::{ConsideredEffect, Report, Verdict};
 /// Stars drift over three pixels.
 const DRIFT: &str = "kind = \"hold\"\ndrift_arcsec_s = [0.35, -0.27, 0.02]";
 
-/// A swing of two arcsec in twenty minutes.
+/// A swing of two arcsec in ten minutes.
 const HOLD: &str = "kind = \"slews\"\nstart = { ra_deg = 83.0, dec_deg = 0.0 }\n\
     [[motion.slew]]\naxis = [0.6, 0.7, 0.4]\nangle_deg = 0.0006\nduration_s = 300.0\n\
     [[motion.slew]]\naxis = [0.6, 0.7, 0.4]\nangle_deg = -0.0006\nduration_s = 300.0\n";
@@ -144,7 +144,7 @@ fn an_s_curve_of_the_middle_of_a_run_is_none() {
     assert_eq!(report.verdict, Verdict::Unexplained);
 }
 
-/// The scale of a part of a run, while the camera hardly moves: 0.4 arcsec at the corners would yield to an
+/// The scale of a part of a run, while the camera hardly moves: 0.4 arcsec at the edges would yield to an
 /// acceleration of 1e-4 arcsec/s^2 by 4000 s^2, what swings once in six minutes.
 #[test]
 fn what_hardly_moves_yields_to_no_acceleration() {

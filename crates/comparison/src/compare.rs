@@ -120,10 +120,9 @@ pub fn compare(
         flights.push(flight);
         notes.extend(said);
     }
-    let first: Vec<[Vec<f64>; 3]> = flights
-        .par_iter()
-        .map(|flight| flight.draw(0))
-        .collect::<Result<_, _>>()?;
+    let first: Vec<Result<_, ComparisonError>> =
+        flights.par_iter().map(|flight| flight.draw(0)).collect();
+    let first: Vec<[Vec<f64>; 3]> = first.into_iter().collect::<Result<_, _>>()?;
     let lost: Vec<bool> = (0..residual.t_s.len())
         .map(|k| first.iter().any(|theta| missing(theta, k)))
         .collect();

@@ -140,10 +140,9 @@ pub(crate) fn ensemble<E: Send + From<SpectraError>>(
         let [x, y, z] = draw(d)?;
         Ok([plans[0].of(&x)?, plans[1].of(&y)?, plans[2].of(&z)?])
     };
-    let all: Vec<[Psd; 3]> = (0..draws)
-        .into_par_iter()
-        .map(of)
-        .collect::<Result<_, E>>()?;
+    // of several errors the first draw's, whichever thread is quicker
+    let all: Vec<Result<[Psd; 3], E>> = (0..draws).into_par_iter().map(of).collect();
+    let all: Vec<[Psd; 3]> = all.into_iter().collect::<Result<_, E>>()?;
     let axis = |axis: usize| Ensemble {
         frequency_hz: all
             .first()

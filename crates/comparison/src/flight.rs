@@ -45,8 +45,8 @@ pub(crate) struct Flight<'a> {
     /// None where the model needs none.
     stars: Option<Stars>,
     effects: Vec<Arc<dyn Effect>>,
-    /// Ideal x and y of the stars of each batch of frames, px: the same in every draw. None of a hybrid
-    /// model, which flies its stars once in a draw and adds processes.
+    /// Ideal x and y of the stars of each batch of frames with all effects, px: the same in every draw. None
+    /// of a hybrid model, whose optics are its own ([`star_tracker::Hem`]).
     ideal: Option<Vec<[Vec<f64>; 2]>>,
 }
 
@@ -159,6 +159,7 @@ impl<'a> Flight<'a> {
     ///
     /// As [`draw`](Self::draw).
     pub(crate) fn processes_alone(&self, draw: u64) -> Result<[Vec<f64>; 3], ComparisonError> {
+        debug_assert!(self.ideal.is_none(), "only a hybrid model has processes");
         let mut model = self.model.clone();
         model.noise.distortion_arcsec = None;
         self.of(&model, &[], draw)

@@ -60,7 +60,8 @@ pub struct StarRows<'a> {
     pub slot: &'a [i32],
     /// Star identities.
     pub star_id: &'a [i64],
-    /// Where waves in the pixel phase of these rows are kept once they are evaluated.
+    /// Where waves in the pixel phase of these rows are kept once they are evaluated: for these positions,
+    /// variances and camera alone, so that rows with others need their own, or none.
     pub waves: Option<&'a PixelWaves>,
     /// The attitude that the modelled positions follow. With it, shifts in time are evaluated on the
     /// path itself, not from velocity and acceleration; without it, inertial effects have no columns.

@@ -141,7 +141,8 @@ impl Phase {
             let phase_rad = self.camera.phase_rad(at_px[axis]);
             PixelWave::at(phase_rad, variance_px2[axis]).orders()
         };
-        for (order, (x, y)) in (1..=ORDERS).zip(wave(0).zip(wave(1))) {
+        let highest = self.orders.iter().max().copied().unwrap_or(0);
+        for (order, (x, y)) in (1..=highest).zip(wave(0).zip(wave(1))) {
             let chunks = self.orders.iter().zip(out.chunks_exact_mut(4));
             for (_, terms) in chunks.filter(|(k, _)| **k == order) {
                 terms[0] = [x[0] / scale_x, 0.0];

@@ -28,7 +28,8 @@ pub struct PixelWave {
 }
 
 impl PixelWave {
-    /// At this phase, rad, of a position known to `variance_px2`.
+    /// At this phase, rad, of a position known to `variance_px2`; one of which no variance is known (NaN) is
+    /// taken as it is.
     pub fn at(phase_rad: f64, variance_px2: f64) -> Self {
         let (sin, cos) = phase_rad.sin_cos();
         let left = if variance_px2 > 0.0 {

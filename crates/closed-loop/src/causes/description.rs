@@ -9,7 +9,8 @@
 
 use block_regression::Folds;
 use effects::{AttitudeRows, Candidate, Coefficient, Effect, EffectError, StarRows, Surroundings};
-use focal_plane::{Camera, PointsMut, VectorsMut};
+use focal_plane::{AttitudeSeries, Camera, PointsMut, VectorsMut};
+use spectra::robust::median_step;
 use std::sync::Arc;
 
 use crate::causes::invariance::{Changing, Inner, Way};
@@ -34,7 +35,7 @@ const MOST_OF_OWN_SIZE: usize = 24;
 const BESIDE_A_LINE: f64 = 1e-4;
 /// Spread of a motion's size over its mean below which it is steady: such a size is nothing beside what it multiplies.
 const STEADY: f64 = 0.25;
-/// Most that yields to an acceleration, s^2: a swing of 0.16 Hz.
+/// What may yield to an acceleration, s^2: a swing of 0.16 Hz.
 const YIELDS_S2: f64 = 1.0;
 /// Sizes show from so many of their sigmas.
 const SHOWS: f64 = 5.0;
@@ -315,7 +316,7 @@ pub(crate) fn of_noise(situation: &Situation<'_>, data: &StarData) -> Vec<(Varia
 }
 
 /// Every variable that the bundle gives values of, and the pairs that matter; without `acceleration` where
-/// that is none, or is too small for anything to show that yields to it: a function of time like any other.
+/// that is none, or is a function of time like any other ([`could_yield`]).
 pub(crate) fn terms(
     situation: &Situation<'_>,
     data: &StarData,
@@ -373,10 +374,8 @@ pub(crate) fn terms(
     for single in [&time, &rate, &mag, &colour] {
         terms.extend(one(single));
     }
-    let acceleration = Some((Variable::Acceleration, motion(&data.acceleration))).filter(|of| {
-        acceleration && 0.5 * (of.1[1] - of.1[0]) >= least_acceleration(situation, data)
-    });
-    if let Some(acceleration) = acceleration {
+    if acceleration {
+        let acceleration = (Variable::Acceleration, motion(&data.acceleration));
         terms.extend(one(&acceleration));
         terms.extend(
             [&mag, &colour]
@@ -428,14 +427,26 @@ pub(crate) fn terms(
     terms
 }
 
-/// The acceleration, px/s^2, of which what gives way to it could show: a structure that swings at f yields
-/// 1/(2 pi f)^2 of it, an exposure of T seconds takes T^2/24.
-fn least_acceleration(situation: &Situation<'_>, data: &StarData) -> f64 {
-    let noise = situation.model.noise.temporal_arcsec.unwrap_or(0.0);
-    let row_px = noise / std::f64::consts::SQRT_2 / data.camera.arcsec_per_px()[0];
-    let shows_px = SHOWS * row_px / (2.0 * data.t_s.len() as f64).sqrt();
-    let exposure_s = situation.exposure_s().unwrap_or(0.0);
-    shows_px / YIELDS_S2.max(exposure_s * exposure_s)
+/// Whether what yields to the acceleration could show beside a residual of `rms` arcsec: a structure that swings
+/// at f yields by 1/(2 pi f)^2 of it, an exposure of T seconds by T^2/24, a path between samples h apart by h^2/8.
+/// How much of it could is a choice: [`YIELDS_S2`], or the square of the largest of these times.
+pub(crate) fn could_yield(situation: &Situation<'_>, data: &StarData, rms: [f64; 2]) -> bool {
+    let largest = data.acceleration.iter().flatten().fold(0.0_f64, |most, a| {
+        if a.is_finite() {
+            most.max(a.abs())
+        } else {
+            most
+        }
+    });
+    let scale = data.camera.arcsec_per_px();
+    let row_px = (rms[0] / scale[0]).min(rms[1] / scale[1]);
+    let counted = data.outlier.iter().filter(|out| !**out).count();
+    let shows_px = SHOWS * row_px / (2.0 * counted.max(1) as f64).sqrt();
+    let samples = situation.reference.as_ref().map(AttitudeSeries::t_s);
+    let step_s = median_step(samples.unwrap_or(&data.frames.t_s)).unwrap_or(0.0);
+    let longest_s = situation.exposure_s().unwrap_or(0.0).max(step_s);
+    // where nothing is known, nothing is ruled out
+    shows_px.is_nan() || largest * YIELDS_S2.max(longest_s * longest_s) >= shows_px
 }
 
 /// The slots, where they are not just the stars under another name.

@@ -8,10 +8,10 @@
 //!
 //! ```text
 //! r = sum_j c_j column_j + g z(v) sum_j c_j column_j,     z = (v - middle) / half
+//!                          g P_2(z(t)) sum_j c_j column_j      the middle of the run against its ends
 //! ```
 //!
-//! in the middle of the span against both ends, `P_2(z)` for z of the time, and beside it also a part g of its own
-//! for every star. An effect is not constant if g is
+//! and beside it also a part g of its own for every star. An effect is not constant if g is
 //! beyond chance (all tests of one bundle are paid for) and the part that changes holds at
 //! least a tenth of the effect's own square: a third of its size. What a second effect of the
 //! catalogue does beside it changes it, too: where the change does not gain more by far than
@@ -146,10 +146,7 @@ impl Candidate for Changing<'_> {
                 Way::Star(_) => Vec::new(),
             };
             for i in 0..n {
-                let within = |[low, high]: &[f64; 2]| {
-                    let z = (2.0 * values[i] - low - high) / (high - low);
-                    if z.is_finite() { z } else { 0.0 }
-                };
+                let within = |[low, high]: &[f64; 2]| (2.0 * values[i] - low - high) / (high - low);
                 let (k, z) = match way {
                     Way::With(_, range) => (columns.start, within(range)),
                     Way::Bent(_, range) => (columns.start, 1.5 * within(range).powi(2) - 0.5),
@@ -158,6 +155,8 @@ impl Candidate for Changing<'_> {
                         None => continue,
                     },
                 };
+                // where the variable is not known nothing changes
+                let z = if z.is_finite() { z } else { 0.0 };
                 out.x[k * n + i] = z * x[i];
                 out.y[k * n + i] = z * y[i];
             }

@@ -19,6 +19,7 @@ use crate::causes::{self, Named, Quest};
 use crate::close::{Closed, catalogue_candidates};
 use crate::declared;
 use crate::error::CloseError;
+use crate::figures;
 use crate::image_level::{self, Side};
 use crate::motion::{self, Around, gyro::with_rates, source};
 use crate::search::orbits::{self, Look};
@@ -219,6 +220,8 @@ fn explain(
     let reference = path.or(situation.reference.as_ref());
     let by_rates = motion.is_some_and(Around::by_rates);
     let accelerates = || by_rates || reference.is_none_or(|r| motion::accelerates(r, arm));
+    let rms = figures::star_rms(&settled.before, data);
+    let yields = description::could_yield(situation, data, rms);
     let named = |put_forward: &[Arc<dyn Candidate>]| {
         let candidates = || {
             let mut list = catalogue_candidates(&scene);
@@ -229,7 +232,9 @@ fn explain(
         };
         let quest = Quest {
             candidates: &candidates,
-            terms: &|wander| description::terms(situation, data, !wander || accelerates()),
+            terms: &|wander| {
+                description::terms(situation, data, yields && (!wander || accelerates()))
+            },
             ways: &ways,
             surroundings: situation.surroundings(),
         };
@@ -292,7 +297,7 @@ fn explain(
             folds,
             &mut searched.found,
             &described.follows(1.0),
-            description::terms(situation, data, true),
+            description::terms(situation, data, yields),
             &situation.surroundings(),
         )?;
     }

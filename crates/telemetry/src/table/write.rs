@@ -26,8 +26,9 @@ const GZIP_LEVEL: Compression = Compression::new(3);
 const BATCH: usize = 8192;
 /// Rows of a row group: what is held in memory, encoded.
 const GROUP: usize = 1 << 17;
-/// Bytes of the distinct values of a column in a row group, up to which they are listed once: the times
-/// and stars of frames are, measured values, of which hardly two are alike, cost no search for long.
+/// Bytes of the distinct values of a column in a row group, up to which they are listed once: stars are, and
+/// times of frames with more than eight of them; measured values, of which hardly two are alike, cost no
+/// search for long.
 const LISTED: usize = 1 << 17;
 
 /// The cells of a column, by row.
