@@ -278,6 +278,12 @@ impl StarMoments {
         })
     }
 
+    /// Sums what every hypothesis needs. Two that are scored side by side must find it there: a thread that waits
+    /// for the parts of a sum may take up the other, which would wait for the same sum on the same thread.
+    pub(crate) fn sum_up(&self) {
+        self.rest();
+    }
+
     /// The sum over the blocks of R.
     fn rest(&self) -> &DMatrix<f64> {
         self.rest.get_or_init(|| {

@@ -327,6 +327,7 @@ impl Trial<'_> {
     /// `chosen` at the better of two starts: all that fits taken out, or `noise`.
     fn score(&self, chosen: &[usize], noise: &CommonNoise) -> Option<Scored> {
         let columns = self.columns(chosen);
+        self.moments.sum_up();
         let (out, given) = rayon::join(
             || self.climb(&columns, &self.taken_out(&columns)?),
             || self.climb(&columns, noise),
