@@ -45,9 +45,9 @@ pub(crate) struct Flight<'a> {
     /// None where the model needs none.
     stars: Option<Stars>,
     effects: Vec<Arc<dyn Effect>>,
-    /// Ideal x and y of the stars of each batch of frames with all effects, px: the same in every draw. None
-    /// of a hybrid model, whose optics are its own ([`star_tracker::Hem`]).
-    ideal: Option<Vec<[Vec<f64>; 2]>>,
+    /// Ideal x and y of the stars of each batch of frames with all effects, px: the same in every draw. Empty
+    /// for a hybrid model, whose optics are its own ([`star_tracker::Hem`]).
+    ideal: Vec<[Vec<f64>; 2]>,
 }
 
 impl<'a> Flight<'a> {
@@ -87,10 +87,10 @@ impl<'a> Flight<'a> {
             camera,
             stars,
             effects,
-            ideal: None,
+            ideal: vec![],
         };
         if !hybrid {
-            flight.ideal = Some(flight.ideal()?);
+            flight.ideal = flight.ideal()?;
         }
         Ok(flight)
     }
@@ -159,7 +159,7 @@ impl<'a> Flight<'a> {
     ///
     /// As [`draw`](Self::draw).
     pub(crate) fn processes_alone(&self, draw: u64) -> Result<[Vec<f64>; 3], ComparisonError> {
-        debug_assert!(self.ideal.is_none(), "only a hybrid model has processes");
+        debug_assert!(self.ideal.is_empty(), "only a hybrid model has processes");
         let mut model = self.model.clone();
         model.noise.distortion_arcsec = None;
         self.of(&model, &[], draw)
@@ -201,8 +201,8 @@ impl<'a> Flight<'a> {
             (Scratch::default(), Measured::default(), vec![]);
         for (batch, frames) in self.batches().enumerate() {
             let rows = self.rows(frames.clone(), &mut first_row);
-            match (&declared.hem, &self.ideal) {
-                (Some(hem), _) => hem.measure_into(
+            match &declared.hem {
+                Some(hem) => hem.measure_into(
                     self.truth,
                     rows,
                     &mut state,
@@ -210,8 +210,8 @@ impl<'a> Flight<'a> {
                     &mut scratch,
                     &mut out,
                 ),
-                (None, Some(ideal)) => {
-                    let [x, y] = &ideal[batch];
+                None => {
+                    let [x, y] = &self.ideal[batch];
                     declared.pbm.measure_at_into(
                         self.truth,
                         rows,
@@ -221,7 +221,6 @@ impl<'a> Flight<'a> {
                         &mut out,
                     );
                 }
-                (None, None) => unreachable!("only a hybrid model has no ideal positions"),
             }
             for k in frames.clone() {
                 let truth = self.truth.attitude(self.t_s[k]);

@@ -180,12 +180,8 @@ impl<S: Shift> Candidate for ShiftCandidate<S> {
                 continue;
             }
             let star = StarView { at, ..rows.view(i) };
-            if centroid {
-                let variance = rows.landed_variance_px2.map(|v| v[i]);
-                self.shift.expected_terms(&star, variance, &mut terms[..p]);
-            } else {
-                self.shift.terms(&star, &mut terms[..p]);
-            }
+            let variance = rows.landed_variance_px2.map(|v| v[i]);
+            self.shift.expected_terms(&star, variance, &mut terms[..p]);
             for (j, term) in terms[..p].iter().enumerate() {
                 out.x[j * n + i] = term[0];
                 out.y[j * n + i] = term[1];

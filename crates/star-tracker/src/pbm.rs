@@ -31,7 +31,7 @@ use rand_core::Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 use crate::star_field::uniform;
-use crate::{Disturbance, Measured, NoiseStreams, Rows, Stages, TemporalNoise};
+use crate::{Disturbance, Measured, NoiseStreams, Rows, Stages, StarView, TemporalNoise};
 
 /// The physics-based model of one tracker.
 #[derive(Clone, Debug)]
@@ -203,7 +203,13 @@ impl Pbm {
         self.centroid_error_px
             .displace_into(distorted, centre, out.reborrow());
         if self.stages.centroid {
-            self.shift_centroids(rows, distorted, out.reborrow());
+            self.shift_rows(
+                rows,
+                |s| s.centroid,
+                Some(distorted),
+                |disturbance, star| disturbance.centroid_shift_px(star),
+                out.reborrow(),
+            );
         }
         out.x.iter().filter(|x| x.is_nan()).count()
     }
@@ -287,16 +293,22 @@ impl Pbm {
             .filter(move |d| stage(d.stages()))
     }
 
-    fn shift_centroids(&self, rows: Rows<'_>, distorted: Points<'_>, out: PointsMut<'_>) {
+    /// Adds to `out` what the disturbances of a stage `shift` each row by, px. They see it at `at`; where that is
+    /// `None`, at what `out` holds.
+    fn shift_rows(
+        &self,
+        rows: Rows<'_>,
+        stage: fn(Stages) -> bool,
+        at: Option<Points<'_>>,
+        mut shift: impl FnMut(&dyn Disturbance, &StarView) -> [f64; 2],
+        out: PointsMut<'_>,
+    ) {
         for k in 0..rows.frames() {
             for row in rows.of(k) {
-                let at = Pixel {
-                    x: distorted.x[row],
-                    y: distorted.y[row],
-                };
-                let star = rows.view(k, row, at);
-                for disturbance in self.at_stage(|s| s.centroid) {
-                    let [dx, dy] = disturbance.centroid_shift_px(&star);
+                let [x, y] = at.map_or([out.x[row], out.y[row]], |at| [at.x[row], at.y[row]]);
+                let star = rows.view(k, row, Pixel { x, y });
+                for disturbance in self.at_stage(stage) {
+                    let [dx, dy] = shift(disturbance, &star);
                     out.x[row] += dx;
                     out.y[row] += dy;
                 }
@@ -370,20 +382,20 @@ impl Pbm {
     }
 
     fn add_spikes<R: Rng>(&self, rows: Rows<'_>, rng: &mut R, out: &mut Measured) {
-        for k in 0..rows.frames() {
-            for row in rows.of(k) {
-                let at = Pixel {
-                    x: out.noise_free_x_px[row],
-                    y: out.noise_free_y_px[row],
-                };
-                let star = rows.view(k, row, at);
-                for disturbance in self.at_stage(|s| s.spike) {
-                    let [dx, dy] = disturbance.spike_px(&star, &mut || uniform(rng));
-                    out.x_px[row] += dx;
-                    out.y_px[row] += dy;
-                }
-            }
-        }
+        let noise_free = Points {
+            x: &out.noise_free_x_px,
+            y: &out.noise_free_y_px,
+        };
+        self.shift_rows(
+            rows,
+            |s| s.spike,
+            Some(noise_free),
+            |disturbance, star| disturbance.spike_px(star, &mut || uniform(rng)),
+            PointsMut {
+                x: &mut out.x_px,
+                y: &mut out.y_px,
+            },
+        );
     }
 
     /// Step 5.

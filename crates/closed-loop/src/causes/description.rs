@@ -431,17 +431,11 @@ pub(crate) fn terms(
 /// at f yields by 1/(2 pi f)^2 of it, an exposure of T seconds by T^2/24, a path between samples h apart by h^2/8.
 /// How much of it could is a choice: [`YIELDS_S2`], or the square of the largest of these times.
 pub(crate) fn could_yield(situation: &Situation<'_>, data: &StarData, rms: [f64; 2]) -> bool {
-    let largest = data.acceleration.iter().flatten().fold(0.0_f64, |most, a| {
-        if a.is_finite() {
-            most.max(a.abs())
-        } else {
-            most
-        }
-    });
+    let [low, high] = range(data.acceleration.iter().flatten().copied());
+    let largest = high.max(-low);
     let scale = data.camera.arcsec_per_px();
     let row_px = (rms[0] / scale[0]).min(rms[1] / scale[1]);
-    let counted = data.outlier.iter().filter(|out| !**out).count();
-    let shows_px = SHOWS * row_px / (2.0 * counted.max(1) as f64).sqrt();
+    let shows_px = SHOWS * row_px / (2.0 * data.counted().max(1) as f64).sqrt();
     let samples = situation.reference.as_ref().map(AttitudeSeries::t_s);
     let step_s = median_step(samples.unwrap_or(&data.frames.t_s)).unwrap_or(0.0);
     let longest_s = situation.exposure_s().unwrap_or(0.0).max(step_s);

@@ -409,7 +409,7 @@ fn tell_apart(f: &Finish<'_>, effects: &mut [FoundEffect]) {
 /// Squared residual over what the declared noise accounts for, in the unit of the
 /// fit's scalars (arcsec, or the centroids' noise where they are whitened); 0 where no noise is declared.
 fn excess(f: &Finish<'_>, power: f64) -> f64 {
-    let rows = f.data.outlier.iter().filter(|o| !**o).count() as f64;
+    let rows = f.data.counted() as f64;
     f.situation.model.noise.temporal_arcsec.map_or(0.0, |s| {
         let unit = f.level.noise.map_or(1.0, |n| n.centroid);
         (rows * power - 0.5 * s * s * f.found.fitted.scalars).max(0.0) / (unit * unit)

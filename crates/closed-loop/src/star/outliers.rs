@@ -16,6 +16,11 @@ use crate::star::data::StarData;
 const FEW_ROWS: usize = 10;
 
 impl StarData {
+    /// Rows that are no outliers.
+    pub(crate) fn counted(&self) -> usize {
+        self.outlier.iter().filter(|out| !**out).count()
+    }
+
     /// Marks rows that stand out of each of `residuals`, of every row, and says how many: out of what other folds
     /// predict alone sound rows do too, where these know nothing of the distortion.
     ///

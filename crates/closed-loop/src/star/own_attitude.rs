@@ -88,13 +88,9 @@ pub(crate) fn residuals(
 /// What the declared effects move the image of each row by, per axis, px.
 fn moved_by_declared_effects(data: &StarData) -> [Vec<f64>; 2] {
     let mut moved = data.projected.clone();
-    for k in 0..data.frames.frames() {
-        for row in data.frames.rows_of(k) {
-            let u = data.stars[data.star[row]].direction;
-            let centre = data.position(&data.attitude[k], &u);
-            for axis in 0..2 {
-                moved[axis][row] -= centre[axis];
-            }
+    for (row, bare) in data.bare_projections().into_iter().enumerate() {
+        for axis in 0..2 {
+            moved[axis][row] -= bare[axis];
         }
     }
     moved

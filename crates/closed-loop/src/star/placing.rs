@@ -26,18 +26,21 @@ impl StarData {
         self.modelled = self.projected.clone();
     }
 
-    /// Projected positions.
-    fn project(&mut self) {
-        let known = &*self;
+    /// Projection of every row by its frame's attitude, before any effect, px.
+    pub(crate) fn bare_projections(&self) -> Vec<[f64; 2]> {
         let of_frame = |k: usize| {
-            let rows = known.frames.rows_of(k);
-            rows.map(move |row| {
-                let u = known.stars[known.star[row]].direction;
-                known.position(&known.attitude[k], &u)
+            self.frames.rows_of(k).map(move |row| {
+                let u = self.stars[self.star[row]].direction;
+                self.position(&self.attitude[k], &u)
             })
         };
         let frames = (0..self.frames.frames()).into_par_iter();
-        let at: Vec<[f64; 2]> = frames.flat_map_iter(of_frame).collect();
+        frames.flat_map_iter(of_frame).collect()
+    }
+
+    /// Projected positions.
+    fn project(&mut self) {
+        let at = self.bare_projections();
         for (row, at) in at.into_iter().enumerate() {
             for axis in 0..2 {
                 self.projected[axis][row] = at[axis];

@@ -55,7 +55,7 @@ pub(crate) fn consider(
     let white = squares / (2.0 * pairs as f64);
     let decay = (-step_s / TYPICAL_TAU_S).exp();
     let sigma = white * ((1.0 - decay * decay) / (theta.len() as f64 * decay * decay)).sqrt();
-    let rows = data.outlier.iter().filter(|o| !**o).count().max(1) as f64;
+    let rows = data.counted().max(1) as f64;
     Some(ConsideredEffect {
         against: None,
         id: REFERENCE_ERROR.to_owned(),

@@ -47,7 +47,13 @@ impl Pbm {
             self.ideal_frame_by_frame(truth, rows, scratch, out.reborrow());
         }
         if self.stages.image {
-            self.shift_images(rows, out);
+            self.shift_rows(
+                rows,
+                |s| s.image,
+                None,
+                |disturbance, star| disturbance.image_shift_px(star),
+                out,
+            );
         }
     }
 
@@ -204,22 +210,5 @@ impl Pbm {
     fn in_tracker(&self, star: &StarView, v: Vector3<f64>) -> Vector3<f64> {
         self.at_stage(|s| s.tracker_direction)
             .fold(v, |v, d| d.tracker_direction(star, v))
-    }
-
-    fn shift_images(&self, rows: Rows<'_>, out: PointsMut<'_>) {
-        for k in 0..rows.frames() {
-            for row in rows.of(k) {
-                let at = Pixel {
-                    x: out.x[row],
-                    y: out.y[row],
-                };
-                let star = rows.view(k, row, at);
-                for disturbance in self.at_stage(|s| s.image) {
-                    let [dx, dy] = disturbance.image_shift_px(&star);
-                    out.x[row] += dx;
-                    out.y[row] += dy;
-                }
-            }
-        }
     }
 }

@@ -10,7 +10,6 @@
 //! Not physics: copies.
 
 use effects::Candidate;
-use nalgebra::DMatrix;
 use std::sync::Arc;
 
 use super::{Block, pick};
@@ -61,10 +60,7 @@ impl<'a> Distinct<'a> {
         Block {
             rest: Arc::new(pick(&block.rest, &self.of)),
             lost: block.lost.as_ref().map(|lost| pick(lost, &self.of)),
-            theta: match block.theta.nrows() {
-                0 => DMatrix::zeros(0, self.of.len()),
-                _ => block.theta.select_columns(&self.of),
-            },
+            theta: block.theta.select_columns(&self.of),
             ..block
         }
     }
