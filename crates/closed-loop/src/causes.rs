@@ -25,7 +25,7 @@ use crate::noise_effects;
 use crate::search::empirical::Empirical;
 use crate::search::refusal::{Refusal, Refused};
 use crate::search::selection::{columns_of, costs};
-use crate::search::{Found, borrowed, family, first_column, fit};
+use crate::search::{Found, borrowed, family, first_column, fit, joined};
 use crate::star::evidence::StarEvidence;
 use crate::star::search::{Searched, attempt, declared_noise};
 use commonness::Slow;
@@ -132,6 +132,8 @@ pub(crate) fn run<'a>(
             .map(|c| !refused.contains_key(&family(c.as_ref())))
             .collect();
         let (mut searched, wander) = attempt(&beside, folds, quest.candidates, &may, start)?;
+        let level = searched.evidence.as_ref().unwrap_or(&beside);
+        searched.found = joined(level, folds, searched.found, &may)?;
         let last = round == MOST_REFUSALS;
         if round == 0 {
             oversize =

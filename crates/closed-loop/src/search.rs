@@ -163,7 +163,10 @@ fn grouped(fits: &Fits, candidates: &[&dyn Candidate]) -> Vec<Group> {
             choices: candidate.choices(),
             shapes: candidate.nonlinear().len(),
             slopes: candidate.slopes(),
-            family: family(*candidate),
+            family: match candidate.part() {
+                Some(part) => format!("{}/part {part}", family(*candidate)),
+                None => family(*candidate),
+            },
             kind: candidate.id(),
             stands_for: candidate.stands_for(),
         });
@@ -183,7 +186,7 @@ fn credible(coefficient: &Coefficient) -> [f64; 2] {
     [coefficient.lower.max(-most), upper]
 }
 
-/// Forms of one cause: one id with one selector of what it acts on.
+/// Forms and parts of one cause: one id with one selector of what it acts on.
 pub(crate) fn family(candidate: &dyn Candidate) -> String {
     let selectors = candidate.selectors();
     let on = ["channel", "star_id", "variable"]
@@ -310,6 +313,47 @@ fn chosen_from(
     let again = fitted.variance < loud;
     let selection = if again { select(&fitted) } else { selection };
     Ok((fitted, selection))
+}
+
+/// The same with the parts of one effect that were chosen as one, in the place of the first of them.
+pub(crate) fn joined(
+    evidence: &dyn Evidence,
+    folds: &Folds,
+    found: Found,
+    may: &[bool],
+) -> Result<Found, CloseError> {
+    let mut candidates = found.candidates.clone();
+    let mut chosen = Vec::new();
+    for &g in &found.selection.chosen {
+        let part_of = |&c: &usize| {
+            let both = [g, c].map(|c| found.candidates[c].as_ref());
+            let parts = both.iter().all(|c| c.part().is_some());
+            parts && family(both[0]) == family(both[1])
+        };
+        if chosen.iter().any(part_of) {
+            continue;
+        }
+        let of_it = found.selection.chosen.iter().copied().filter(part_of);
+        let mut parts: Vec<u32> = of_it.filter_map(|c| found.candidates[c].part()).collect();
+        parts.sort_unstable();
+        if parts.len() > 1
+            && let Some(whole) = candidates[g].of_parts(&parts)
+        {
+            candidates[g] = whole.into();
+        }
+        chosen.push(g);
+    }
+    if chosen.len() == found.selection.chosen.len() {
+        return Ok(found);
+    }
+    let fitted = fit(evidence, folds, &borrowed(&candidates))?;
+    let cost = costs(&fitted.groups, may);
+    let judged = fitted.trials(&cost).judged(&chosen);
+    Ok(Found {
+        candidates,
+        fitted,
+        selection: Selection { chosen, judged },
+    })
 }
 
 /// The place of the first column of candidate `g` among those of all.

@@ -233,10 +233,15 @@ pub trait Candidate: Debug + Send + Sync {
     fn describes(&self) -> bool {
         false
     }
-    /// Whether each of its columns is, number for number, the one of that name in every candidate of its
-    /// effect that says the same: such a column need be formed only once.
-    fn columns_by_name(&self) -> bool {
-        false
+    /// Which part of its effect it is, where the effect has parts: several of them may act together, and are
+    /// then told as [one](Self::of_parts).
+    fn part(&self) -> Option<u32> {
+        None
+    }
+    /// All `parts` of its effect in one; `None` where it has none.
+    fn of_parts(&self, parts: &[u32]) -> Option<Box<dyn Candidate>> {
+        let _ = parts;
+        None
     }
     /// Star columns, px per unit: `out` holds coefficient after coefficient, each `rows.len()` long.
     /// Returns false, leaving `out` unspecified, when it does not act on stars or lacks what it needs.

@@ -90,10 +90,7 @@ impl EffectKind for Kind {
             return Vec::new();
         }
         let camera = scene.surroundings.camera;
-        let mut all: Vec<Box<dyn Candidate>> =
-            (1..=ORDERS).map(|k| harmonics_of(camera, &[k])).collect();
-        all.push(harmonics_of(camera, &[1, 2, 3, 4]));
-        all
+        (1..=ORDERS).map(|k| harmonics_of(camera, &[k])).collect()
     }
 }
 
@@ -176,9 +173,19 @@ impl Shift for Phase {
         }
         all
     }
-    // a wave of an order and an axis has one form
-    fn columns_by_name(&self) -> bool {
-        true
+    // an order is a part
+    fn part(&self) -> Option<u32> {
+        match self.orders[..] {
+            [order] => Some(order),
+            _ => None,
+        }
+    }
+    fn of_parts(&self, parts: &[u32]) -> Option<Self> {
+        let orders = parts.to_vec();
+        Some(Self {
+            orders,
+            ..self.clone()
+        })
     }
     fn terms(&self, star: &StarView, out: &mut [[f64; 2]]) {
         self.expected([star.at.x, star.at.y], [0.0; 2], out);

@@ -70,9 +70,14 @@ pub(crate) trait Shift: Clone + Debug + Send + Sync + 'static {
     fn stands_for(&self) -> f64 {
         1.0
     }
-    /// See [`Candidate::columns_by_name`].
-    fn columns_by_name(&self) -> bool {
-        false
+    /// See [`Candidate::part`].
+    fn part(&self) -> Option<u32> {
+        None
+    }
+    /// See [`Candidate::of_parts`].
+    fn of_parts(&self, parts: &[u32]) -> Option<Self> {
+        let _ = parts;
+        None
     }
 }
 
@@ -158,8 +163,11 @@ impl<S: Shift> Candidate for ShiftCandidate<S> {
     fn stands_for(&self) -> f64 {
         self.shift.stands_for()
     }
-    fn columns_by_name(&self) -> bool {
-        self.shift.columns_by_name()
+    fn part(&self) -> Option<u32> {
+        self.shift.part()
+    }
+    fn of_parts(&self, parts: &[u32]) -> Option<Box<dyn Candidate>> {
+        self.shift.of_parts(parts).map(Self::boxed)
     }
     fn acts_on_stars(&self) -> bool {
         true

@@ -59,7 +59,7 @@ pub(crate) struct Group {
     pub(crate) shapes: usize,
     /// Columns that are slopes of such parameters.
     pub(crate) slopes: usize,
-    /// Groups of one family are forms of one cause: at most one is chosen.
+    /// Groups of one family are forms of one cause, or of one part of it: at most one is chosen.
     pub(crate) family: String,
     /// Groups of one kind are one effect, whatever it acts on.
     pub(crate) kind: &'static str,

@@ -21,7 +21,6 @@ mod paced;
 mod sums;
 #[cfg(test)]
 mod tests;
-mod twice;
 
 use std::sync::{Arc, OnceLock};
 
@@ -32,7 +31,6 @@ use rayon::prelude::*;
 
 use self::paced::Paced;
 use self::sums::{SOLVING, SolvedBins, Sums};
-use self::twice::Distinct;
 use crate::bins::Bins;
 use crate::star::columns::StarColumns;
 
@@ -137,21 +135,6 @@ pub(crate) struct StarMoments {
 impl StarMoments {
     /// One pass over `columns`.
     pub(crate) fn accumulate(columns: &StarColumns<'_>, folds: &Folds, keep: Keep<'_>) -> Self {
-        let Some(distinct) = Distinct::of(columns) else {
-            return Self::of_each(columns, folds, keep);
-        };
-        let once = StarColumns {
-            candidates: &distinct.candidates,
-            ..*columns
-        };
-        let mut all = Self::of_each(&once, folds, keep);
-        let blocks = all.blocks.into_par_iter();
-        all.blocks = blocks.map(|block| distinct.spread(block)).collect();
-        all
-    }
-
-    /// The same of columns that are taken as they stand.
-    fn of_each(columns: &StarColumns<'_>, folds: &Folds, keep: Keep<'_>) -> Self {
         let long = columns.data.t_s.len() >= PACED_ROWS;
         let paced = match keep {
             _ if !long => None,

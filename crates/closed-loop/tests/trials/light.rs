@@ -53,3 +53,31 @@ fn a_pixel_phase_error_keeps_its_size_under_noisy_attitudes() {
     let mean = all.iter().map(|v| v.0 * weight(v)).sum::<f64>() / information;
     assert!((mean - 3.0).abs() < 3.0 * information.powf(-0.5), "{mean}");
 }
+
+/// One order along x and another along y, each of ten sigma (s sqrt(2/n) of an amplitude: of 10 080 rows of
+/// 7.43/sqrt(2) arcsec an axis 0.074): both are found and told as one effect. With one order alone, as before,
+/// `pixel_phase_x` was left.
+#[test]
+fn two_orders_are_one_effect() {
+    let acts = "x2_amplitude_arcsec = 0.75\nx2_phase_rad = 0.7\ny3_amplitude_arcsec = 0.75\ny3_phase_rad = -1.1";
+    for seed in 0..3 {
+        let case = Case::new(Path::Drift, 3300 + seed).with("pixel_phase_harmonics", acts);
+        let report = case.close().report;
+        let [effect] = &report.effects[..] else {
+            panic!("{seed}: {:?}", report.effects);
+        };
+        assert_eq!(effect.id, "pixel_phase_harmonics");
+        assert!(!report.unattributed.present, "{seed}");
+        let sizes: Vec<_> = effect
+            .parameters
+            .keys()
+            .filter(|k| k.contains("amplitude"))
+            .collect();
+        assert_eq!(sizes.len(), 4, "{sizes:?}");
+        for name in ["x2_amplitude_arcsec", "y3_amplitude_arcsec"] {
+            let got = &effect.parameters[name];
+            let off = (got.value - 0.75).abs() / got.sigma.unwrap();
+            assert!(off < 4.0, "{seed}, {name}: {got:?}");
+        }
+    }
+}

@@ -204,7 +204,6 @@ fn with_pass(
             .collect()
     });
     let residuals = [residual];
-    // the columns of the second order stand twice
     let [second, both] =
         [&[2][..], &[1, 2]].map(|orders| effects::harmonics_of(&data.camera, orders));
     let one: [&dyn Candidate; 4] = [&whole, &*second, &sparse, &*both];
