@@ -6,17 +6,24 @@
 //! ```
 //!
 //! phi is the cubic with these four values; its error falls as h^4 where rates are given. A missing
-//! rate comes from the neighbours: with a = log(q[i-1] q[i]^-1) and b = log(q[i+1] q[i]^-1), the
-//! parabola through (-h0, a), (0, 0), (h1, b) gives
+//! rate comes from the neighbours, two on each side where there are as many: of the polynomial through
+//! (t_j, log(q[j] q[i]^-1)) and zero at t = 0
 //!
 //! ```text
-//! -omega[i]   = (b h0/h1 - a h1/h0) / (h0 + h1)
-//! -omega[i-1] = J_l(a) (slope of the parabola at -h0)      where i-1 is the first of a run
+//! -omega[i] = sum_j phi_j (1/t_j) prod over k /= j of t_k / (t_k - t_j)
 //! ```
 //!
-//! and then the error falls as h^3 (slope error h^2/6 phi'''). Two samples on their own are joined
-//! by slerp, or by a parabola if one of them has a rate. Slerp elsewhere would break the path at
-//! every sample, which halves the estimated exposure of a smear at 2 Hz.
+//! is the slope there, with an error of h^4/30 phi''''', so that the path still falls as h^4. With one on each
+//! side it would be h^2/6 phi''', and h^3/6 phi''' s (1 - s) (1 - 2 s) of the path: under a sway of frequency w a
+//! time tag of -(w h)^2/6 h s (1 - s) (1 - 2 s), where stars are measured at one place s between two samples.
+//! At the first of a run
+//!
+//! ```text
+//! -omega[i-1] = J_l(a) (slope of the parabola at -h0)      through (-h0, a), (0, 0), (h1, b) about i
+//! ```
+//!
+//! Two samples on their own are joined by slerp, or by a parabola if one of them has a rate. Slerp elsewhere
+//! would break the path at every sample, which halves the estimated exposure of a smear at 2 Hz.
 //!
 //! Source: physics conventions, row "attitude between samples"; Hermite interpolation as in any
 //! text, the end slopes derived above.
@@ -29,6 +36,13 @@ use crate::{
     so3_left_jacobian_inverse,
 };
 
+/// Neighbours on each side that tell a missing rate.
+const SIDE: usize = 2;
+/// The longest step between these over the shortest: where steps are less even, the nearest alone tell it, for a
+/// polynomial through points that lie close together shows their noise.
+const EVEN: f64 = 2.0;
+/// Largest turn to one of these, rad: further on two turns may be one.
+const LARGEST_TURN: f64 = 1.0;
 /// Largest deviation of a quaternion's norm from 1.
 const NORM_TOLERANCE: f64 = 1e-6;
 
@@ -220,7 +234,7 @@ impl AttitudeSeries {
             .or_else(|| before.map(|segment| segment.rate_rad_s(1.0)))
     }
 
-    /// `-omega` at each sample, from the given rate, else from a run of three samples.
+    /// `-omega` at each sample, from the given rate, else from a run of at least three samples.
     fn slopes(&self) -> Vec<Option<Vector3<f64>>> {
         (0..self.len())
             .map(|i| self.given_slope(i).or_else(|| self.neighbour_slope(i)))
@@ -237,19 +251,47 @@ impl AttitudeSeries {
             |i: usize| i + 1 < self.len() && self.t_s[i + 1] - self.t_s[i] <= self.max_gap_s;
         let before = i > 0 && joined(i - 1);
         if before && joined(i) {
-            Some(self.parabola(i).1)
+            let back = (1..=SIDE.min(i)).take_while(|k| joined(i - k)).count();
+            let ahead = (0..SIDE).take_while(|k| joined(i + k)).count();
+            Some(self.slope_through(i, back, ahead))
         } else if !before && joined(i) && joined(i + 1) {
             Some(self.parabola(i + 1).0)
         } else if before && i >= 2 && joined(i - 2) {
-            Some(self.parabola(i - 1).2)
+            Some(self.parabola(i - 1).1)
         } else {
             None
         }
     }
 
-    /// `-omega` at i-1, i and i+1 of the parabola through these three, in the chart of i: no
+    /// `-omega` at i of the polynomial through so many neighbours before and after, at least one each; through the
+    /// nearest alone where they are uneven or far.
+    fn slope_through(&self, i: usize, before: usize, after: usize) -> Vector3<f64> {
+        let near = (i - before..=i + after).filter(|&j| j != i);
+        let mut others = [(0.0, Vector3::zeros()); 2 * SIDE];
+        for (other, j) in others.iter_mut().zip(near) {
+            let turn = rotation_vector(&self.q[j], &self.q[i]);
+            *other = (self.t_s[j] - self.t_s[i], turn);
+        }
+        let others = &others[..before + after];
+        let steps = (i - before..i + after).map(|j| self.t_s[j + 1] - self.t_s[j]);
+        let (short, long) = steps.fold((f64::INFINITY, 0.0_f64), |(short, long), h| {
+            (short.min(h), long.max(h))
+        });
+        let far = others.iter().any(|(_, turn)| turn.norm() > LARGEST_TURN);
+        if others.len() > 2 && (far || long > EVEN * short) {
+            return self.slope_through(i, 1, 1);
+        }
+        let of = |j: usize| {
+            let (t, turn) = others[j];
+            let rest = (0..others.len()).filter(|&k| k != j).map(|k| others[k].0);
+            turn * (rest.map(|other| other / (other - t)).product::<f64>() / t)
+        };
+        (0..others.len()).map(of).sum()
+    }
+
+    /// `-omega` at i-1 and i+1 of the parabola through these and i, in the chart of i: no
     /// logarithm reaches further than one step.
-    fn parabola(&self, i: usize) -> (Vector3<f64>, Vector3<f64>, Vector3<f64>) {
+    fn parabola(&self, i: usize) -> (Vector3<f64>, Vector3<f64>) {
         let (h0, h1) = (self.t_s[i] - self.t_s[i - 1], self.t_s[i + 1] - self.t_s[i]);
         let a = rotation_vector(&self.q[i - 1], &self.q[i]);
         let b = rotation_vector(&self.q[i + 1], &self.q[i]);
@@ -257,7 +299,6 @@ impl AttitudeSeries {
         let bend = (a / h0 + b / h1) / (h0 + h1);
         (
             so3_left_jacobian(&a, &(slope - bend * (2.0 * h0))),
-            slope,
             so3_left_jacobian(&b, &(slope + bend * (2.0 * h1))),
         )
     }
