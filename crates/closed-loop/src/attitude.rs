@@ -8,6 +8,7 @@
 //! spatial_errors  what the declared model itself makes of crossing and changing stars
 //! imagined        the same from drawn skies and fields, and its lines
 //! likeness        how much of an effect that makes
+//! steadied        the reference's path less its slow error
 //! ```
 //!
 //! Not physics: the contents of a folder.
@@ -19,5 +20,6 @@ mod likeness;
 mod run;
 mod search;
 pub(crate) mod spatial_errors;
+mod steadied;
 
 pub(crate) use run::run;

@@ -53,7 +53,7 @@ const DOUBT: f64 = 1e-4;
 const MISPLACED: &str = "catalogue_position";
 const MOST_MISPLACED: usize = 2;
 /// The effect of the acceleration.
-const SMEAR: &str = "exposure_smear";
+pub(crate) const SMEAR: &str = "exposure_smear";
 /// Share of what a description gains below which an effect beside it is what it leaves.
 const REMAINDER: f64 = 0.05;
 /// Slow: over this share of the span.

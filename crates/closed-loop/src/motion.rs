@@ -26,7 +26,10 @@ mod stencil;
 
 pub(crate) use around::Around;
 
-use focal_plane::{AttitudeSeries, AttitudeSource, Camera, rotation_vector};
+use focal_plane::{
+    ARCSEC_PER_RAD, AttitudeSeries, AttitudeSource, Camera, Series, rotation_from_vector,
+    rotation_vector,
+};
 use nalgebra::{UnitQuaternion, Vector3};
 
 use crate::gaps::longest_step;
@@ -76,6 +79,30 @@ fn predicts(
 pub(crate) fn around(series: &AttitudeSeries, t_s: &[f64], arm: f64) -> Around {
     let stencil = is_motion(series, arm).then(|| Stencil::of(series));
     Around::new(series, t_s, stencil.as_ref())
+}
+
+/// The series turned by `arcsec` in tracker axes, which is known at `t_s`, and beyond these as at the first and
+/// last. `None`: nothing is known.
+pub(crate) fn turned_by(
+    series: &AttitudeSeries,
+    t_s: &[f64],
+    arcsec: &[Vector3<f64>],
+) -> Option<AttitudeSeries> {
+    let [x, y, z] = [0, 1, 2].map(|axis| {
+        let values = arcsec.iter().map(|turn| turn[axis]).collect();
+        Series::new(t_s.to_vec(), values).ok()
+    });
+    let axes = [x?, y?, z?];
+    let (first, last) = (*t_s.first()?, *t_s.last()?);
+    let turned = series.t_s().iter().zip(series.quaternions());
+    let turned = turned.map(|(t, q)| {
+        let turn = axes.each_ref().map(|axis| axis.at(t.clamp(first, last)));
+        let turn = turn.map(|arcsec| arcsec.unwrap_or(0.0) / ARCSEC_PER_RAD);
+        rotation_from_vector(&Vector3::from(turn)) * q
+    });
+    let rates = series.given_rates_rad_s().map(<[_]>::to_vec);
+    let turned = AttitudeSeries::new(series.t_s().to_vec(), turned.collect(), rates).ok()?;
+    Some(turned.with_max_gap_s(series.max_gap_s()))
 }
 
 /// Whether it is not known how the tracker moved around each of the times, where it is around others.

@@ -12,7 +12,9 @@ use crate::attitude::data::{AttitudeData, AttitudeEvidence};
 use crate::attitude::declared_effects;
 use crate::attitude::search;
 use crate::attitude::spatial_errors::SpatialErrors;
+use crate::attitude::steadied::steadied;
 use crate::bins;
+use crate::causes::SMEAR;
 use crate::close::{Closed, Rival, catalogue_candidates};
 use crate::declared;
 use crate::error::CloseError;
@@ -70,7 +72,8 @@ pub(crate) fn run(
         });
     }
     let folds = Folds::cut(data.t_s.len());
-    let motion = &motion::around(reference, &data.t_s, 1.0);
+    let around = motion::around(reference, &data.t_s, 1.0);
+    let mut motion = &around;
     if !motion.resolved() {
         data.rate = std::array::from_fn(|_| vec![0.0; data.t_s.len()]);
     }
@@ -84,7 +87,7 @@ pub(crate) fn run(
     progress("searching for causes");
     let scene = scene(situation, &data);
     let changes = SpatialErrors::declared(situation, &data.t_s);
-    let search = |data: &AttitudeData, put_forward: &[Arc<dyn Candidate>]| {
+    let search = |data: &AttitudeData, motion: &Around, put_forward: &[Arc<dyn Candidate>]| {
         let mut list = catalogue_candidates(&scene);
         list.retain(|c| c.acts_on_attitude());
         list.extend(leftover_terms(situation, data));
@@ -101,10 +104,21 @@ pub(crate) fn run(
             start,
         )?;
         let inside = in_sample(&with_noise(noise), data.t_s.len(), &found);
-        let series = inside.map(|inside| tracks(data, &inside, changes.as_ref()));
-        Ok::<_, CloseError>((found, noise, refused, series))
+        let series = inside
+            .as_ref()
+            .map(|inside| tracks(data, inside, changes.as_ref()));
+        Ok::<_, CloseError>((found, noise, refused, series, inside))
     };
-    let (mut found, mut noise, mut refused, mut series) = search(&data, &[])?;
+    let (mut found, mut noise, mut refused, mut series, inside) = search(&data, motion, &[])?;
+    let steady = inside
+        .filter(|_| !motion.by_rates() && found.chosen().any(|c| c.id() == SMEAR))
+        .and_then(|inside| steadied(&data, reference, &inside, &noise));
+    let steady = steady.map(|path| motion::around(&path, &data.t_s, 1.0).without_error());
+    if let Some(steady) = &steady {
+        progress("searching again along the path less the reference's slow error");
+        motion = steady;
+        (found, noise, refused, series, _) = search(&data, motion, &[])?;
+    }
     let line = series.as_ref().and_then(Series::shared_line);
     let jump = series.as_ref().and_then(Series::shared_jump);
     let mut put_forward: Vec<_> = line
@@ -125,7 +139,7 @@ pub(crate) fn run(
         if line.is_some_and(|line| !data.bins.resolve(line.frequency_hz)) {
             data.rebin(&folds, leftover::MOST_POINTS);
         }
-        let again = search(&data, &put_forward)?;
+        let again = search(&data, motion, &put_forward)?;
         let rivals = search::rivals(
             &|noise| evidence(&data, situation, noise, motion),
             &data,
@@ -137,7 +151,7 @@ pub(crate) fn run(
         let theirs = orbits::is_beaten(&again.0, &rivals, search::follows_a_channel);
         // what was put forward in vain changes nothing
         if again.0.names_one_of_the_last(put_forward.len()) && !theirs {
-            (found, noise, refused, series) = again;
+            (found, noise, refused, series, _) = again;
         } else {
             data.rebin(&folds, bins::MOST);
         }

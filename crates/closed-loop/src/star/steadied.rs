@@ -14,9 +14,10 @@
 //! Source: Henderson 1975 (best linear unbiased prediction); Fuller 1987 (regression calibration).
 
 use coloured_noise::Rotations;
-use focal_plane::{ARCSEC_PER_RAD, AttitudeSeries, Series, rotation_from_vector};
+use focal_plane::AttitudeSeries;
 use nalgebra::Vector3;
 
+use crate::motion::turned_by;
 use crate::star::data::StarData;
 use crate::star::frame_rotation::Turns;
 use crate::star::search::Wander;
@@ -44,19 +45,7 @@ pub(crate) fn steadied(
     let noise = &wander.noise;
     let frames = vec![1; t_s.len()];
     let slow = Rotations::new(t_s.clone(), theta, frames, inverse, noise.centroid).slow_part(noise);
-    let [x, y, z] = [0, 1, 2].map(|axis| {
-        let series = slow.iter().map(|m| m[axis]).collect();
-        Series::new(t_s.clone(), series).ok()
-    });
-    let (slow, back) = ([x?, y?, z?], data.turn().inverse());
-    let (first, last) = (*t_s.first()?, *t_s.last()?);
-    let steady = reference.t_s().iter().zip(reference.quaternions());
-    let steady = steady.map(|(t, q)| {
-        let error = slow.each_ref().map(|m| m.at(t.clamp(first, last)));
-        let error = error.map(|m| m.unwrap_or(0.0) / ARCSEC_PER_RAD);
-        rotation_from_vector(&(back * Vector3::from(error))) * q
-    });
-    let rates = reference.given_rates_rad_s().map(<[_]>::to_vec);
-    let steady = AttitudeSeries::new(reference.t_s().to_vec(), steady.collect(), rates).ok()?;
-    Some(steady.with_max_gap_s(reference.max_gap_s()))
+    let back = data.turn().inverse();
+    let slow: Vec<_> = slow.iter().map(|m| back * m).collect();
+    turned_by(reference, t_s, &slow)
 }

@@ -7,7 +7,7 @@
 //!
 //! phi is the cubic with these four values; its error falls as h^4 where rates are given. A missing
 //! rate comes from the neighbours, two on each side where there are as many: of the polynomial through
-//! (t_j, log(q[j] q[i]^-1)) and zero at t = 0
+//! (`t_j`, log(q[j] q[i]^-1)) and zero at t = 0
 //!
 //! ```text
 //! -omega[i] = sum_j phi_j (1/t_j) prod over k /= j of t_k / (t_k - t_j)
