@@ -13,8 +13,10 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use super::Layout;
 use super::out_of_fold::gaussian;
 
-/// Share of a column's information that it is given beside.
+/// Share of a column's information that it is given beside, where it needs any.
 const FLOOR: f64 = 1e-10;
+/// Share of it beside all other columns below which it needs some.
+const TOLD: f64 = 10.0 * FLOOR;
 
 /// The nuisance eliminated on one training set.
 #[derive(Clone, Debug)]
@@ -42,21 +44,30 @@ impl Eliminated {
     ) -> Option<Self> {
         let n = layout.nuisance_precision.nrows();
         let mut normal = gram.view((0, 0), (n, n)).into_owned();
-        // A column that nothing constrains (a gauge freedom, a star never seen in training) gets a precision far
-        // below what one scalar of data brings: of its own, for columns have all sorts of units.
+        // A star never seen in training gets a precision far below what one scalar of data brings.
         let most = normal.diagonal().max().max(f64::MIN_POSITIVE);
         let mut prior = &layout.nuisance_precision * variance;
-        for k in 0..n {
-            let own = normal[(k, k)];
-            let told = own > FLOOR * FLOOR * most;
-            prior[(k, k)] += FLOOR * if told { own } else { most };
+        let own: Vec<f64> = normal.diagonal().iter().copied().collect();
+        let seen = |k: usize| own[k] > FLOOR * FLOOR * most;
+        for k in (0..n).filter(|&k| !seen(k)) {
+            prior[(k, k)] += FLOOR * most;
         }
         normal += &prior;
+        let mut factor = Cholesky::new(normal.clone()).filter(|factor| tells_all(factor, &normal));
+        if factor.is_none() {
+            // So does a gauge freedom: of its own information, for columns have all sorts of units. Where none is, that
+            // would draw an angle of 1e5 of its sigmas to zero by dozens of nats, and by less beside slow noise.
+            for k in (0..n).filter(|&k| seen(k)) {
+                prior[(k, k)] += FLOOR * own[k];
+                normal[(k, k)] += FLOOR * own[k];
+            }
+            factor = Cholesky::new(normal);
+        }
         let cross = picked(gram, 0..n, pick);
         let (nuisance, log_det) = if n == 0 {
             (cross.clone(), 0.0)
         } else {
-            let factor = Cholesky::new(normal)?;
+            let factor = factor?;
             (factor.solve(&cross), factor.ln_determinant())
         };
         let mut reduced = both(gram, pick);
@@ -164,6 +175,12 @@ impl Eliminated {
     pub(super) fn left(&self, set: &[usize], beta: &DVector<f64>) -> DVector<f64> {
         less(&self.nuisance, set, beta)
     }
+}
+
+/// Whether each column of a normal matrix is told beside those before it.
+fn tells_all(factor: &Cholesky<f64, Dyn>, normal: &DMatrix<f64>) -> bool {
+    let pivots = factor.l_dirty();
+    (0..normal.nrows()).all(|k| pivots[(k, k)].powi(2) > TOLD * normal[(k, k)])
 }
 
 /// How well a set describes some data, all amplitudes integrated out.
