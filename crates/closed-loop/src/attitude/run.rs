@@ -27,7 +27,7 @@ use crate::questions::manoeuvre::attitudes::fly;
 use crate::search::empirical::{Empirical, Variable, range};
 use crate::search::instants;
 use crate::search::orbits::{self, Look};
-use crate::search::refusal::Refused;
+use crate::search::refusal::{Refusal, Refused};
 use crate::search::selection::columns_of;
 use crate::search::{Found, amplitudes, borrowed, fit};
 use crate::situation::{Situation, channels_of_interest};
@@ -110,8 +110,9 @@ pub(crate) fn run(
         Ok::<_, CloseError>((found, noise, refused, series, inside))
     };
     let (mut found, mut noise, mut refused, mut series, inside) = search(&data, motion, &[])?;
+    let is_smeared = |found: &Found| found.chosen().any(|c| c.id() == SMEAR);
     let steady = inside
-        .filter(|_| !motion.by_rates() && found.chosen().any(|c| c.id() == SMEAR))
+        .filter(|_| !motion.by_rates() && is_smeared(&found))
         .and_then(|inside| steadied(&data, reference, &inside, &noise));
     let steady = steady.map(|path| motion::around(&path, &data.t_s, 1.0).without_error());
     if let Some(steady) = &steady {
@@ -155,6 +156,9 @@ pub(crate) fn run(
         } else {
             data.rebin(&folds, bins::MOST);
         }
+    }
+    if steady.is_some() && !is_smeared(&found) {
+        refused.insert(SMEAR.to_owned(), Refusal::OwnPath);
     }
     let bins = &data.bins.folds;
     let with_noise = |noise: [Coloured; 3]| evidence(&data, situation, noise, motion);
