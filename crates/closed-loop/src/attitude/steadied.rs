@@ -61,7 +61,7 @@ mod tests {
     /// A wander e of s = 0.5 arcsec over T = 120 s at h = 0.25 s beside white noise of w = 0.13 arcsec: the smoothed
     /// error has a variance of about s^2 / sqrt(1 + 2 T s^2 / (h w^2)), here 0.042^2, an axis, and its product with what
     /// is left has a mean of zero where that of e itself is -s^2. The tracker's attitudes are a rotation theta from the
-    /// reference's, q = exp(theta) q_ref: the wrong sign would double the error.
+    /// reference's: the wrong sign would double the error.
     #[test]
     fn the_path_loses_the_error_of_its_reference() {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(5);
