@@ -322,19 +322,20 @@ pub(crate) fn joined(
     found: Found,
     may: &[bool],
 ) -> Result<Found, CloseError> {
+    let part_of = |g: usize| {
+        let candidate = found.candidates[g].as_ref();
+        candidate.part().map(|_| family(candidate))
+    };
     let mut candidates = found.candidates.clone();
     let mut chosen = Vec::new();
     for &g in &found.selection.chosen {
-        let part_of = |&c: &usize| {
-            let both = [g, c].map(|c| found.candidates[c].as_ref());
-            let parts = both.iter().all(|c| c.part().is_some());
-            parts && family(both[0]) == family(both[1])
-        };
-        if chosen.iter().any(part_of) {
+        let effect = part_of(g);
+        if effect.is_some() && chosen.iter().any(|&c| part_of(c) == effect) {
             continue;
         }
-        let of_it = found.selection.chosen.iter().copied().filter(part_of);
-        let mut parts: Vec<u32> = of_it.filter_map(|c| found.candidates[c].part()).collect();
+        let same = found.selection.chosen.iter().copied();
+        let same = same.filter(|&c| part_of(c) == effect);
+        let mut parts: Vec<u32> = same.filter_map(|c| found.candidates[c].part()).collect();
         parts.sort_unstable();
         if parts.len() > 1
             && let Some(whole) = candidates[g].of_parts(&parts)

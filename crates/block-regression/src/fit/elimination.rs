@@ -15,8 +15,8 @@ use super::out_of_fold::gaussian;
 
 /// Share of a column's information that it is given beside, where it needs any.
 const FLOOR: f64 = 1e-10;
-/// Share of it beside all other columns below which it needs some.
-const TOLD: f64 = 10.0 * FLOOR;
+/// Share of it beside other columns below which rounding is all that tells it from them.
+const TOLD: f64 = 1e-9;
 
 /// The nuisance eliminated on one training set.
 #[derive(Clone, Debug)]
@@ -53,16 +53,15 @@ impl Eliminated {
             prior[(k, k)] += FLOOR * most;
         }
         normal += &prior;
-        let mut factor = Cholesky::new(normal.clone()).filter(|factor| tells_all(factor, &normal));
-        if factor.is_none() {
+        let factor = told_apart(&normal).or_else(|| {
             // So does a gauge freedom: of its own information, for columns have all sorts of units. Where none is, that
             // would draw an angle of 1e5 of its sigmas to zero by dozens of nats, and by less beside slow noise.
             for k in (0..n).filter(|&k| seen(k)) {
                 prior[(k, k)] += FLOOR * own[k];
                 normal[(k, k)] += FLOOR * own[k];
             }
-            factor = Cholesky::new(normal);
-        }
+            Cholesky::new(normal)
+        });
         let cross = picked(gram, 0..n, pick);
         let (nuisance, log_det) = if n == 0 {
             (cross.clone(), 0.0)
@@ -125,14 +124,7 @@ impl Eliminated {
         if (0..set.len()).any(|i| normal[(i, i)].is_nan() || normal[(i, i)] <= 0.0) {
             return None;
         }
-        let factor = Cholesky::new(normal.clone())?;
-        // Collinear within rounding: the set cannot be told apart in this data.
-        let pivots = factor.l_dirty();
-        for i in 0..set.len() {
-            if pivots[(i, i)] * pivots[(i, i)] < 1e-9 * normal[(i, i)] {
-                return None;
-            }
-        }
+        let factor = told_apart(&normal)?;
         let beta = factor.solve(&score);
         Some((beta, factor))
     }
@@ -177,10 +169,12 @@ impl Eliminated {
     }
 }
 
-/// Whether each column of a normal matrix is told beside those before it.
-fn tells_all(factor: &Cholesky<f64, Dyn>, normal: &DMatrix<f64>) -> bool {
+/// The factor of a normal matrix; `None` where a column cannot be told from those before it.
+fn told_apart(normal: &DMatrix<f64>) -> Option<Cholesky<f64, Dyn>> {
+    let factor = Cholesky::new(normal.clone())?;
     let pivots = factor.l_dirty();
-    (0..normal.nrows()).all(|k| pivots[(k, k)].powi(2) > TOLD * normal[(k, k)])
+    let told = |k: usize| pivots[(k, k)].powi(2) >= TOLD * normal[(k, k)];
+    (0..normal.nrows()).all(told).then_some(factor)
 }
 
 /// How well a set describes some data, all amplitudes integrated out.

@@ -112,7 +112,8 @@ pub(crate) fn run(
     let (mut found, mut noise, mut refused, mut series, inside) = search(&data, motion, &[])?;
     let is_smeared = |found: &Found| found.chosen().any(|c| c.id() == SMEAR);
     let steady = inside
-        .filter(|_| !motion.by_rates() && is_smeared(&found))
+        .filter(|_| !motion.by_rates() && noise.iter().any(|n| n.slow > 0.0))
+        .filter(|_| is_smeared(&found))
         .and_then(|inside| steadied(&data, reference, &inside, &noise));
     let steady = steady.map(|path| motion::around(&path, &data.t_s, 1.0).without_error());
     if let Some(steady) = &steady {
