@@ -16,6 +16,7 @@
 mod bursts;
 mod follows;
 mod judge;
+mod levels;
 mod rows;
 #[cfg(test)]
 mod tests;

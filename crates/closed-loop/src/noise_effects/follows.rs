@@ -11,7 +11,8 @@
 //!
 //! of which the larger chance counts. Of the time, stretches of a fifth, a tenth and a twentieth are tried, too: noise
 //! may come in bursts. What differs between stars alone (colour, place) is held
-//! against the scatter of their levels about a line in magnitude, as is each star. Residuals
+//! against the scatter of their levels about a line in magnitude, as is each star
+//! ([`super::levels`]). Residuals
 //! that are slow are no noise: what changes from frame to frame has to tell the same.
 //!
 //! Source: Breusch & Pagan 1979, studentised by Koenker 1981; clusters as in Liang & Zeger 1986.
@@ -19,7 +20,7 @@
 use block_regression::Folds;
 use nalgebra::{Cholesky, DMatrix, DVector};
 use rayon::prelude::*;
-use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor, StudentsT};
+use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
 use telemetry::report::{Dependence, Unattributed};
 
 use super::bursts::burst;
@@ -37,19 +38,9 @@ const ALPHA: f64 = 0.001;
 const SPIKE: f64 = 24.0;
 /// Least rms of a column over the rows of a star, of 1: less is no change.
 const LEAST_CHANGE: f64 = 0.05;
-/// Fewest rows of a star with a level, stars that are compared, and blocks of time.
-const MIN_ROWS: usize = 50;
-const MIN_STARS: usize = 8;
-/// Fewest where it is known how they usually scatter.
-const MIN_USUAL_STARS: usize = 5;
-/// A star with fewer rows than this part of the most is not compared.
-const SELDOM: usize = 20;
+/// Fewest rows of a star with a level, and blocks of time.
+pub(super) const MIN_ROWS: usize = 50;
 const MIN_BLOCKS: usize = 10;
-/// Most odd stars.
-const MOST_ODD: usize = 3;
-/// By how much stars differ for no reason (logarithm of the variance), and how many that is known from.
-const SCATTER: f64 = 0.02;
-const PRIOR: f64 = 8.0;
 const MEDIAN: f64 = std::f64::consts::LN_2;
 
 /// What the noise follows, most certain first.
@@ -147,6 +138,19 @@ pub(crate) fn noise_follows(
     }
     found.retain(|d| d.p_value < ALPHA);
     found.sort_by(|a, b| a.p_value.total_cmp(&b.p_value));
+    // stars that differ all over are told where nothing says by what
+    if found.is_empty()
+        && let Some([p, share]) = both(all.scatter(), fast.scatter())
+    {
+        let p_value = p * (tried + 1) as f64;
+        if p_value < ALPHA {
+            found.push(Dependence {
+                variable: "star".to_owned(),
+                variance_explained: share,
+                p_value,
+            });
+        }
+    }
     Ok(NoiseFollows(first_of_each(found, |d| &d.variable)))
 }
 
@@ -171,9 +175,9 @@ pub(super) struct Table {
 
 /// A variable in the rows of a table.
 pub(super) struct Columns {
-    rows: Vec<[f64; 2]>,
+    pub(super) rows: Vec<[f64; 2]>,
     /// Over the rows of each star.
-    mean: Vec<[f64; 2]>,
+    pub(super) mean: Vec<[f64; 2]>,
 }
 
 impl Columns {
@@ -314,148 +318,11 @@ impl Table {
         let p = law.sf(square / k);
         Some([p.max(p_white), (beta.dot(&score).max(0.0) / n).sqrt()])
     }
-
-    /// Stars that are compared: logarithm of the level, magnitude, and the number of the star.
-    fn compared(&self) -> Vec<(f64, f64, usize)> {
-        let most = self.stars.iter().map(|s| s.1).max().unwrap_or(0);
-        let enough = MIN_ROWS.max(most / SELDOM);
-        let each = self.stars.iter().enumerate();
-        each.filter(|(_, (level, rows, _))| *rows >= enough && *level > 0.0)
-            .map(|(star, (level, _, mag))| (level.ln(), *mag, star))
-            .collect()
-    }
-
-    /// A column of a variable of stars beside a line in magnitude, held against the scatter of their levels.
-    fn between(&self, columns: &Columns, k: usize) -> Option<Judged> {
-        let stars = self.compared();
-        let y: Vec<f64> = stars.iter().map(|s| s.0).collect();
-        let f: Vec<f64> = stars.iter().map(|s| columns.mean[s.2][k]).collect();
-        let mag: Vec<f64> = stars.iter().map(|s| s.1).collect();
-        let (p, left) = beside_line(&y, &f, &mag, None)?;
-        Some([p, left])
-    }
-
-    /// The star whose level lies farthest off the others', those set aside that are farther off still: one
-    /// odd star hides another (Rosner 1983).
-    fn odd_star(&self) -> Option<Judged> {
-        let mut stars = self.compared();
-        let mut best: Option<Judged> = None;
-        for stage in 1..=MOST_ODD {
-            let Some((at, [p, share])) = self.oddest(&stars) else {
-                break;
-            };
-            let p = (p * (stars.len() * stage) as f64).min(1.0);
-            if best.is_none_or(|b| p < b[0]) {
-                best = Some([p, share]);
-            }
-            stars.remove(at);
-        }
-        best
-    }
-
-    /// The one of `stars` whose level lies farthest off the others'.
-    fn oddest(&self, stars: &[(f64, f64, usize)]) -> Option<(usize, Judged)> {
-        let y: Vec<f64> = stars.iter().map(|s| s.0).collect();
-        let mag: Vec<f64> = stars.iter().map(|s| s.1).collect();
-        let rows = |k: usize| self.stars[stars[k].2].1 as f64;
-        let sampling = (0..stars.len()).map(|k| rows(k).recip()).sum::<f64>() / stars.len() as f64;
-        let usual = Some(sampling + SCATTER * SCATTER);
-        let each = (0..stars.len()).filter_map(|k| {
-            let alone: Vec<f64> = (0..stars.len())
-                .map(|j| f64::from(u8::from(j == k)))
-                .collect();
-            let (p, share) = beside_line(&y, &alone, &mag, usual)?;
-            // a star that was seen for a moment scatters by itself: half a square of two axes has
-            // variance 1, and so has the logarithm of its mean over one row
-            let one = (stars.len() as f64).recip();
-            let off = share / (one * (1.0 - one)).sqrt();
-            let own = ChiSquared::new(1.0).ok()?.sf(off * off * rows(k));
-            Some((k, [p.max(own), share]))
-        });
-        each.min_by(|a, b| a.1[0].total_cmp(&b.1[0]))
-    }
-}
-
-/// The chance of the slope of `y` along `f` beside a constant and a line in `mag` (which 0
-/// throughout stands for unknown), and the rms of what it takes. The variance is what is left, and counts
-/// beside the `usual` one as where that is known from [`PRIOR`] others (Smyth 2004).
-fn beside_line(y: &[f64], f: &[f64], mag: &[f64], usual: Option<f64>) -> Option<(f64, f64)> {
-    let n = y.len();
-    let known = mag.iter().any(|m| (m - mag[0]).abs() > 1e-6);
-    let columns = 2 + usize::from(known);
-    let (fewest, prior, usual) =
-        usual.map_or((MIN_STARS, 0.0, 0.0), |v| (MIN_USUAL_STARS, PRIOR, v));
-    if n < fewest {
-        return None;
-    }
-    let design = DMatrix::from_fn(n, columns, |i, j| [f[i], 1.0, mag[i]][j]);
-    let factor = Cholesky::new(design.transpose() * &design)?;
-    let y = DVector::from_column_slice(y);
-    let beta = factor.solve(&(design.transpose() * &y));
-    let squares = (&y - &design * &beta).norm_squared();
-    let freedom = prior + (n - columns) as f64;
-    let left = (prior * usual + squares) / freedom;
-    let variance = factor.inverse()[(0, 0)] * left;
-    let law = StudentsT::new(0.0, 1.0, freedom).ok()?;
-    let t = beta[0] / variance.sqrt();
-    let p = 2.0 * law.sf(t.abs());
-    let mean = f.iter().sum::<f64>() / n as f64;
-    let spread = f.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n as f64;
-    t.is_finite().then(|| (p, beta[0].abs() * spread.sqrt()))
 }
 
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-
-    /// Eleven stars of 10 000 rows, whose levels are known to 1 %, and one of `rows` at `level`.
-    fn odd(level: f64, rows: usize) -> f64 {
-        let usual = (0..11).map(|k| (1.0 + 0.01 * f64::from(k - 5), 10_000, 0.1 * f64::from(k)));
-        let table = Table {
-            rows: Vec::new(),
-            relative: Vec::new(),
-            stars: usual.chain([(level, rows, 0.5)]).collect(),
-            blocks: 0,
-        };
-        table.odd_star().unwrap()[0]
-    }
-
-    /// Of twenty stars two are noisier, by half as much again: the one stands far off the others only once the
-    /// other is set aside (with it their levels scatter by 0.2, of which 0.8 is 4 sigma).
-    #[test]
-    fn an_odd_star_does_not_hide_another() {
-        let usual = (0..18).map(|k| (1.0 + 0.01 * f64::from(k % 5), 1000, 0.1 * f64::from(k)));
-        let table = Table {
-            rows: Vec::new(),
-            relative: Vec::new(),
-            stars: usual.chain([(2.2, 1000, 0.7), (2.3, 1000, 1.1)]).collect(),
-            blocks: 0,
-        };
-        assert!(table.odd_star().unwrap()[0] < 1e-6);
-        // the same number of stars that all differ like that for no reason
-        let table = Table {
-            stars: (0..20)
-                .map(|k| (if k % 3 == 0 { 2.2 } else { 1.0 }, 1000, 0.1 * f64::from(k)))
-                .collect(),
-            ..table
-        };
-        assert!(table.odd_star().unwrap()[0] > 0.05);
-    }
-
-    /// Of six stars one is noisier, by 1.7 times: 1.06 in the logarithm of the variance, which 350 rows of a star
-    /// tell to 0.053 and a line through five others to some 0.08.
-    #[test]
-    fn six_stars_are_enough_for_one_to_be_odd() {
-        let usual = (0..5).map(|k| (1.0 + 0.03 * f64::from(k % 3), 350, 0.3 * f64::from(k)));
-        let table = |level: f64| Table {
-            rows: Vec::new(),
-            relative: Vec::new(),
-            stars: usual.clone().chain([(level, 350, 0.7)]).collect(),
-            blocks: 0,
-        };
-        assert!(table(2.9).odd_star().unwrap()[0] < 1e-5);
-        assert!(table(1.1).odd_star().unwrap()[0] > 0.05);
-    }
 
     /// One star over twelve blocks of 200 rows, whose level goes with the time from -1 to 1, which is in the columns.
     pub(in crate::noise_effects) fn in_time(level: impl Fn(f64) -> f64) -> (Table, Columns) {
@@ -499,43 +366,11 @@ pub(super) mod tests {
         table.within(&columns, 1).unwrap()[0]
     }
 
-    /// Twelve stars of 1000 rows across the field, noisier at both edges: no slope, and a parabola.
-    #[test]
-    fn stars_at_the_edges_may_be_noisier() {
-        let x = |k: usize| k as f64 / 5.5 - 1.0;
-        let level = |k: usize| (0.4 * x(k) * x(k) + 0.01 * (k % 3) as f64).exp();
-        let table = Table {
-            rows: Vec::new(),
-            relative: Vec::new(),
-            stars: (0..12)
-                .map(|k| (level(k), 1000, (k * 5 % 12) as f64))
-                .collect(),
-            blocks: 0,
-        };
-        let mean = (0..12).map(|k| [x(k), 1.5 * x(k) * x(k) - 0.5]).collect();
-        let columns = Columns {
-            rows: Vec::new(),
-            mean,
-        };
-        let [slope, bent] = [0, 1].map(|k| table.between(&columns, k).unwrap()[0]);
-        assert!(bent < 1e-6 && slope > 0.1, "{bent} {slope}");
-    }
-
     /// A rise of 0.5 is known to sqrt(3 / 2400) = 0.035: 14 sigma. Scores of the blocks grow with the square of
     /// the time, which is what they follow and no scatter.
     #[test]
     fn noise_that_grows_is_seen_in_a_dozen_blocks() {
         assert!(chance_in_time(0.5) < 1e-6, "{}", chance_in_time(0.5));
         assert!(chance_in_time(0.0) > 0.01, "{}", chance_in_time(0.0));
-    }
-
-    /// Of 600 rows a level is known to 4 %: 10 % more are 2.3 sigma, and the worst of twelve stars lies
-    /// there by chance in one of five. Of 60 it is not compared: what is left are the levels of the others,
-    /// evenly spread.
-    #[test]
-    fn a_star_that_was_seen_for_a_moment_is_not_odd() {
-        assert!(odd(1.1, 10_000) < 1e-3);
-        assert!(odd(1.1, 600) > 0.05);
-        assert!(odd(1.3, 60) > 0.05);
     }
 }
