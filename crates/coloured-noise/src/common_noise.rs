@@ -13,6 +13,15 @@
 //! The slow parts are those of greatest likelihood axis by axis, the white ones of all axes together
 //! (joint.rs): stars off the boresight know one mixture of rotations far better than any axis of it.
 //!
+//! By itself an axis is known to `sigma^2 / n_k + white^2`, `n_k` stars' worth: where the frames' stars come and go,
+//! a white part of the reference is not in proportion to theirs, and what stays the same from frame to frame is
+//! what a slow part has, too. So both laws are held against the data, with and without the white part that
+//! changes from frame to frame show, to which a slow part adds next to nothing:
+//!
+//! ```text
+//! white^2 = mean ( (y_k+1 - y_k)^2 - sigma^2 (1/n_k + 1/n_k+1) ) / 2       n'_k = sigma^2 / (sigma^2 / n_k + white^2)
+//! ```
+//!
 //! Source: Brown & Hwang 2012, ch. 4 (Gauss-Markov process).
 
 use nalgebra::{DMatrix, Matrix3, Vector3};
@@ -24,6 +33,8 @@ use crate::smoother::slow_part;
 
 /// Half the relative difference of two noises that serve a fit alike.
 const ALIKE: f64 = 0.02;
+/// Sigmas beyond which changes from bin to bin show white noise of the reference.
+const BEYOND_CHANCE: f64 = 4.0;
 
 /// What the residuals of stars against a reference are made of, all in one unit of angle.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -48,6 +59,8 @@ pub struct Rotations {
     inverse: Vec<Option<Matrix3<f64>>>,
     /// Stars' worth of each bin: the centroid variance over it is the mean's.
     count: [Vec<f64>; 3],
+    /// The same with the white noise that the changes between bins show, where they show any.
+    beside_white: [Option<Vec<f64>>; 3],
     centroid: f64,
 }
 
@@ -64,7 +77,10 @@ impl Rotations {
     ) -> Self {
         let mean = std::array::from_fn(|a| theta.iter().skip(a).step_by(3).copied().collect());
         let worth = |a: usize| move |v: &Option<Matrix3<f64>>| v.map_or(0.0, |v| v[(a, a)].recip());
-        let count = std::array::from_fn(|a| inverse.iter().map(worth(a)).collect());
+        let count: [Vec<f64>; 3] = std::array::from_fn(|a| inverse.iter().map(worth(a)).collect());
+        let mean: [Vec<f64>; 3] = mean;
+        let beside_white =
+            std::array::from_fn(|a| beside_white(centroid, &mean[a], &count[a], &frames));
         Self {
             t_s,
             theta: DMatrix::from_vec(theta.len(), 1, theta),
@@ -72,6 +88,7 @@ impl Rotations {
             frames,
             inverse,
             count,
+            beside_white,
             centroid,
         }
     }
@@ -79,14 +96,14 @@ impl Rotations {
     /// The noise of greatest likelihood; started from `near` where there is one.
     pub fn noise(&self, near: Option<&CommonNoise>) -> CommonNoise {
         let of = |axis: usize| {
-            let (y, count) = (&self.mean[axis], &self.count[axis]);
             // rotations are no whiter than their stars: a slow part of less than a step between frames is
             // white noise by another name
-            let fitted = match near.map(|n| n.reference[axis]) {
-                Some(known) if known.slow > 0.0 => self.by_itself(axis, known),
-                _ => Coloured::fit_above(self.centroid, &self.t_s, y, count),
-            };
-            self.beside_centroids(axis, fitted)
+            let known = near.map(|n| n.reference[axis]).filter(|n| n.slow > 0.0);
+            let (fitted, count, _) = self.likeliest(axis, |y, count| match known {
+                Some(known) => self.near(known, axis, y, count),
+                None => Coloured::fit_above(self.centroid, &self.t_s, y, count),
+            });
+            self.beside_centroids(fitted, count, axis)
         };
         let (x, (y, z)) = rayon::join(|| of(0), || rayon::join(|| of(1), || of(2)));
         let apart = CommonNoise {
@@ -114,8 +131,7 @@ impl Rotations {
             if noise.reference[axis].slow <= 0.0 {
                 return 0.0;
             }
-            let with = self.by_itself(axis, noise.reference[axis]);
-            let likely = with.log_likelihood(&self.t_s, &self.mean[axis], &self.count[axis]);
+            let (_, _, likely) = self.by_itself(axis, noise.reference[axis]);
             2.0 * (likely - self.white_alone(axis))
         })
     }
@@ -131,10 +147,15 @@ impl Rotations {
 
     /// The slow error that is the same about X and Y, and the log-likelihood of both by themselves.
     fn alike(&self, noise: &CommonNoise) -> Option<(Coloured, f64)> {
-        let both = [0, 1].map(|axis| (self.mean[axis].as_slice(), self.count[axis].as_slice()));
         let starts = (0..2).filter(|&axis| noise.reference[axis].slow > 0.0);
         let fitted = starts.filter_map(|axis| {
-            let start = self.with_centroids(axis, noise.reference[axis]);
+            let (start, beside, _) = self.by_itself(axis, noise.reference[axis]);
+            let whole = std::ptr::eq(beside, &raw const self.count[axis]);
+            let both = [0, 1].map(|a| {
+                let count = self.beside_white[a].as_ref().filter(|_| !whole);
+                let count = count.unwrap_or(&self.count[a]);
+                (self.mean[a].as_slice(), count.as_slice())
+            });
             fit_alike(self.centroid, &self.t_s, &both, &start)
         });
         fitted.max_by(|a, b| a.1.total_cmp(&b.1))
@@ -184,27 +205,45 @@ impl Rotations {
         slow_part(noise, &filter, &self.theta)
     }
 
-    /// Log-likelihood of an axis's rotations under white noise.
+    /// Log-likelihood of an axis's rotations under white noise, in proportion to the stars' or not.
     fn white_alone(&self, axis: usize) -> f64 {
-        let (y, count) = (&self.mean[axis], &self.count[axis]);
-        let kept = count.iter().filter(|c| **c > 0.0).count().max(1) as f64;
-        let variance = y.iter().zip(count).map(|(y, c)| y * y * c).sum::<f64>() / kept;
-        Coloured {
-            white: variance.sqrt().max(self.centroid),
-            slow: 0.0,
-            tau_s: 1.0,
-        }
-        .log_likelihood(&self.t_s, y, count)
+        let white = |y: &[f64], count: &[f64]| {
+            let kept = count.iter().filter(|c| **c > 0.0).count().max(1) as f64;
+            let variance = y.iter().zip(count).map(|(y, c)| y * y * c).sum::<f64>() / kept;
+            Coloured {
+                white: variance.sqrt().max(self.centroid),
+                slow: 0.0,
+                tau_s: 1.0,
+            }
+        };
+        self.likeliest(axis, white).2
+    }
+
+    /// What `law` makes of an axis's rotations and the stars' worth of each bin, where that is likelier with the
+    /// white noise of the changes or without; that worth, and the log-likelihood.
+    fn likeliest<'a>(
+        &'a self,
+        axis: usize,
+        law: impl Fn(&[f64], &[f64]) -> Coloured,
+    ) -> (Coloured, &'a Vec<f64>, f64) {
+        let y = &self.mean[axis];
+        let of = |count: &'a Vec<f64>| {
+            let fitted = law(y, count);
+            (fitted, count, fitted.log_likelihood(&self.t_s, y, count))
+        };
+        let whole = of(&self.count[axis]);
+        let beside = self.beside_white[axis].as_ref().map(of);
+        beside.filter(|b| b.2 > whole.2).unwrap_or(whole)
     }
 
     /// The noise of an axis's rotations by themselves, from `reference` uphill; it has a slow part.
-    fn by_itself(&self, axis: usize, reference: Coloured) -> Coloured {
-        self.with_centroids(axis, reference).refit_above(
-            self.centroid,
-            &self.t_s,
-            &self.mean[axis],
-            &self.count[axis],
-        )
+    fn by_itself(&self, axis: usize, reference: Coloured) -> (Coloured, &Vec<f64>, f64) {
+        self.likeliest(axis, |y, count| self.near(reference, axis, y, count))
+    }
+
+    fn near(&self, reference: Coloured, axis: usize, y: &[f64], count: &[f64]) -> Coloured {
+        let start = self.with_centroids(axis, reference, count);
+        start.refit_above(self.centroid, &self.t_s, y, count)
     }
 
     /// Standard errors of the slow part of an axis, relative: of sigma and of tau. `None`: it has none.
@@ -213,39 +252,70 @@ impl Rotations {
         if reference.slow <= 0.0 {
             return None;
         }
-        self.by_itself(axis, reference).relative_sigma(
-            &self.t_s,
-            &self.mean[axis],
-            &self.count[axis],
-        )
+        let (own, count, _) = self.by_itself(axis, reference);
+        own.relative_sigma(&self.t_s, &self.mean[axis], count)
     }
 
-    /// Noise of a rotation with that of its centroids, in the unit of a centroid.
-    fn with_centroids(&self, axis: usize, reference: Coloured) -> Coloured {
+    /// Noise of a rotation with that of its centroids, in the unit of a centroid where bins are worth `count`.
+    fn with_centroids(&self, axis: usize, reference: Coloured, count: &[f64]) -> Coloured {
+        let frame = self.centroid.powi(2) / self.usual_count(axis) + reference.white.powi(2);
         Coloured {
-            white: self
-                .centroid
-                .hypot(reference.white * self.usual_count(axis).sqrt()),
+            white: (frame * self.usual(count)).sqrt().max(self.centroid),
             ..reference
         }
     }
 
     /// Takes the centroids' noise out again.
-    fn beside_centroids(&self, axis: usize, fitted: Coloured) -> Coloured {
-        let excess = fitted.white.powi(2) - self.centroid.powi(2);
+    fn beside_centroids(&self, fitted: Coloured, count: &[f64], axis: usize) -> Coloured {
+        let frame = fitted.white.powi(2) / self.usual(count);
+        let excess = frame - self.centroid.powi(2) / self.usual_count(axis);
         Coloured {
-            white: (excess.max(0.0) / self.usual_count(axis)).sqrt(),
+            white: excess.max(0.0).sqrt(),
             ..fitted
         }
     }
 
     fn usual_count(&self, axis: usize) -> f64 {
-        let bins = self.count[axis].iter().zip(&self.frames);
+        self.usual(&self.count[axis])
+    }
+
+    /// What a frame is worth where bins are worth `count`.
+    fn usual(&self, count: &[f64]) -> f64 {
+        let bins = count.iter().zip(&self.frames);
         let kept = bins.filter(|(c, _)| **c > 0.0);
         // a bin averages the reference's white noise as it does the centroids'
         let (stars, frames) = kept.fold((0.0, 0), |(s, n), (c, f)| (s + c, n + f));
         stars / frames.max(1) as f64
     }
+}
+
+/// Stars' worth of the bins of an axis with the reference's white noise as its changes show it beside the noise
+/// of the centroids; `None`: they show none beyond chance.
+fn beside_white(centroid: f64, y: &[f64], count: &[f64], frames: &[usize]) -> Option<Vec<f64>> {
+    let of_stars = |k: usize| centroid * centroid / count[k];
+    let pairs = (1..y.len()).filter(|&k| count[k - 1] > 0.0 && count[k] > 0.0);
+    let (mut excess, mut parts, mut squares, mut pairs_seen) = (0.0, 0.0, 0.0, 0.0_f64);
+    for k in pairs {
+        let known = of_stars(k) + of_stars(k - 1);
+        excess += (y[k] - y[k - 1]).powi(2) - known;
+        parts += (frames[k] as f64).recip() + (frames[k - 1] as f64).recip();
+        squares += known * known;
+        pairs_seen += 1.0;
+    }
+    // squares of neighbouring changes share a half of each
+    let chance = BEYOND_CHANCE * (3.0 * squares).sqrt();
+    if pairs_seen < 1.0 || excess <= chance {
+        return None;
+    }
+    let white = excess / parts;
+    let worth = |k: usize| {
+        if count[k] > 0.0 {
+            centroid * centroid / (of_stars(k) + white / frames[k] as f64)
+        } else {
+            0.0
+        }
+    };
+    Some((0..y.len()).map(worth).collect())
 }
 
 /// What slow errors gain in log-likelihood over white noise alone, nats, all axes held together.
@@ -317,6 +387,31 @@ mod tests {
                     (-0.5..24.0).contains(&ratio),
                     "seed {seed}: {ratio} {noise:?}"
                 );
+            }
+            let alike = white.alike_ratio(&noise);
+            assert!((0.0..24.0).contains(&alike), "seed {seed}: {alike}");
+        }
+    }
+
+    /// Frames whose stars' worth swings between 4 and 24 in 100 s, and a reference with twice the noise of 12 stars
+    /// as white noise: what stays the same from frame to frame is no slow error. A law in proportion to the stars'
+    /// worth alone told one by 100 nats and more.
+    #[test]
+    fn white_noise_beside_stars_that_come_and_go_is_not_slow() {
+        let worth = |k: usize| 14.0 + 10.0 * (0.0628 * STEP_S * k as f64).sin();
+        let frames = 1200;
+        for seed in 0..40 {
+            let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+            let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
+            let theta: Vec<f64> = (0..3 * frames)
+                .map(|k| CENTROID * (normal() / worth(k / 3).sqrt() + 0.577 * normal()))
+                .collect();
+            let inverse = (0..frames).map(|k| Some(Matrix3::identity() / worth(k)));
+            let t_s = (0..frames).map(|k| STEP_S * k as f64).collect();
+            let white = Rotations::new(t_s, theta, vec![1; frames], inverse.collect(), CENTROID);
+            let noise = white.noise(None);
+            for ratio in white.slow_ratio(&noise) {
+                assert!((-0.5..24.0).contains(&ratio), "seed {seed}: {ratio}");
             }
             let alike = white.alike_ratio(&noise);
             assert!((0.0..24.0).contains(&alike), "seed {seed}: {alike}");
