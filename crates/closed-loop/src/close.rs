@@ -11,47 +11,16 @@
 //! Source: formats.md of the design notes (`close` writes) for what *before*,
 //! *after*, the folds and the figures mean.
 
-use std::sync::Arc;
-
-use effects::Candidate;
-use telemetry::report::Report;
-use telemetry::{AttitudeResiduals, Bundle, DarkMap, Model, StarResiduals};
+use telemetry::{Bundle, Model};
 
 use crate::attitude;
 use crate::conventions;
 use crate::declared;
 use crate::error::CloseError;
+use crate::outcome::Closed;
 use crate::questions::hypothesis::Questions;
 use crate::situation::Situation;
 use crate::star;
-
-/// Everything a run of the loop finds.
-#[derive(Clone, Debug)]
-pub struct Closed {
-    /// The finished report.
-    pub report: Report,
-    /// The model with what was added.
-    pub model: Model,
-    /// Star residuals before and after, a row each.
-    pub stars: Option<StarResiduals>,
-    /// Attitude residuals before and after, a row each.
-    pub attitude: Option<AttitudeResiduals>,
-    /// The dark map, where one was estimated and adopted.
-    pub dark_map: Option<DarkMap>,
-    /// How rival explanations of the same leftover compare, each by itself.
-    pub rivals: Vec<Rival>,
-}
-
-/// One explanation of a leftover beside others.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Rival {
-    /// What was tried: one effect, or several joined by `+`.
-    pub what: String,
-    /// Out-of-fold rms of each axis, arcsec: x and y of stars, or X, Y, Z of attitudes.
-    pub rms_arcsec: Vec<f64>,
-    /// Gain in out-of-fold log-likelihood over the declared model, nats.
-    pub delta_loglik: f64,
-}
 
 /// Closes the loop between `model` and `bundle`. `progress` hears what is being
 /// done, in words.
@@ -85,13 +54,4 @@ pub fn close_asking(
     } else {
         attitude::run(&situation, progress)
     }
-}
-
-/// Candidates of every effect of the catalogue that the scene allows.
-pub(crate) fn catalogue_candidates(scene: &effects::Scene<'_>) -> Vec<Arc<dyn Candidate>> {
-    effects::catalogue()
-        .iter()
-        .flat_map(|kind| kind.candidates(scene))
-        .map(Arc::from)
-        .collect()
 }

@@ -30,10 +30,10 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 use telemetry::report::{Estimate, FoundEffect, Selector};
 use telemetry::{EffectEntry, EffectValue, WindowTable};
 
-use crate::close::Rival;
 use crate::error::CloseError;
 use crate::evidence::Evidence;
 use crate::figures;
+use crate::outcome::Rival;
 use crate::search::selection::{FAMILY_ALPHA, columns_of};
 use crate::search::{Fitted, amplitudes, borrowed, fit};
 use crate::star::data::StarData;

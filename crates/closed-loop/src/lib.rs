@@ -8,6 +8,7 @@
 //!
 //! ```text
 //! close              the door: model and bundle joined (situation, declared), then stars or attitudes
+//! outcome            what it hands back
 //! conventions        quaternions that are meant another way are refused before anything is made of them
 //! star  attitude     the two kinds of measurement, each with the order of its steps (run)
 //! evidence           what the search asks of either: sums over blocks, and residuals out of fold
@@ -38,14 +39,16 @@ mod gaps;
 mod image_level;
 mod motion;
 mod noise_effects;
+mod outcome;
 mod questions;
 mod search;
 mod situation;
 mod star;
 mod unexplained;
 
-pub use close::{Closed, Rival, close, close_asking};
+pub use close::{close, close_asking};
 pub use error::CloseError;
+pub use outcome::{Closed, Rival};
 pub use questions::hypothesis::Questions;
 
 /// Seeds of a trial of alarms and the most of them that may raise one: `seeds` and

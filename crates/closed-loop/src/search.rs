@@ -19,6 +19,7 @@ use crate::error::CloseError;
 use crate::evidence::{Amplitudes, Evidence};
 use selection::{Group, Selection, Trials, columns_of, costs};
 
+pub(crate) mod catalogue;
 pub(crate) mod empirical;
 pub(crate) mod instants;
 pub(crate) mod orbits;

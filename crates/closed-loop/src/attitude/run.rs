@@ -15,15 +15,16 @@ use crate::attitude::spatial_errors::SpatialErrors;
 use crate::attitude::steadied::steadied;
 use crate::bins;
 use crate::causes::SMEAR;
-use crate::close::{Closed, Rival, catalogue_candidates};
 use crate::declared;
 use crate::error::CloseError;
 use crate::evidence::{Amplitudes, Evidence, Residuals};
 use crate::figures;
 use crate::motion::{self, Around};
+use crate::outcome::{Closed, Rival};
 use crate::questions::confusion;
 use crate::questions::hypothesis::{self, Grounds};
 use crate::questions::manoeuvre::attitudes::fly;
+use crate::search::catalogue;
 use crate::search::empirical::{Empirical, Variable, range};
 use crate::search::instants;
 use crate::search::orbits::{self, Look};
@@ -88,7 +89,7 @@ pub(crate) fn run(
     let scene = scene(situation, &data);
     let changes = SpatialErrors::declared(situation, &data.t_s);
     let search = |data: &AttitudeData, motion: &Around, put_forward: &[Arc<dyn Candidate>]| {
-        let mut list = catalogue_candidates(&scene);
+        let mut list = catalogue::candidates(&scene);
         list.retain(|c| c.acts_on_attitude());
         list.extend(leftover_terms(situation, data));
         list.extend(put_forward.iter().cloned());

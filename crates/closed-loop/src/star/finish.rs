@@ -12,12 +12,12 @@ use telemetry::{DarkMap, Model, StarResiduals};
 
 use crate::causes::commonness::Slow;
 use crate::causes::description::{self, Described};
-use crate::close::Closed;
 use crate::error::CloseError;
 use crate::evidence::{Amplitudes, Evidence, Residuals};
 use crate::figures;
 use crate::image_level::{self, ImageLevel};
 use crate::noise_effects;
+use crate::outcome::Closed;
 use crate::questions::confusion;
 use crate::questions::hypothesis::{self, Grounds};
 use crate::questions::manoeuvre::stars::Sky;

@@ -16,12 +16,13 @@ use spectra::robust::median_step;
 
 use crate::causes::description;
 use crate::causes::{self, Named, Quest};
-use crate::close::{Closed, catalogue_candidates};
 use crate::declared;
 use crate::error::CloseError;
 use crate::figures;
 use crate::image_level::{self, Side};
 use crate::motion::{self, Around, gyro::with_rates, source};
+use crate::outcome::Closed;
+use crate::search::catalogue;
 use crate::search::orbits::{self, Look};
 use crate::situation::Situation;
 use crate::star::data::{Inputs, Star, StarData};
@@ -202,7 +203,7 @@ fn explain(
     let scene = scene(situation, data, &facts, &warm);
     let image = match &sides {
         Some(sides) => {
-            let mut others = catalogue_candidates(&scene);
+            let mut others = catalogue::candidates(&scene);
             others.retain(|c| c.acts_on_stars());
             let phase: Vec<_> = others
                 .extract_if(.., |c| c.id() == "pixel_phase_harmonics")
@@ -224,7 +225,7 @@ fn explain(
     let yields = description::could_yield(situation, data, rms);
     let named = |put_forward: &[Arc<dyn Candidate>]| {
         let candidates = || {
-            let mut list = catalogue_candidates(&scene);
+            let mut list = catalogue::candidates(&scene);
             // With raw windows a warm pixel is the dark map's business.
             list.retain(|c| c.acts_on_stars() && !(formed.is_some() && c.id() == "hot_pixel"));
             list.extend(put_forward.iter().cloned());
