@@ -28,11 +28,13 @@ use crate::search::selection::{columns_of, costs};
 use crate::search::{Found, borrowed, family, first_column, fit, joined};
 use crate::star::evidence::StarEvidence;
 use crate::star::search::{Searched, attempt, declared_noise};
+use changing_effect::{Changing, Inner, Way};
 use commonness::Slow;
 use description::{Described, Kept};
-use invariance::{Change, Changing, Inner, Way, changing};
+use invariance::{Change, changing};
 use stand_ins::{Part, describe, stand_ins};
 
+mod changing_effect;
 pub(crate) mod commonness;
 pub(crate) mod description;
 pub(crate) mod invariance;

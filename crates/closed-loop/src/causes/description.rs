@@ -1,7 +1,7 @@
 //! What is left beside the effects that were chosen, described.
 //!
 //! One pass over the stars holds the chosen effects, what each would be if it changed
-//! with something ([`crate::causes::invariance`]), and every term of one variable or of two
+//! with something ([`crate::causes::changing_effect`]), and every term of one variable or of two
 //! ([`crate::search::empirical`]). Whether an effect stands in for another cause, whether it is
 //! the same everywhere, and what the leftover follows are then algebra.
 //!
@@ -13,7 +13,7 @@ use focal_plane::{AttitudeSeries, Camera, PointsMut, VectorsMut};
 use spectra::robust::median_step;
 use std::sync::Arc;
 
-use crate::causes::invariance::{Changing, Inner, Way};
+use crate::causes::changing_effect::{Changing, Inner, Way};
 use crate::error::CloseError;
 use crate::figures::{self, Followed};
 use crate::search::empirical::{Empirical, Variable, flux_of, range};
