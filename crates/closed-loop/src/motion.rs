@@ -25,6 +25,7 @@
 
 mod around;
 pub(crate) mod gyro;
+mod neighbours;
 mod rates;
 mod stencil;
 

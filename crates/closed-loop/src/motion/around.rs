@@ -30,8 +30,9 @@ use nalgebra::{UnitQuaternion, Vector3};
 use rayon::prelude::*;
 use spectra::robust::median_step;
 
+use super::neighbours::{COEFFICIENTS, Place, SIDE};
 use super::rates::{divide, integrated, is_finite, slope};
-use super::stencil::{COEFFICIENTS, Place, SIDE, Stencil};
+use super::stencil::Stencil;
 use crate::gaps::GAP_STEPS;
 
 /// Neighbours on each side with rates.

@@ -13,8 +13,8 @@ use nalgebra::Vector3;
 use spectra::robust::median_step;
 use telemetry::RateTable;
 
+use super::neighbours::{SIDE, of_samples};
 use super::rates::{is_finite, that_tell_more};
-use super::stencil::{SIDE, of_samples};
 use crate::gaps::longest_step;
 
 /// Steps of the attitudes that one of the gyro may take: rounded times are no slower gyro.

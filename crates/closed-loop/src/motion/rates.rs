@@ -25,7 +25,7 @@ use focal_plane::{AttitudeSeries, rotation_vector};
 use nalgebra::Vector3;
 use spectra::robust::{self, median_step};
 
-use super::stencil::{COEFFICIENTS, MEDIAN, Place, SIDE, errors, predicted};
+use super::neighbours::{COEFFICIENTS, MEDIAN, Place, SIDE, errors, predicted};
 use crate::gaps::longest_step;
 
 /// Share of the attitudes' variance below which that of a step of the rates is well below.
@@ -36,7 +36,7 @@ const KNOWN: f64 = 0.9;
 const AGREES: f64 = 6.0;
 
 /// The bias of the measured rates of a series, rad/s, where they tell more than its attitudes, which are predicted
-/// with these squared errors ([`super::stencil::of_samples`]).
+/// with these squared errors ([`super::neighbours::of_samples`]).
 pub(crate) fn that_tell_more(series: &AttitudeSeries, own: &Vector3<f64>) -> Option<Vector3<f64>> {
     let rates = series.given_rates_rad_s()?;
     let step = median_step(series.t_s())?;
@@ -149,7 +149,7 @@ pub(crate) fn divide(nodes: &[f64], values: &mut [Vector3<f64>], slopes: &[Vecto
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::motion::stencil::of_samples;
+    use crate::motion::neighbours::of_samples;
     use focal_plane::rotation_from_vector;
     use rand_core::SeedableRng;
     use rand_distr::{Distribution, StandardNormal};
