@@ -18,6 +18,7 @@ mod follows;
 mod judge;
 mod levels;
 mod rows;
+mod squares;
 #[cfg(test)]
 mod tests;
 mod variance;

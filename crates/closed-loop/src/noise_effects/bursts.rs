@@ -4,18 +4,18 @@
 //! f = 1 in the stretch, 0 elsewhere;   per block and star   u = Z_in - m Z,   N = n_in (1 - 2 m) + m^2 n
 //! ```
 //!
-//! n and Z are rows and the sum of their z, m the share of the star's rows that lies in the stretch: `follows.rs` with
-//! a column of ones and noughts. Every stretch begins and ends at a fortieth of the time, so that sums over those
+//! n and Z are rows and the sum of their z, m the share of the star's rows that lies in the stretch: `squares.rs`
+//! with a column of ones and noughts. Every stretch begins and ends at a fortieth of the time, so that sums over those
 //! do for all.
 //!
-//! Source: a scan over stretches (Naus 1965); what each is worth, as in `follows.rs`.
+//! Source: a scan over stretches (Naus 1965); what each is worth, as in `squares.rs`.
 
 use std::collections::BTreeMap;
 
 use rayon::prelude::*;
 
-use super::follows::{Judged, Scores, Table, both};
 use super::rows::Row;
+use super::squares::{Judged, Scores, Table, both};
 
 /// Fortieths that a burst may last: a fifth, a tenth, a twentieth. Each begins at every half of its length.
 const LENGTHS: [usize; 3] = [8, 4, 2];
@@ -86,8 +86,8 @@ impl<'a> Cells<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::noise_effects::follows::Columns;
-    use crate::noise_effects::follows::tests::in_time;
+    use crate::noise_effects::squares::Columns;
+    use crate::noise_effects::squares::tests::in_time;
 
     /// Twice the variance in an eighth of the time, 300 rows: known to 1/sqrt(300), 17 sigma, of which a slope and a
     /// parabola take next to nothing. Without it 67 stretches are tried for nothing.

@@ -21,7 +21,7 @@
 use nalgebra::{Cholesky, DMatrix, DVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor, StudentsT};
 
-use super::follows::{Columns, Judged, MIN_ROWS, Table};
+use super::squares::{Columns, Judged, MIN_ROWS, Table};
 
 /// Fewest stars that are compared.
 const MIN_STARS: usize = 8;

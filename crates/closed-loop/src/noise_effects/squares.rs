@@ -1,0 +1,249 @@
+//! Squares of the residuals over their usual size, and whether they follow a column.
+//!
+//! Squares over what is claimed of their variance, and over the own level of
+//! every star, are 1 on average wherever one looks if the noise is the same. For a variable
+//! with columns f, less their mean over each star's rows,
+//!
+//! ```text
+//! z_i = q_i / (2 v_i L_star) - 1,   u = sum f_i z_i,   beta = N^-1 u,   N = sum f f'
+//! T^2 = u' V^-1 u,  V = sum over blocks of time of (u_b - N_b beta)(...)',   and  u' N^-1 u / var z  ~ chi2
+//! ```
+//!
+//! of which the larger chance counts.
+//!
+//! Source: Breusch & Pagan 1979, studentised by Koenker 1981; clusters as in Liang & Zeger 1986.
+
+use nalgebra::{Cholesky, DMatrix, DVector};
+use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
+
+use super::rows::{Row, Source};
+
+/// A square beyond this many times the usual is a spike's.
+const SPIKE: f64 = 24.0;
+/// Least rms of a column over the rows of a star, of 1: less is no change.
+const LEAST_CHANGE: f64 = 0.05;
+/// Fewest rows of a star with a level, and blocks of time.
+pub(super) const MIN_ROWS: usize = 50;
+const MIN_BLOCKS: usize = 10;
+const MEDIAN: f64 = std::f64::consts::LN_2;
+
+/// A chance, and the rms share of the variance that changes.
+pub(super) type Judged = [f64; 2];
+
+/// What all residuals tell, as far as what changes from frame to frame tells the same.
+pub(super) fn both(all: Option<Judged>, fast: Option<Judged>) -> Option<Judged> {
+    let (all, fast) = (all?, fast?);
+    Some([all[0].max(fast[0]), all[1]])
+}
+
+/// Squares over their usual size.
+pub(super) struct Table {
+    pub(super) rows: Vec<Row>,
+    /// Of each row, over the level of its star.
+    pub(super) relative: Vec<f64>,
+    /// Level of each star over the declared one, its rows, and magnitude - 5.
+    pub(super) stars: Vec<(f64, usize, f64)>,
+    pub(super) blocks: usize,
+}
+
+/// A variable in the rows of a table.
+pub(super) struct Columns {
+    pub(super) rows: Vec<[f64; 2]>,
+    /// Over the rows of each star.
+    pub(super) mean: Vec<[f64; 2]>,
+}
+
+impl Columns {
+    pub(super) fn of(table: &Table, column: impl Fn(&Row) -> [f64; 2]) -> Self {
+        let rows: Vec<[f64; 2]> = table.rows.iter().map(column).collect();
+        let mut mean = vec![[0.0; 2]; table.stars.len()];
+        for (row, f) in table.rows.iter().zip(&rows) {
+            let count = table.stars[row.star].1 as f64;
+            for k in 0..2 {
+                mean[row.star][k] += f[k] / count;
+            }
+        }
+        Self { rows, mean }
+    }
+}
+
+/// u and N of some columns.
+#[derive(Clone)]
+pub(super) struct Scores {
+    pub(super) score: DVector<f64>,
+    pub(super) normal: DMatrix<f64>,
+}
+
+impl Scores {
+    pub(super) fn zeros(count: usize) -> Self {
+        Self {
+            score: DVector::zeros(count),
+            normal: DMatrix::zeros(count, count),
+        }
+    }
+}
+
+impl Table {
+    pub(super) fn new(source: &Source<'_>) -> Option<Self> {
+        let stars = source.data.stars.len();
+        let mut levels = vec![1.0; stars];
+        let mut rows = Vec::new();
+        for round in 0..2 {
+            let own = levels.clone();
+            rows = source.rows(&|row: &Row| [row.declared * own[row.star], 1.0]);
+            rows.retain(|r| !r.marked);
+            let mut squares = vec![Vec::new(); stars];
+            for row in &rows {
+                squares[row.star].push(0.5 * row.square / row.declared);
+            }
+            for (level, squares) in levels.iter_mut().zip(&mut squares) {
+                if squares.len() < MIN_ROWS {
+                    *level = f64::NAN;
+                } else if let Some(median) = spectra::robust::median(squares) {
+                    *level = median / MEDIAN;
+                }
+            }
+            if round == 0 {
+                let known = levels.iter().copied().filter(|l| l.is_finite());
+                let count = known.clone().count();
+                if count == 0 {
+                    return None;
+                }
+                let mean = known.sum::<f64>() / count as f64;
+                for level in levels.iter_mut().filter(|l| !l.is_finite()) {
+                    *level = mean;
+                }
+            }
+        }
+        rows.retain(|r| {
+            let level = levels[r.star];
+            level > 0.0 && r.square < SPIKE * r.declared * level
+        });
+        let mut sums = vec![(0.0, 0_usize, f64::NAN); stars];
+        for row in &rows {
+            let sum = &mut sums[row.star];
+            *sum = (sum.0 + 0.5 * row.square / row.declared, sum.1 + 1, row.mag);
+        }
+        for sum in &mut sums {
+            sum.0 /= sum.1.max(1) as f64;
+        }
+        let relative = rows
+            .iter()
+            .map(|r| 0.5 * r.square / r.declared / sums[r.star].0 - 1.0)
+            .collect();
+        Some(Self {
+            relative,
+            stars: sums,
+            blocks: rows.iter().map(|r| r.block + 1).max()?,
+            rows,
+        })
+    }
+
+    /// A variable that changes while a star is seen, by the first `count` of its columns.
+    pub(super) fn within(&self, columns: &Columns, count: usize) -> Option<Judged> {
+        let mut of_block = vec![Scores::zeros(count); self.blocks];
+        for ((row, f), z) in self.rows.iter().zip(&columns.rows).zip(&self.relative) {
+            let mean = columns.mean[row.star];
+            let Scores { score, normal } = &mut of_block[row.block];
+            for i in 0..count {
+                let own = f[i] - mean[i];
+                score[i] += own * z;
+                for j in 0..count {
+                    normal[(i, j)] += own * (f[j] - mean[j]);
+                }
+            }
+        }
+        self.judge(of_block)
+    }
+
+    /// What the blocks of time tell of some columns.
+    pub(super) fn judge(&self, mut of_block: Vec<Scores>) -> Option<Judged> {
+        of_block.retain(|b| b.score.norm_squared() > 0.0);
+        let count = of_block.first()?.score.len();
+        let mut all = Scores::zeros(count);
+        for block in &of_block {
+            all.score += &block.score;
+            all.normal += &block.normal;
+        }
+        let Scores { score, normal } = all;
+        let n = self.rows.len() as f64;
+        if (0..count).any(|k| normal[(k, k)] < n * LEAST_CHANGE * LEAST_CHANGE) {
+            return None;
+        }
+        let beta = Cholesky::new(normal)?.solve(&score);
+        let square = self.relative.iter().map(|z| z * z).sum::<f64>();
+        let white = beta.dot(&score) / (square / n).max(1.0);
+        let k = count as f64;
+        let p_white = ChiSquared::new(k).ok()?.sf(white);
+        let blocks = of_block.len() as f64;
+        if of_block.len() < MIN_BLOCKS {
+            return None;
+        }
+        // what the fit leaves of the blocks: what it takes is no scatter
+        let spread: DMatrix<f64> = of_block
+            .iter()
+            .map(|b| &b.score - &b.normal * &beta)
+            .map(|left| &left * left.transpose())
+            .fold(DMatrix::zeros(count, count), |a, b| a + b);
+        let covariance = spread * (blocks / (blocks - k));
+        let square = score.dot(&Cholesky::new(covariance)?.solve(&score));
+        let law = FisherSnedecor::new(k, blocks - k).ok()?;
+        let p = law.sf(square / k);
+        Some([p.max(p_white), (beta.dot(&score).max(0.0) / n).sqrt()])
+    }
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+
+    /// One star over twelve blocks of 200 rows, whose level goes with the time from -1 to 1, which is in the columns.
+    pub(in crate::noise_effects) fn in_time(level: impl Fn(f64) -> f64) -> (Table, Columns) {
+        let mut state = 7_u64;
+        let mut table = Table {
+            rows: Vec::new(),
+            relative: Vec::new(),
+            stars: vec![(1.0, 2400, 0.0)],
+            blocks: 12,
+        };
+        let mut columns = Columns {
+            rows: Vec::new(),
+            mean: vec![[0.0; 2]],
+        };
+        for k in 0..2400_usize {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1);
+            let uniform = ((state >> 11) as f64 + 0.5) / (1_u64 << 53) as f64;
+            let t = k as f64 / 1200.0 - 1.0;
+            table.rows.push(Row {
+                square: 0.0,
+                declared: 1.0,
+                mag: 0.0,
+                rate: 0.0,
+                at: k,
+                star: 0,
+                block: k / 200,
+                marked: false,
+            });
+            // half a square of two axes is exponential
+            table.relative.push(-uniform.ln() * level(t) - 1.0);
+            columns.rows.push([t, 0.0]);
+        }
+        (table, columns)
+    }
+
+    /// Chance of a slope in time of the noise; `rise`: by how much the squares grow from the middle to an end.
+    fn chance_in_time(rise: f64) -> f64 {
+        let (table, columns) = in_time(|t| 1.0 + rise * t);
+        table.within(&columns, 1).unwrap()[0]
+    }
+
+    /// A rise of 0.5 is known to sqrt(3 / 2400) = 0.035: 14 sigma. Scores of the blocks grow with the square of
+    /// the time, which is what they follow and no scatter.
+    #[test]
+    fn noise_that_grows_is_seen_in_a_dozen_blocks() {
+        assert!(chance_in_time(0.5) < 1e-6, "{}", chance_in_time(0.5));
+        assert!(chance_in_time(0.0) > 0.01, "{}", chance_in_time(0.0));
+    }
+}
