@@ -11,6 +11,7 @@
 //! nuisance        what the declared model leaves unknown, as columns with priors
 //! changes         what residuals change by from frame to frame
 //! weights         how much each star counts
+//! layout          the forms in which columns are held
 //! columns         all columns of a fit, row by row
 //! reference_noise how much the rotation that they share counts
 //! moments         their products, in one pass, for every fit at every noise
@@ -33,6 +34,7 @@ mod finish;
 pub(crate) mod frame_rotation;
 #[cfg(test)]
 pub(crate) mod harness;
+mod layout;
 mod light;
 mod misalignment;
 mod moments;

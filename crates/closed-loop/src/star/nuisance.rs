@@ -23,8 +23,8 @@ use focal_plane::{Angle, Pixel};
 use nalgebra::{DMatrix, DVector, Vector3};
 use telemetry::Model;
 
-use crate::star::columns::Filled;
 use crate::star::data::StarData;
+use crate::star::layout::Filled;
 
 /// The unknowns of the declared model at star level.
 #[derive(Clone, Debug)]

@@ -26,8 +26,9 @@ use effects::Candidate;
 use rayon::prelude::*;
 
 use super::sums::{SOLVING, Scratch, SolvedBins, Sums};
-use crate::star::columns::{Filled, Layout, StarColumns};
+use crate::star::columns::StarColumns;
 use crate::star::data::StarData;
+use crate::star::layout::{Filled, Layout};
 use crate::star::nuisance::StarNuisance;
 
 /// Frames of a group, and those where its slow columns are evaluated.

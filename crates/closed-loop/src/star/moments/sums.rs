@@ -17,8 +17,9 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DMatrixView, DMatrixViewMut, DVector, Dyn, Matrix3, Vector3};
 
 use super::{Block, pick};
-use crate::star::columns::{Filled, Layout, StarColumns};
+use crate::star::columns::StarColumns;
 use crate::star::frame_rotation::rotation_row;
+use crate::star::layout::{Filled, Layout};
 
 /// Frames whose columns are filled at once: enough for the matrix product to
 /// dominate, few enough to stay in cache.

@@ -8,9 +8,9 @@ use telemetry::Model;
 
 use super::*;
 use crate::search::empirical::{Empirical, Variable};
-use crate::star::columns::Filled;
 use crate::star::data::{Inputs, StarData};
 use crate::star::frame_rotation::rotation_row;
+use crate::star::layout::Filled;
 use crate::star::nuisance::StarNuisance;
 
 /// The camera turns about an axis by a function of time.
