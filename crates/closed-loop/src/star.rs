@@ -7,6 +7,7 @@
 //! misalignment    the rotation between camera and reference, taken exactly
 //! frame_rotation  the rotation that the stars of a frame agree on
 //! light           where the light of each star fell, better than its reference says
+//! landing         where fits take the stars, and with them the light
 //! outliers        rows that stand out
 //! nuisance        what the declared model leaves unknown, as columns with priors
 //! changes         what residuals change by from frame to frame
@@ -34,6 +35,7 @@ mod finish;
 pub(crate) mod frame_rotation;
 #[cfg(test)]
 pub(crate) mod harness;
+mod landing;
 mod layout;
 mod light;
 mod misalignment;

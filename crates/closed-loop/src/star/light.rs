@@ -36,7 +36,7 @@ use spectra::robust::median_step;
 
 use crate::gaps::GAP_STEPS;
 use crate::star::changes;
-use crate::star::data::StarData;
+use crate::star::data::{Light, StarData};
 use crate::star::frame_rotation::{Turns, counts, rotation_row};
 use crate::star::weights;
 
@@ -50,88 +50,70 @@ const JUDGES: usize = 32;
 /// A reference that errs by less than this leaves the light where it is modelled, px.
 const KNOWN_PX: f64 = 1e-3;
 
-/// By how much the light falls beside the modelled position, and how well that is known.
-#[derive(Clone, Debug)]
-pub(crate) struct Light {
-    pub(crate) beside_px: [Vec<f64>; 2],
-    pub(crate) variance_px2: [Vec<f64>; 2],
-}
-
 /// A rotation axis by axis, with its variances.
 type Known = [(f64, f64); 3];
 const NOTHING: Known = [(0.0, f64::INFINITY); 3];
 
-impl Light {
-    /// Where it is modelled.
-    pub(crate) fn as_modelled(rows: usize) -> Self {
-        let zeros = || [vec![0.0; rows], vec![0.0; rows]];
-        Self {
-            beside_px: zeros(),
-            variance_px2: zeros(),
-        }
+/// Where the light of `data` falls; `residual`: what the best fit leaves, arcsec.
+pub(crate) fn of(data: &StarData, residual: [&[f64]; 2]) -> Light {
+    let rows = data.t_s.len();
+    let mut light = Light::as_modelled(rows);
+    let weight = weights::of(data, &changes::of(data));
+    let turns = Turns::of(data, residual, &weight);
+    let known = KNOWN_PX * data.camera.arcsec_per_px()[0];
+    if !data.free_attitude && turns.reference[..2].iter().all(|s| *s < known * known) {
+        return light;
     }
-
-    /// `residual`: what the best fit leaves, arcsec.
-    pub(crate) fn of(data: &StarData, residual: [&[f64]; 2]) -> Self {
-        let rows = data.t_s.len();
-        let mut light = Self::as_modelled(rows);
-        let weight = weights::of(data, &changes::of(data));
-        let turns = Turns::of(data, residual, &weight);
-        let known = KNOWN_PX * data.camera.arcsec_per_px()[0];
-        if !data.free_attitude && turns.reference[..2].iter().all(|s| *s < known * known) {
-            return light;
+    // information of the reference, none where there is none
+    let reference = turns.reference.map(|s| {
+        if data.free_attitude {
+            0.0
+        } else {
+            s.max(1e-3 * known * known).recip()
         }
-        // information of the reference, none where there is none
-        let reference = turns.reference.map(|s| {
-            if data.free_attitude {
-                0.0
-            } else {
-                s.max(1e-3 * known * known).recip()
+    });
+    let around = around(data, &turns, reference);
+    let scale = data.camera.arcsec_per_px();
+    let weight = &weight;
+    let of_frame = |k: usize| {
+        let around = &around[k];
+        let turn = turns.frames[k].as_ref();
+        let of_row = move |row: usize| -> Option<[[f64; 2]; 2]> {
+            let turn = turn?;
+            let own = rotation_row(data, row).map(Vector3::from);
+            let (mut normal, mut moment) = (turn.normal, turn.moment);
+            if !data.free_attitude && counts(data, residual, row) {
+                let w = weight[row] * weight[row];
+                for (axis, a) in own.iter().enumerate() {
+                    normal -= a * a.transpose() * w;
+                    moment -= a * (w * residual[axis][row]);
+                }
             }
-        });
-        let around = around(data, &turns, reference);
-        let scale = data.camera.arcsec_per_px();
-        let weight = &weight;
-        let of_frame = |k: usize| {
-            let around = &around[k];
-            let turn = turns.frames[k].as_ref();
-            let of_row = move |row: usize| -> Option<[[f64; 2]; 2]> {
-                let turn = turn?;
-                let own = rotation_row(data, row).map(Vector3::from);
-                let (mut normal, mut moment) = (turn.normal, turn.moment);
-                if !data.free_attitude && counts(data, residual, row) {
-                    let w = weight[row] * weight[row];
-                    for (axis, a) in own.iter().enumerate() {
-                        normal -= a * a.transpose() * w;
-                        moment -= a * (w * residual[axis][row]);
-                    }
-                }
-                let (mut normal, mut moment) = (normal / turns.noise, moment / turns.noise);
-                for (axis, (p, q)) in around.iter().enumerate() {
-                    normal[(axis, axis)] += reference[axis] + q.recip();
-                    moment[axis] += p / q;
-                }
-                let variance = normal.try_inverse()?;
-                let theta = variance * moment;
-                Some([0, 1].map(|axis| {
-                    let a = own[axis] / scale[axis];
-                    [a.dot(&theta), a.dot(&(variance * a)).max(0.0)]
-                }))
-            };
-            data.frames.rows_of(k).map(of_row)
+            let (mut normal, mut moment) = (normal / turns.noise, moment / turns.noise);
+            for (axis, (p, q)) in around.iter().enumerate() {
+                normal[(axis, axis)] += reference[axis] + q.recip();
+                moment[axis] += p / q;
+            }
+            let variance = normal.try_inverse()?;
+            let theta = variance * moment;
+            Some([0, 1].map(|axis| {
+                let a = own[axis] / scale[axis];
+                [a.dot(&theta), a.dot(&(variance * a)).max(0.0)]
+            }))
         };
-        let each: Vec<_> = (0..around.len())
-            .into_par_iter()
-            .flat_map_iter(of_frame)
-            .collect();
-        for (row, known) in each.into_iter().enumerate() {
-            for (axis, [beside, variance]) in known.into_iter().flatten().enumerate() {
-                light.beside_px[axis][row] = beside;
-                light.variance_px2[axis][row] = variance;
-            }
+        data.frames.rows_of(k).map(of_row)
+    };
+    let each: Vec<_> = (0..around.len())
+        .into_par_iter()
+        .flat_map_iter(of_frame)
+        .collect();
+    for (row, known) in each.into_iter().enumerate() {
+        for (axis, [beside, variance]) in known.into_iter().flatten().enumerate() {
+            light.beside_px[axis][row] = beside;
+            light.variance_px2[axis][row] = variance;
         }
-        light
     }
+    light
 }
 
 /// What the frames around each frame say of its rotation.
@@ -349,7 +331,7 @@ mod tests {
         let reference = AttitudeSeries::new(t_s, q, None).unwrap();
         let data = seen(&camera, &frames, (!free).then_some(&reference), &STARS);
         let residual = data.measured_residual();
-        let light = Light::of(&data, residual.each_ref().map(Vec::as_slice));
+        let light = of(&data, residual.each_ref().map(Vec::as_slice));
         let truth = std::array::from_fn(|a| {
             let modelled = &data.modelled[a];
             places[a].iter().zip(modelled).map(|(p, m)| p - m).collect()

@@ -1,0 +1,140 @@
+//! Where fits take the stars, and with them the light.
+//!
+//! Modelled positions start as projections. What is fitted shifts them, frames with attitudes of their own turn
+//! by what their stars still agree on, and the declared centroid error is evaluated where the light then falls
+//! ([`crate::star::light`]).
+//!
+//! Not physics: projection and shift added up.
+
+use centroid::CentroidError;
+use focal_plane::ARCSEC_PER_RAD;
+use nalgebra::{UnitQuaternion, Vector3};
+use rayon::prelude::*;
+
+use crate::evidence::Residuals;
+use crate::star::data::{Light, StarData};
+use crate::star::frame_rotation::{rotation_of, rotation_row};
+use crate::star::light;
+
+/// Light that falls this far off has another pixel phase: by a fifth of a radian.
+const ELSEWHERE_PX: f64 = 0.03;
+
+impl StarData {
+    /// The measured residual less `shift`, arcsec.
+    fn left(&self, shift: &[Vec<f64>]) -> [Vec<f64>; 2] {
+        let mut left = self.measured_residual();
+        for (left, shift) in left.iter_mut().zip(shift) {
+            left.iter_mut().zip(shift).for_each(|(l, s)| *l -= s);
+        }
+        left
+    }
+
+    /// Turns each frame's own attitude by what its stars still agree on, once `shift` (arcsec,
+    /// what the fitted unknowns move each row by) is out. The first attitudes know neither the
+    /// unknowns nor the declared effects: under a lens that bends by pixels they are off by
+    /// pixels, and with them every phase.
+    pub(crate) fn turn_frames(&mut self, shift: &[Vec<f64>]) {
+        let left = self.left(shift);
+        let scale = self.camera.arcsec_per_px();
+        for frame in 0..self.frames.frames() {
+            let Some(theta) = rotation_of(self, frame, &left) else {
+                continue;
+            };
+            let turn = UnitQuaternion::from_scaled_axis(theta / ARCSEC_PER_RAD);
+            self.attitude[frame] = turn * self.attitude[frame];
+            // pixels within the field: the square of the turn is nothing
+            for row in self.frames.rows_of(frame) {
+                let jacobian = rotation_row(self, row);
+                for axis in 0..2 {
+                    self.projected[axis][row] +=
+                        Vector3::from(jacobian[axis]).dot(&theta) / scale[axis];
+                }
+            }
+        }
+    }
+
+    /// Moves the modelled positions to projection + what the residuals `inside` were modelled by (misalignment,
+    /// distortion and directions as all data have them), and evaluates the declared centroid error where the
+    /// light fell.
+    /// Takes its change out of `residual`; returns the sum of its squares, arcsec^2.
+    pub(crate) fn move_modelled(
+        &mut self,
+        inside: &Residuals,
+        residual: &mut Residuals,
+        phase: &CentroidError,
+    ) -> f64 {
+        let scale = self.camera.arcsec_per_px();
+        let known = self.phase_error.clone();
+        self.light = light::of(self, [&inside.axes[0], &inside.axes[1]]);
+        self.modelled = self.shifted(&inside.modelled);
+        self.update_phase(phase);
+        let mut squares = 0.0;
+        for axis in 0..2 {
+            for (row, known) in known[axis].iter().enumerate() {
+                let change = (self.phase_error[axis][row] - known) * scale[axis];
+                residual.axes[axis][row] -= change;
+                if !self.outlier[row] {
+                    squares += change * change;
+                }
+            }
+        }
+        squares
+    }
+
+    /// Where this takes each row from its projection, px.
+    fn shifted(&self, shift_arcsec: &[Vec<f64>]) -> [Vec<f64>; 2] {
+        let scale = self.camera.arcsec_per_px();
+        let rows = (0..self.t_s.len()).into_par_iter();
+        let (x, y) = rows
+            .map(|row| {
+                let turned = self.turned_arcsec(row);
+                let at = |axis: usize| {
+                    let shift = shift_arcsec[axis][row] - turned[axis];
+                    self.projected[axis][row] + shift / scale[axis]
+                };
+                (at(0), at(1))
+            })
+            .unzip();
+        [x, y]
+    }
+
+    /// Takes the light to fall where it is modelled.
+    pub(crate) fn lands_as_modelled(&mut self) {
+        self.carried = None;
+        self.light = Light::as_modelled(self.t_s.len());
+    }
+
+    /// Whether `shift_arcsec`, with the effects that were found, takes the light off from where it was
+    /// taken to fall by enough for its pixel phase to be another one.
+    pub(crate) fn lands_elsewhere(&self, shift_arcsec: &[Vec<f64>]) -> bool {
+        let known = self.carried.as_ref().unwrap_or(&self.modelled);
+        let at = self.shifted(shift_arcsec);
+        let (mut squares, mut count) = (0.0, 0.0);
+        for row in (0..self.t_s.len()).filter(|&r| !self.outlier[r]) {
+            for axis in 0..2 {
+                squares += (at[axis][row] - known[axis][row]).powi(2);
+            }
+            count += 2.0;
+        }
+        squares > ELSEWHERE_PX * ELSEWHERE_PX * count
+    }
+
+    /// Evaluates the declared centroid error where `shift_arcsec` takes the light. Columns of what moves
+    /// the image are those where that motion starts from: projection + `fitted_arcsec`, without it.
+    pub(crate) fn land(
+        &mut self,
+        fitted_arcsec: &[Vec<f64>],
+        shift_arcsec: &[Vec<f64>],
+        phase: &CentroidError,
+    ) {
+        if self.free_attitude {
+            self.turn_frames(shift_arcsec);
+        }
+        let (modelled, carried) = (self.shifted(fitted_arcsec), self.shifted(shift_arcsec));
+        self.modelled = modelled;
+        self.carried = Some(carried);
+        let left = self.left(shift_arcsec);
+        self.light = light::of(self, left.each_ref().map(Vec::as_slice));
+        self.update_phase(phase);
+    }
+}
