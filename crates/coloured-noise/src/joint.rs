@@ -110,7 +110,7 @@ impl Slope {
 mod tests {
     use super::*;
     use crate::coloured::Coloured;
-    use crate::common_noise::Rotations;
+    use crate::rotations::Rotations;
     use rand_core::SeedableRng;
     use rand_distr::{Distribution, StandardNormal};
     use rand_xoshiro::Xoshiro256PlusPlus;

@@ -69,8 +69,10 @@ mod coloured;
 mod common_noise;
 mod filter;
 mod joint;
+mod rotations;
 mod smoother;
 
 pub use coloured::{Coloured, LogProduct};
-pub use common_noise::{CommonNoise, Rotations, SlowGains};
+pub use common_noise::CommonNoise;
 pub use filter::Filter;
+pub use rotations::{Rotations, SlowGains};
