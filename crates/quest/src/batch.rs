@@ -11,9 +11,9 @@
 //!
 //! Source: as [`Profile`]; \[M23\] section 2.5.
 
-use crate::profile::{second_pass, solve_guarded};
+use crate::error::QuestError;
+use crate::profile::{Profile, second_pass, solve_guarded};
 use crate::quartic::{FirstPass, Rows, first_pass};
-use crate::{Profile, QuestError};
 
 /// Frames worked on together.
 const LANES: usize = 8;

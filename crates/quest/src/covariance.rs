@@ -12,8 +12,10 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use crate::QuestError;
-use crate::single::{check, inverse_length};
+use crate::error::QuestError;
+use crate::gap_limits::MIN_GAP;
+use crate::polish::least_eigenvalue;
+use crate::unit_vectors::{check, inverse_length};
 
 /// Covariance of the attitude error, rad^2, tracker axes; `sigma_rad[i]` per axis of star i.
 ///
@@ -113,8 +115,8 @@ pub(crate) fn information(measured: &[Vector3<f64>], weights: &[f64], total: f64
 /// Error if all vectors lie on one line: the mean square distance from it is the least eigenvalue
 /// of the information at unit weight, and half the gap of exact data.
 fn spread_checked(information: &[f64; 6]) -> Result<(), QuestError> {
-    let spread = crate::polish::least_eigenvalue(*information);
-    if 2.0 * spread >= crate::MIN_GAP {
+    let spread = least_eigenvalue(*information);
+    if 2.0 * spread >= MIN_GAP {
         return Ok(());
     }
     Err(QuestError::Parallel {

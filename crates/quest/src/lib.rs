@@ -41,14 +41,18 @@
 mod batch;
 mod covariance;
 mod error;
+mod gap_limits;
 mod polish;
 mod profile;
 mod quartic;
 mod sequential;
 mod single;
+mod unit_vectors;
 
 pub use batch::{FrameStatus, ProfileBatch, QuaternionsMut, Vectors, solve_batch_into};
 pub use covariance::{covariance, covariance_as_printed};
 pub use error::QuestError;
-pub use profile::{Attitude, MIN_GAP, POLISH_GAP, Profile};
-pub use single::{Solution, UNIT_TOLERANCE, quest};
+pub use gap_limits::{MIN_GAP, POLISH_GAP};
+pub use profile::{Attitude, Profile};
+pub use single::{Solution, quest};
+pub use unit_vectors::UNIT_TOLERANCE;

@@ -19,6 +19,8 @@
 //! J. Astronautical Sciences 41, 261. The sign of `z` is for Hamilton quaternions with
 //! `w = q v`, the opposite of the source's.
 
+use crate::gap_limits::POLISH_GAP;
+
 /// Row-major profile.
 pub(crate) type Rows = [f64; 9];
 
@@ -192,7 +194,7 @@ impl FirstPass {
     /// The quaternion stands as it is. Written so that a NaN says no.
     #[inline(always)]
     pub(crate) fn is_final(&self) -> bool {
-        (self.gap_bound >= crate::POLISH_GAP)
+        (self.gap_bound >= POLISH_GAP)
             & (self.last_step.abs() <= CONVERGED * self.gap_bound)
             & (self.scalar2 >= MIN_SCALAR2)
     }

@@ -12,12 +12,11 @@
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 use crate::covariance::{information, of_information};
+use crate::error::QuestError;
+use crate::gap_limits::MIN_GAP;
 use crate::polish::least_eigenvalue;
-use crate::profile::MIN_GAP;
-use crate::{Profile, QuestError};
-
-/// How far from 1 a vector's length may be. Within this it is scaled to unit length.
-pub const UNIT_TOLERANCE: f64 = 1e-6;
+use crate::profile::Profile;
+use crate::unit_vectors::{check, inverse_length};
 
 /// What [`quest`] returns.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -44,8 +43,8 @@ pub struct Solution {
 /// # Errors
 ///
 /// [`QuestError`] for slices of different lengths, fewer than two stars, a component that is not
-/// finite, a length more than [`UNIT_TOLERANCE`] from 1, a weight that is not finite and positive,
-/// a set of parallel or antiparallel vectors, or a gap below [`MIN_GAP`].
+/// finite, a length more than [`UNIT_TOLERANCE`](crate::UNIT_TOLERANCE) from 1, a weight that is not
+/// finite and positive, a set of parallel or antiparallel vectors, or a gap below [`MIN_GAP`].
 ///
 /// ```
 /// use nalgebra::Vector3;
@@ -125,29 +124,6 @@ fn checked(
         });
     }
     Ok(total)
-}
-
-/// `1/|v|` of a vector checked to be nearly unit: with `e = |v|^2 - 1`, below 2e-6, the series to
-/// second order leaves `5/16 e^3 < 3e-18`.
-pub(crate) fn inverse_length(v: &Vector3<f64>) -> f64 {
-    let e = v.norm_squared() - 1.0;
-    1.0 - e * (0.5 - 0.375 * e)
-}
-
-pub(crate) fn check(set: &'static str, vectors: &[Vector3<f64>]) -> Result<(), QuestError> {
-    for (index, v) in vectors.iter().enumerate() {
-        if !v.iter().all(|x| x.is_finite()) {
-            return Err(QuestError::NotFinite { set, index });
-        }
-        // the root only for those near or beyond the limit
-        if (v.norm_squared() - 1.0).abs() > UNIT_TOLERANCE {
-            let length = v.norm();
-            if (length - 1.0).abs() > UNIT_TOLERANCE {
-                return Err(QuestError::NotUnit { set, index, length });
-            }
-        }
-    }
-    Ok(())
 }
 
 fn profile(
