@@ -304,6 +304,7 @@ fn follow(
     let Some(followed) = switching::follow(sample, one, fits, taken) else {
         return 0;
     };
+    let in_time = [followed.shift.as_slice(), &followed.variance];
     let mut pixels = Pixels::default();
     for (w, (found, start)) in formed.iter_mut().zip(fits).enumerate() {
         let (Some(found), Some(start)) = (found, start) else {
@@ -312,7 +313,7 @@ fn follow(
         if followed.shift[sample.cells_of(w)].iter().all(|s| *s == 0.0) {
             continue;
         }
-        if let Some(fit) = one.fitted_with(sample, w, start, &followed, &mut pixels) {
+        if let Some(fit) = one.fitted_with(sample, w, start, in_time, &mut pixels) {
             found[WAYS - 1] = fit.at;
         }
     }

@@ -24,7 +24,6 @@ use super::pixel_noise::{self, MIN_READ_VARIANCE};
 use super::sample::Sample;
 use super::spline::Grid;
 use super::spot::{self, Normal};
-use super::switching::Followed;
 use super::window_fit::{self, Fitted, Known, PixelNoise, Pixels};
 use super::{MAD_SCALE, robust_median};
 
@@ -507,18 +506,19 @@ impl Learned {
         window_fit::fit(&known, sample, w, &start, FINAL_STEPS, pixels)
     }
 
-    /// The position by the spot with what the pixels add to their map in time, from where the star was found without.
+    /// The position by the spot with what the pixels add to their map in time, from where the star was found
+    /// without: `shift` value by value, beside which the map has `dark_variance`.
     pub(crate) fn fitted_with(
         &self,
         sample: &Sample,
         w: usize,
         start: &Fitted,
-        followed: &Followed,
+        [shift, dark_variance]: [&[f64]; 2],
         pixels: &mut Pixels,
     ) -> Option<Fitted> {
         let known = Known {
-            shift: Some(&followed.shift),
-            ..self.known(sample.star[w], Some(&followed.variance))
+            shift: Some(shift),
+            ..self.known(sample.star[w], Some(dark_variance))
         };
         window_fit::fit(&known, sample, w, start, FINAL_STEPS, pixels)
     }
