@@ -9,10 +9,12 @@ use rayon::prelude::*;
 use telemetry::WindowTable;
 
 use crate::learn::{self, Learned};
+use crate::map::{self, DarkMap};
+use crate::robust::{MAD_SCALE, robust_median};
 use crate::sample::{Entry, Sample};
 use crate::spline::Grid;
 use crate::window_fit::{Fitted, Pixels};
-use crate::{map, spot, switching};
+use crate::{spot, switching};
 
 #[cfg(test)]
 mod tests;
@@ -31,42 +33,6 @@ pub struct Stars<'a> {
     /// Where a model puts each row, px. It may be off by a constant of each star, and by a small rotation
     /// of each frame.
     pub expected_px: [&'a [f64]; 2],
-}
-
-/// One pixel of a dark map.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct DarkPixel {
-    /// Centre of the pixel, centred px.
-    pub x_px: f64,
-    /// Centre of the pixel, centred px.
-    pub y_px: f64,
-    /// What it adds to every read-out, in the unit of the windows.
-    pub dn: f64,
-    /// 1 sigma of the pixel against the mean of its surroundings.
-    pub sigma_dn: f64,
-}
-
-/// What each detector pixel under the windows adds, by itself, to every read-out.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct DarkMap {
-    /// Every pixel that a window has covered.
-    pub pixels: Vec<DarkPixel>,
-}
-
-impl DarkMap {
-    /// Root mean square of the map about its mean: only contrasts mean anything.
-    #[must_use]
-    pub fn rms_dn(&self) -> f64 {
-        let n = self.pixels.len().max(1) as f64;
-        let mean = self.pixels.iter().map(|p| p.dn).sum::<f64>() / n;
-        (self
-            .pixels
-            .iter()
-            .map(|p| (p.dn - mean).powi(2))
-            .sum::<f64>()
-            / n)
-            .sqrt()
-    }
 }
 
 /// Centroids formed anew in one way: one variant a fold, learned outside it, and a
@@ -115,14 +81,6 @@ const KNOTS_PX: f64 = 0.4;
 const MARGIN_PX: f64 = 0.5;
 /// Fewest frames to learn from.
 const MIN_FRAMES: usize = 30;
-
-/// The MAD of a Gaussian times this is its standard deviation.
-pub(crate) const MAD_SCALE: f64 = 1.482_602_218_505_602;
-
-/// Median of the finite values.
-pub(crate) fn robust_median(mut values: Vec<f64>) -> Option<f64> {
-    spectra::robust::median(&mut values)
-}
 
 /// Learns dark map and spots from the windows, outside each fold and on all
 /// data, and forms the centroids anew. `fold` is the fold of each frame, counted from 0. `None` where the

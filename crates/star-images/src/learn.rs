@@ -21,11 +21,11 @@ use super::gaussian_spot;
 use super::geometry::Geometry;
 use super::moment_level;
 use super::pixel_noise::{self, MIN_READ_VARIANCE};
+use super::robust::{MAD_SCALE, robust_median};
 use super::sample::Sample;
 use super::spline::Grid;
 use super::spot::{self, Normal};
 use super::window_fit::{self, Fitted, Known, PixelNoise, Pixels};
-use super::{MAD_SCALE, robust_median};
 
 /// Rounds of everything: with half as many the table's centroids, moved by the very
 /// pixels that are sought, still show in the map at twice its error.

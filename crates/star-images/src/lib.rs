@@ -36,6 +36,7 @@ mod learn;
 mod map;
 mod moment_level;
 mod pixel_noise;
+mod robust;
 mod sample;
 mod spline;
 mod spot;
@@ -44,6 +45,5 @@ mod switching;
 mod synthetic;
 mod window_fit;
 
-use form::{MAD_SCALE, robust_median};
-
-pub use form::{Centroids, DarkMap, DarkPixel, Formed, Stars, Variants, form};
+pub use form::{Centroids, Formed, Stars, Variants, form};
+pub use map::{DarkMap, DarkPixel};

@@ -19,9 +19,44 @@
 //! Source: Efron & Stein 1981, Annals of Statistics 9, 586 (jackknife).
 
 use super::learn::Learned;
-use super::robust_median;
+use super::robust::robust_median;
 use super::sample::{Sample, levelled, mean};
-use super::{DarkMap, DarkPixel};
+
+/// One pixel of a dark map.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DarkPixel {
+    /// Centre of the pixel, centred px.
+    pub x_px: f64,
+    /// Centre of the pixel, centred px.
+    pub y_px: f64,
+    /// What it adds to every read-out, in the unit of the windows.
+    pub dn: f64,
+    /// 1 sigma of the pixel against the mean of its surroundings.
+    pub sigma_dn: f64,
+}
+
+/// What each detector pixel under the windows adds, by itself, to every read-out.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct DarkMap {
+    /// Every pixel that a window has covered.
+    pub pixels: Vec<DarkPixel>,
+}
+
+impl DarkMap {
+    /// Root mean square of the map about its mean: only contrasts mean anything.
+    #[must_use]
+    pub fn rms_dn(&self) -> f64 {
+        let n = self.pixels.len().max(1) as f64;
+        let mean = self.pixels.iter().map(|p| p.dn).sum::<f64>() / n;
+        (self
+            .pixels
+            .iter()
+            .map(|p| (p.dn - mean).powi(2))
+            .sum::<f64>()
+            / n)
+            .sqrt()
+    }
+}
 
 /// The map of `all`, its errors from itself and from the `folds` left out in turn.
 pub(crate) fn of(sample: &Sample, folds: &[Learned], all: &Learned) -> DarkMap {

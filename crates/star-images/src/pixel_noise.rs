@@ -10,8 +10,8 @@
 //! Source: photon transfer, Janesick, Scientific Charge-Coupled Devices (2001), section 2.2;
 //! Rousseeuw & Croux 1993 for the scaled MAD.
 
+use super::robust::{MAD_SCALE, robust_median};
 use super::window_fit::PixelNoise;
-use super::{MAD_SCALE, robust_median};
 
 /// Bins of the model.
 const BINS: usize = 30;

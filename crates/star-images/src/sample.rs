@@ -14,7 +14,7 @@
 
 use std::collections::BTreeMap;
 
-use super::robust_median;
+use super::robust::robust_median;
 
 /// Median flux of a window after scaling.
 const FLUX_SCALE: f64 = 1e4;

@@ -21,7 +21,7 @@
 use nalgebra::{Matrix4, Vector4};
 
 use super::learn::Learned;
-use super::robust_median;
+use super::robust::robust_median;
 use super::sample::Sample;
 use super::spot::WindowTaps;
 use super::window_fit::Fitted;

@@ -279,7 +279,7 @@ pub(crate) fn rms(made: &Made, at: &[Vec<f64>; 2], taken: &dyn Fn(usize) -> bool
                 .filter(|&r| made.data.star[r] == s)
                 .map(|r| at[axis][r] - made.truth[axis][r])
                 .collect();
-            let centre = super::robust_median(all).unwrap();
+            let centre = super::robust::robust_median(all).unwrap();
             for r in (0..made.truth[0].len()).filter(|&r| made.data.star[r] == s && taken(r)) {
                 total += (at[axis][r] - made.truth[axis][r] - centre).powi(2);
                 count += 1.0;

@@ -3,6 +3,7 @@
 //! Not physics: tests.
 
 use super::*;
+use crate::map::DarkPixel;
 use crate::synthetic::{
     BACKGROUND, Data, Made, SIGMA_PX, Scenario, all, dither, no_hit, nothing, rigid, rms, steady,
 };
