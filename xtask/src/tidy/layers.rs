@@ -3,6 +3,7 @@
 use super::code::Code;
 use super::manifest::{self, Kind, Manifest};
 use super::table::{self, Row};
+use super::tree::is_test_file;
 use super::{Finding, Tree};
 
 const DOCUMENT: &str = "docs/architecture.md";
@@ -164,7 +165,7 @@ fn forbidden_names(tree: &Tree, folder: &str, row: &Crate<'_>) -> Vec<Finding> {
     }
     let sources = format!("{folder}/src");
     for (path, text) in tree.under(&sources) {
-        if !path.ends_with(".rs") || super::sources::is_test_file(path) {
+        if !path.ends_with(".rs") || is_test_file(path) {
             continue;
         }
         let code = Code::new(text);

@@ -2,6 +2,7 @@
 
 use super::layers::{self, Crate};
 use super::manifest;
+use super::tree::is_test_file;
 use super::{Finding, Tree};
 
 /// A file holds one idea; beyond this it holds several.
@@ -31,11 +32,6 @@ fn owes(cell: &str) -> Option<Owes> {
         "none" => Some(Owes::Nothing),
         _ => None,
     }
-}
-
-/// Files that are compiled for tests alone.
-pub(super) fn is_test_file(path: &str) -> bool {
-    path.ends_with("/tests.rs") || path.contains("/tests/")
 }
 
 pub(super) fn check(tree: &Tree) -> Vec<Finding> {

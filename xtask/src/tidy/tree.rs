@@ -90,6 +90,11 @@ impl Tree {
     }
 }
 
+/// Files that are compiled for tests alone.
+pub(super) fn is_test_file(path: &str) -> bool {
+    path.ends_with("/tests.rs") || path.contains("/tests/")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
