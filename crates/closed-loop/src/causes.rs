@@ -32,7 +32,7 @@ use changing_effect::{Changing, Inner, Way};
 use commonness::Slow;
 use description::{Described, Kept};
 use invariance::{Change, changing};
-use stand_ins::{Part, describe, stand_ins};
+use stand_ins::{BY_FAR, Part, describe, stand_ins};
 
 mod changing_effect;
 pub(crate) mod commonness;
@@ -41,8 +41,6 @@ pub(crate) mod invariance;
 mod recurrence;
 mod stand_ins;
 
-/// Nats by which a description must be worth more than a slow error of the reference.
-const BY_FAR: f64 = 8.0;
 /// Nats by which a slow error of the reference is no likelier than effects in its place: a description that
 /// beats it speaks for them.
 const TIE: f64 = 2.0;
@@ -402,7 +400,8 @@ fn in_place_of_wander(coloured: &Described, plain: &Described, axes: usize) -> O
     // a size and a time each
     let paid = axes as f64 * plain.fitted.scalars.max(2.0).ln();
     let time = parts.iter().all(|(k, _)| plain.terms[*k].term.is_of_time());
-    (!time && worth > with - paid + BY_FAR).then_some(parts)
+    let looked = plain.looked() * parts.len() as f64;
+    (!time && worth - looked > with - paid + BY_FAR).then_some(parts)
 }
 
 /// Slow noise that is left of the stars themselves.

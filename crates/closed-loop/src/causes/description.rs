@@ -178,6 +178,16 @@ impl Described {
         told
     }
 
+    /// Parts that a description may be made of.
+    pub(crate) fn tried(&self) -> usize {
+        self.terms.iter().map(|t| t.parts.len()).sum()
+    }
+
+    /// What each part of a description pays for having been looked for, nats.
+    pub(crate) fn looked(&self) -> f64 {
+        (self.tried() as f64).ln()
+    }
+
     /// Whether what is left follows the acceleration.
     pub(crate) fn follows_acceleration(&self) -> bool {
         let name = Variable::Acceleration.name();

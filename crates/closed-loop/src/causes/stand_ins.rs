@@ -49,7 +49,7 @@ pub(crate) type Part = (usize, Vec<usize>);
 /// does, and that description.
 pub(crate) fn stand_ins(described: &Described) -> Option<(Vec<usize>, Vec<Part>)> {
     let groups = &described.fitted.groups;
-    let looked = (parts_of_all(described) as f64).ln();
+    let looked = described.looked();
     let mut most = None;
     let mut by = 0.0;
     for set in sets(described) {
@@ -96,15 +96,32 @@ fn too_large(described: &Described, set: &[usize], rest: &[usize]) -> Option<f64
     Some(estimate.excess(&which)?.max(1.0))
 }
 
-/// Likelihood of `rest` and the part of `set` that is worth most, gains over `times`, after its price.
+/// Likelihood of `rest` and the part of `set` that is worth most, gains over `times`, after its price: one that
+/// is not worth what it pays is left out, so that it tells against none of the others.
 fn at_best(described: &Described, set: &[usize], rest: &[usize], times: f64) -> Option<f64> {
     let fits = &described.fitted.fits;
     let price = Price::of(described, times);
-    let paid: f64 = set.iter().map(|&k| described.paid[k]).sum();
     let base = likelihood(fits, rest, &[])?;
-    let part = columns_of(&described.fitted.groups, set);
-    let (likelihood, part) = needed(fits, rest, part, price)?;
-    Some(base + price.worth(likelihood - base, part.len()) - paid)
+    let worth = |set: &[usize]| {
+        let paid: f64 = set.iter().map(|&k| described.paid[k]).sum();
+        let part = columns_of(&described.fitted.groups, set);
+        let (likelihood, part) = needed(fits, rest, part, price)?;
+        Some(base + price.worth(likelihood - base, part.len()) - paid)
+    };
+    let mut set = set.to_vec();
+    let mut best = worth(&set)?;
+    while set.len() > 1 {
+        let fewer = (0..set.len()).filter_map(|at| {
+            let mut less = set.clone();
+            less.remove(at);
+            Some((worth(&less)?, less))
+        });
+        match fewer.max_by(|a, b| a.0.total_cmp(&b.0)) {
+            Some((value, less)) if value > best => (best, set) = (value, less),
+            _ => break,
+        }
+    }
+    Some(best)
 }
 
 /// What columns pay.
@@ -185,7 +202,7 @@ pub(crate) fn describe(described: &Described, rest: &[usize]) -> Option<(f64, Ve
 fn describe_at(described: &Described, rest: &[usize], times: f64) -> Option<(f64, Vec<Part>)> {
     let fits = &described.fitted.fits;
     let price = Price::of(described, times);
-    let tried = parts_of_all(described);
+    let tried = described.tried();
     let mut with = rest.to_vec();
     let mut base = likelihood(fits, rest, &[])?;
     let mut worth = base;
@@ -235,11 +252,6 @@ fn describe_at(described: &Described, rest: &[usize], times: f64) -> Option<(f64
         with.extend(part);
     }
     (!parts.is_empty()).then_some((worth, parts))
-}
-
-/// Parts that a description may be made of.
-fn parts_of_all(described: &Described) -> usize {
-    described.terms.iter().map(|t| t.parts.len()).sum()
 }
 
 /// Each effect, each pile of one kind, and all.

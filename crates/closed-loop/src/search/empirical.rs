@@ -7,8 +7,8 @@
 //! (g, 0)   (0, g)   (-y g, x g)   (x g, y g)      g = P_1(v), P_2(v), ..., v scaled to -1..1
 //! ```
 //!
-//! a shift along each axis, a roll and a scale; on an attitude it drives each
-//! axis. Motion (a, b) drives each axis by each of its own, by its squares a^2, b^2 and ab and by its size; a
+//! a shift along each axis, a roll and a scale (the time by what bends the scale alone: a frame's turns would be
+//! those of a reference that errs slowly); on an attitude it drives each axis. Motion (a, b) drives each axis by each of its own, by its squares a^2, b^2 and ab and by its size; a
 //! pixel phase its own axis by its first six harmonics, the place within the window its own axis. A rate also
 //! drives by its direction alone, whatever its size: backlash does. Two variables together are what neither does
 //! alone,
@@ -228,8 +228,8 @@ impl Empirical {
             Variable::Phase(_) => 2 * HARMONICS,
             Variable::Position(_) | Variable::Window => 2 * ORDERS,
             Variable::Half(_) | Variable::Quarter => 2,
+            Variable::Time if stars => 4 * ORDERS,
             // A polynomial in time is only good outside its fold if it is straight.
-            Variable::Time if stars => 4,
             Variable::Time => 3,
             Variable::Rate => OF_A_RATE,
             Variable::Acceleration => BENT,
@@ -509,11 +509,15 @@ impl Candidate for Empirical {
                     }
                 }
                 _ => {
+                    // what turns whole frames to and fro is what a slow error of the reference does
+                    let straight = matches!(self.variable, Variable::Time);
                     let g = legendre(self.scale.of(values[i]));
                     for (k, g) in g.into_iter().enumerate().take(count.div_ceil(4)) {
-                        put(4 * k, g, 0.0);
-                        put(4 * k + 1, 0.0, g);
-                        put(4 * k + 2, -y * g, x * g);
+                        if k == 0 || !straight {
+                            put(4 * k, g, 0.0);
+                            put(4 * k + 1, 0.0, g);
+                            put(4 * k + 2, -y * g, x * g);
+                        }
                         put(4 * k + 3, x * g, y * g);
                     }
                 }

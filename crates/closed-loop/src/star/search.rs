@@ -19,7 +19,7 @@
 //!
 //! k parameters (instant, frequency and lag too), q the square of the amplitudes over
 //! their errors: the evidence if effects are spread like what was found. One slow error may act about X and Y
-//! alike; what differs about them pays ln 2 more. Without a slow
+//! alike; what differs about them, or acts about one alone, pays ln 6 more. Without a slow
 //! error the noise is white, so that what such an error would add is taken off. The
 //! likelier explanation is named; an effect that is worth less than a slow error in its
 //! place is not, even if that error would not be named either. The log-odds of a step of
@@ -57,8 +57,9 @@ pub(crate) const WIDENING: f64 = 1.3;
 /// What a slow error of an axis pays for its size and correlation time, nats: a size is
 /// known to a fifth and a time to a factor of two, within the decades that they may have.
 const SLOW_PRICE: f64 = 4.0;
-/// What slow errors pay beside that if they are not the same about X and Y, nats: every other one is so.
-const APART: f64 = std::f64::consts::LN_2;
+/// How much less likely a slow error about X alone, one about Y alone, or another about each is than one that is
+/// the same about both: two references of three err alike, the third in one of three ways.
+const APART: f64 = 6.0;
 /// Most effects that are added.
 const MOST: usize = 8;
 /// Parts of a long run of which one is searched before the whole is.
@@ -405,7 +406,7 @@ impl Trial<'_> {
         let paid = slow.axes.map(|gain| gain.min(slow_price));
         // none across the boresight, one that is the same about both axes, or one about each that has one
         let alike = slow.across - slow.alike + slow_price;
-        let apart = paid[0] + paid[1] + APART;
+        let apart = paid[0] + paid[1] + APART.ln();
         let without = slow.across.min(alike.max(0.0)).min(apart) + paid[2];
         let effects: f64 = scored
             .parts
