@@ -5,9 +5,12 @@
 //! less variance than its noise v (or more, if the row took no part), axis by axis
 //!
 //! ```text
-//! var_i = v_i - 2 w_i v_i h_i + h_i     h_i = a_i^T C a_i,  C = (sum w a a^T)^-1,  w = P(no spike)/v
-//! q_i = sum over the axes of r_i^2 v_i / var_i           so that q/v ~ chi2_2
+//! var_i = V_i - 2 w_i V_i h_i + h_i     h_i = a_i^T C a_i,  C = (sum w a a^T)^-1,  w = P(no spike)/v
+//! q_i = sum over the axes of r_i^2 V_i / var_i           so that q/V ~ chi2_2
 //! ```
+//!
+//! V is v and what a spike adds to it, as far as the row is believed to be one: held against v alone, spikes
+//! beside nine other stars were told to be a fourteenth too small.
 //!
 //! Source: leverage in linear regression (Hoaglin & Welsch 1978).
 
@@ -43,6 +46,28 @@ pub(super) struct Row {
     pub(super) marked: bool,
 }
 
+/// What is believed of a row, variances per axis, arcsec^2.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Belief {
+    /// Of its noise.
+    pub(super) noise: f64,
+    /// With that of the spike that it may hold.
+    pub(super) whole: f64,
+    /// How likely it holds none.
+    pub(super) sound: f64,
+}
+
+impl Belief {
+    /// No spike, and so much noise.
+    pub(super) fn sound(noise: f64) -> Self {
+        Self {
+            noise,
+            whole: noise,
+            sound: 1.0,
+        }
+    }
+}
+
 /// Where the rows come from.
 pub(super) struct Source<'a> {
     pub(super) data: &'a StarData,
@@ -54,8 +79,8 @@ pub(super) struct Source<'a> {
 }
 
 impl Source<'_> {
-    /// All rows under `belief`: the variance of a row and how likely it is no spike.
-    pub(super) fn rows(&self, belief: &dyn Fn(&Row) -> [f64; 2]) -> Vec<Row> {
+    /// All rows under `belief`.
+    pub(super) fn rows(&self, belief: &dyn Fn(&Row) -> Belief) -> Vec<Row> {
         let step = self.data.t_s.len().div_ceil(MOST_ROWS).max(1);
         let mut out = Vec::new();
         for (block, frames) in self.folds.blocks.iter().enumerate() {
@@ -70,7 +95,7 @@ impl Source<'_> {
         &self,
         frame: usize,
         block: usize,
-        belief: &dyn Fn(&Row) -> [f64; 2],
+        belief: &dyn Fn(&Row) -> Belief,
         out: &mut Vec<Row>,
     ) {
         let data = self.data;
@@ -94,9 +119,9 @@ impl Source<'_> {
                     block,
                     marked: data.outlier[r],
                 };
-                let [variance, sound] = belief(&row);
-                let sound = if row.marked { 0.0 } else { sound };
-                (r, row, [variance, sound / variance])
+                let believed = belief(&row);
+                let sound = if row.marked { 0.0 } else { believed.sound };
+                (r, row, [believed.whole, sound / believed.noise])
             })
             .collect();
         if members.iter().filter(|m| !m.1.marked).count() < MIN_STARS {
@@ -115,14 +140,14 @@ impl Source<'_> {
             return;
         };
         let theta = covariance * moment;
-        for (r, mut row, [variance, weight]) in members {
+        for (r, mut row, [whole, weight]) in members {
             let jacobian = rotation_row(data, r);
             let mut square = 0.0;
             let mut least = f64::INFINITY;
             for axis in 0..2 {
                 let a = Vector3::from(jacobian[axis]);
                 let leverage = a.dot(&(covariance * a));
-                let share = 1.0 - 2.0 * weight * leverage + leverage / variance;
+                let share = 1.0 - 2.0 * weight * leverage + leverage / whole;
                 let left = self.residual[axis][r] - a.dot(&theta);
                 square += left * left / share;
                 least = least.min(share);

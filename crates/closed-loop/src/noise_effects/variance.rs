@@ -24,7 +24,7 @@ use coloured_noise::LogProduct;
 use nalgebra::{Cholesky, SMatrix, SVector};
 use rayon::prelude::*;
 
-use super::rows::Row;
+use super::rows::{Belief, Row};
 
 /// Parameters: level a, magnitude b, rate w, share rho (logit), size S^2 (log).
 pub(super) const PARAMETERS: usize = 5;
@@ -122,12 +122,18 @@ impl Model {
         }
     }
 
-    /// Variance of a row, and the probability that it holds no spike.
-    pub(super) fn belief(&self, at: &Vector) -> impl Fn(&Row) -> [f64; 2] + use<> {
+    /// What is believed of a row.
+    pub(super) fn belief(&self, at: &Vector) -> impl Fn(&Row) -> Belief + use<> {
         let there = self.there(at);
         move |row| {
-            let v = there.own(row) + there.at[RATE] * row.rate;
-            [v, there.density(row.square, v).posterior[0]]
+            let noise = there.own(row) + there.at[RATE] * row.rate;
+            let posterior = there.density(row.square, noise).posterior;
+            let spike: f64 = posterior.iter().zip(there.more).map(|(p, s)| p * s).sum();
+            Belief {
+                noise,
+                whole: noise + spike,
+                sound: posterior[0],
+            }
         }
     }
 
@@ -409,7 +415,9 @@ impl Model {
         let (mut sum, mut weight) = (0.0, 0.0);
         let belief = self.belief(at);
         for row in rows {
-            let [v, sound] = belief(row);
+            let Belief {
+                noise: v, sound, ..
+            } = belief(row);
             if sound > 0.5 {
                 sum += (0.5 * row.square / v - 1.0).powi(2);
                 weight += 1.0;

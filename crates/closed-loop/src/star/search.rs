@@ -32,7 +32,7 @@
 use std::sync::Arc;
 
 use block_regression::{Estimate, Fits, Folds, Layout};
-use coloured_noise::{CommonNoise, Rotations};
+use coloured_noise::{CommonNoise, Rotations, SlowGains};
 use effects::Candidate;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
@@ -403,11 +403,7 @@ impl Trial<'_> {
     /// error of an axis `slow_price`, or its absence where that costs less.
     fn worth(&self, scored: &Scored, slow_price: f64) -> f64 {
         let slow = scored.rotations.slow_gains(&scored.noise);
-        let paid = slow.axes.map(|gain| gain.min(slow_price));
-        // none across the boresight, one that is the same about both axes, or one about each that has one
-        let alike = slow.across - slow.alike + slow_price;
-        let apart = paid[0] + paid[1] + APART.ln();
-        let without = slow.across.min(alike.max(0.0)).min(apart) + paid[2];
+        let without = paid_by_slow(&slow, slow_price);
         let effects: f64 = scored
             .parts
             .iter()
@@ -440,6 +436,15 @@ impl Trial<'_> {
             observable: !columns.is_empty(),
         }
     }
+}
+
+/// What slow errors pay of what they gain, `price` each, or all of it where that costs less: none across the
+/// boresight, one that is the same about X and Y, or one about each that has one; and that about Z.
+fn paid_by_slow(slow: &SlowGains, price: f64) -> f64 {
+    let paid = slow.axes.map(|gain| gain.min(price));
+    let alike = slow.across - slow.alike + price;
+    let apart = paid[0] + paid[1] + APART.ln();
+    slow.across.min(alike.max(0.0)).min(apart) + paid[2]
 }
 
 /// What the search beside a slow error ends with.
@@ -606,4 +611,27 @@ impl Wander {
 /// together.
 fn chance(ratio: f64) -> f64 {
     4.0 * ChiSquared::new(2.0).map_or(1.0, |law| law.sf(ratio.max(0.0) / WIDENING))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What a step about Y alone makes of a slow error (18.6 nats about Y, nothing about X), and a reference that
+    /// wanders about both alike. One about Y alone pays as well for being one of three kinds that are rare.
+    #[test]
+    fn a_slow_error_about_one_axis_pays_for_its_kind() {
+        let of = |axes: [f64; 3], across: f64, alike: f64| {
+            let gains = SlowGains {
+                axes,
+                across,
+                alike,
+            };
+            paid_by_slow(&gains, SLOW_PRICE)
+        };
+        assert!((of([0.0, 18.6, 0.0], 18.6, 15.0) - 4.0 - 6.0_f64.ln()).abs() < 1e-12);
+        assert!((of([20.0, 25.0, 0.0], 45.0, 45.0) - 4.0).abs() < 1e-12);
+        // no more than it gains, and the one about Z by itself
+        assert!((of([0.0, 2.0, 30.0], 2.0, 1.0) - 6.0).abs() < 1e-12);
+    }
 }

@@ -64,6 +64,28 @@ fn a_pair_is_the_first_columns_of_one_times_the_other() {
     assert!(still.is_none());
 }
 
+/// A scale may bend in time; what turns whole frames to and fro is a slow error of the reference.
+#[test]
+fn the_time_bends_the_scale_alone() {
+    let time = Empirical::new(Variable::Time, [0.0, 4.0], true).unwrap();
+    let [x, y] = columns(&time);
+    let acts = |k: usize| {
+        x[2 * k..2 * k + 2]
+            .iter()
+            .chain(&y[2 * k..2 * k + 2])
+            .any(|v| *v != 0.0)
+    };
+    let acting: Vec<usize> = (0..time.coefficients().len())
+        .filter(|&k| acts(k))
+        .collect();
+    assert_eq!(acting, [0, 1, 2, 3, 7, 11]);
+    // (x, y) times P_2 of -0.5 and 1
+    let [half, _] = camera().half_size_px();
+    let scale = 1.0 / camera().arcsec_per_px()[0];
+    assert!((x[14] - -0.125 * -100.3 / half * scale).abs() < 1e-12);
+    assert!((y[15] - -300.1 / half * scale).abs() < 1e-12);
+}
+
 /// A rate of 1 and 2 px/s of at most 2, and one of -1: by its size alone, and in a pair with the place.
 #[test]
 fn a_motion_drives_by_its_size() {

@@ -240,8 +240,7 @@ fn two_forms_are_as_far_apart_as_their_columns() {
         &[],
     )
     .unwrap();
-    let span = [data.t_s[0], data.t_s[data.t_s.len() - 1]];
-    let one = Empirical::new(Variable::Time, span, true).unwrap();
+    let one = Empirical::new(Variable::Slot(vec![1, 2]), [0.0, 1.0], true).unwrap();
     let two = data.stars.iter().map(|s| s.id).take(2).collect();
     let other = Empirical::new(Variable::Star(two), [0.0, 1.0], true).unwrap();
     let candidates: [&dyn Candidate; 2] = [&one, &other];
