@@ -42,7 +42,7 @@ use crate::star::data::StarData;
 use crate::star::evidence::StarEvidence;
 pub(crate) use follows::{NoiseFollows, noise_follows};
 use judge::{Judged, Known, judge};
-use rows::{Belief, Row, Source};
+use rows::{Row, Source};
 
 /// Identities in the catalogue.
 const MAGNITUDE: &str = "magnitude_noise";
@@ -216,7 +216,7 @@ pub(crate) fn claim(
         declared: &declared,
         folds,
     };
-    let make = |belief: &dyn Fn(&Row) -> Belief| source.rows(belief);
+    let make = |belief: &dyn Fn(&Row) -> [f64; 2]| source.rows(belief);
     let follows_light = situation.model.effects.iter().any(|e| e.id == MAGNITUDE)
         || situation.bundle.images.is_some();
     let known = Known {
@@ -237,7 +237,7 @@ pub(crate) fn claim(
             residual: &quick,
             ..source
         };
-        let make = |belief: &dyn Fn(&Row) -> Belief| source.rows(belief);
+        let make = |belief: &dyn Fn(&Row) -> [f64; 2]| source.rows(belief);
         if let Some(fast) = judge(&make, folds, known) {
             verdicts.magnitude.stands &= verdicts.magnitude.agrees(&fast.magnitude);
             verdicts.rate.stands &= verdicts.rate.agrees(&fast.rate);

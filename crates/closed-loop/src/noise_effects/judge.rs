@@ -20,7 +20,7 @@
 use block_regression::Folds;
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
 
-use super::rows::{Belief, Row};
+use super::rows::Row;
 use super::variance::{
     Covariance, Fit, LEVEL, MAGNITUDE, Model, PARAMETERS, RATE, SHARE, SIZE, Vector, logit, sigmoid,
 };
@@ -51,8 +51,8 @@ const SEEN_QUICK: f64 = 2.0;
 /// Rounds of rows (whose rotation is weighed by the noise) and fit.
 const ROUNDS: usize = 2;
 
-/// Makes the rows under a belief.
-pub(super) type Make<'a> = dyn Fn(&dyn Fn(&Row) -> Belief) -> Vec<Row> + 'a;
+/// Makes the rows under a belief: the variance of a row, and how likely it is no spike.
+pub(super) type Make<'a> = dyn Fn(&dyn Fn(&Row) -> [f64; 2]) -> Vec<Row> + 'a;
 
 type Free = [bool; PARAMETERS];
 
@@ -128,9 +128,9 @@ pub(super) struct Known {
     pub(super) outliers: Option<[f64; 2]>,
 }
 
-/// Judges. `make` gives the rows under a belief.
+/// Judges. `make` gives the rows under a belief of variance and soundness.
 pub(super) fn judge(make: &Make<'_>, folds: &Folds, known: Known) -> Option<Verdicts> {
-    let mut rows = make(&|row: &Row| Belief::sound(row.declared));
+    let mut rows = make(&|row: &Row| [row.declared, 1.0]);
     let mut free = [false; PARAMETERS];
     let mut model = Model::new(&rows, known.outliers);
     // the highest hill is known from the first round on
@@ -333,7 +333,7 @@ impl Bench<'_> {
         let mut squares = vec![Vec::new(); self.stars];
         let belief = self.model.belief(&full.at);
         for row in self.rows.iter().filter(|r| !r.marked) {
-            let v = belief(row).noise;
+            let [v, _] = belief(row);
             squares[row.star].push(row.square / v);
         }
         let level: Vec<f64> = squares

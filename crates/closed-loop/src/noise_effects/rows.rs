@@ -5,12 +5,12 @@
 //! less variance than its noise v (or more, if the row took no part), axis by axis
 //!
 //! ```text
-//! var_i = V_i - 2 w_i V_i h_i + h_i     h_i = a_i^T C a_i,  C = (sum w a a^T)^-1,  w = P(no spike)/v
-//! q_i = sum over the axes of r_i^2 V_i / var_i           so that q/V ~ chi2_2
+//! var_i = v_i - 2 w_i v_i h_i + h_i     h_i = a_i^T C a_i,  C = (sum w a a^T)^-1,  w = P(no spike)/v
+//! q_i = sum over the axes of r_i^2 v_i / var_i           so that q/v ~ chi2_2
 //! ```
 //!
-//! V is v and what a spike adds to it, as far as the row is believed to be one: held against v alone, spikes
-//! beside nine other stars were told to be a fourteenth too small.
+//! A spike of the row's own is left to (1 - w_i h_i) of itself, so that it adds (1 - w_i h_i)^2 v_i / var_i of its
+//! square: held to add all of it, spikes beside nine other stars were told to be a fourteenth too small.
 //!
 //! Source: leverage in linear regression (Hoaglin & Welsch 1978).
 
@@ -32,6 +32,8 @@ const MOST_ROWS: usize = 100_000;
 pub(super) struct Row {
     /// Squared residual over two axes, arcsec^2.
     pub(super) square: f64,
+    /// Share of its square that a spike of the row adds to it.
+    pub(super) shows: f64,
     /// Declared variance per axis, arcsec^2.
     pub(super) declared: f64,
     /// Magnitude - 5; 0 where unknown.
@@ -46,28 +48,6 @@ pub(super) struct Row {
     pub(super) marked: bool,
 }
 
-/// What is believed of a row, variances per axis, arcsec^2.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Belief {
-    /// Of its noise.
-    pub(super) noise: f64,
-    /// With that of the spike that it may hold.
-    pub(super) whole: f64,
-    /// How likely it holds none.
-    pub(super) sound: f64,
-}
-
-impl Belief {
-    /// No spike, and so much noise.
-    pub(super) fn sound(noise: f64) -> Self {
-        Self {
-            noise,
-            whole: noise,
-            sound: 1.0,
-        }
-    }
-}
-
 /// Where the rows come from.
 pub(super) struct Source<'a> {
     pub(super) data: &'a StarData,
@@ -79,8 +59,8 @@ pub(super) struct Source<'a> {
 }
 
 impl Source<'_> {
-    /// All rows under `belief`.
-    pub(super) fn rows(&self, belief: &dyn Fn(&Row) -> Belief) -> Vec<Row> {
+    /// All rows under `belief`: the variance of a row and how likely it is no spike.
+    pub(super) fn rows(&self, belief: &dyn Fn(&Row) -> [f64; 2]) -> Vec<Row> {
         let step = self.data.t_s.len().div_ceil(MOST_ROWS).max(1);
         let mut out = Vec::new();
         for (block, frames) in self.folds.blocks.iter().enumerate() {
@@ -95,7 +75,7 @@ impl Source<'_> {
         &self,
         frame: usize,
         block: usize,
-        belief: &dyn Fn(&Row) -> Belief,
+        belief: &dyn Fn(&Row) -> [f64; 2],
         out: &mut Vec<Row>,
     ) {
         let data = self.data;
@@ -111,6 +91,7 @@ impl Source<'_> {
                 let mag = data.mag[r] - 5.0;
                 let row = Row {
                     square: self.residual[0][r].powi(2) + self.residual[1][r].powi(2),
+                    shows: 1.0,
                     declared: self.declared[r],
                     mag: if mag.is_finite() { mag } else { 0.0 },
                     rate,
@@ -119,9 +100,9 @@ impl Source<'_> {
                     block,
                     marked: data.outlier[r],
                 };
-                let believed = belief(&row);
-                let sound = if row.marked { 0.0 } else { believed.sound };
-                (r, row, [believed.whole, sound / believed.noise])
+                let [variance, sound] = belief(&row);
+                let sound = if row.marked { 0.0 } else { sound };
+                (r, row, [variance, sound / variance])
             })
             .collect();
         if members.iter().filter(|m| !m.1.marked).count() < MIN_STARS {
@@ -140,20 +121,21 @@ impl Source<'_> {
             return;
         };
         let theta = covariance * moment;
-        for (r, mut row, [whole, weight]) in members {
+        for (r, mut row, [variance, weight]) in members {
             let jacobian = rotation_row(data, r);
-            let mut square = 0.0;
+            let (mut square, mut shows) = (0.0, 0.0);
             let mut least = f64::INFINITY;
             for axis in 0..2 {
                 let a = Vector3::from(jacobian[axis]);
                 let leverage = a.dot(&(covariance * a));
-                let share = 1.0 - 2.0 * weight * leverage + leverage / whole;
+                let share = 1.0 - 2.0 * weight * leverage + leverage / variance;
                 let left = self.residual[axis][r] - a.dot(&theta);
                 square += left * left / share;
+                shows += 0.5 * (1.0 - weight * leverage).powi(2) / share;
                 least = least.min(share);
             }
             if least > 1.0 - MOST_LEVERAGE {
-                row.square = square;
+                (row.square, row.shows) = (square, shows);
                 out.push(row);
             }
         }

@@ -16,7 +16,7 @@
 use nalgebra::{Cholesky, DMatrix, DVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
 
-use super::rows::{Belief, Row, Source};
+use super::rows::{Row, Source};
 
 /// A square beyond this many times the usual is a spike's.
 const SPIKE: f64 = 24.0;
@@ -90,7 +90,7 @@ impl Table {
         let mut rows = Vec::new();
         for round in 0..2 {
             let own = levels.clone();
-            rows = source.rows(&|row: &Row| Belief::sound(row.declared * own[row.star]));
+            rows = source.rows(&|row: &Row| [row.declared * own[row.star], 1.0]);
             rows.retain(|r| !r.marked);
             let mut squares = vec![Vec::new(); stars];
             for row in &rows {

@@ -56,6 +56,7 @@ fn verdicts(seed: u64, frames: usize, truth: Truth) -> Verdicts {
                 rows.push(Row {
                     at: 0,
                     square,
+                    shows: 1.0,
                     declared: 1.0,
                     mag: *mag,
                     rate: rate * rate,

@@ -24,7 +24,7 @@ use coloured_noise::LogProduct;
 use nalgebra::{Cholesky, SMatrix, SVector};
 use rayon::prelude::*;
 
-use super::rows::{Belief, Row};
+use super::rows::Row;
 
 /// Parameters: level a, magnitude b, rate w, share rho (logit), size S^2 (log).
 pub(super) const PARAMETERS: usize = 5;
@@ -122,18 +122,12 @@ impl Model {
         }
     }
 
-    /// What is believed of a row.
-    pub(super) fn belief(&self, at: &Vector) -> impl Fn(&Row) -> Belief + use<> {
+    /// Variance of a row, and the probability that it holds no spike.
+    pub(super) fn belief(&self, at: &Vector) -> impl Fn(&Row) -> [f64; 2] + use<> {
         let there = self.there(at);
         move |row| {
-            let noise = there.own(row) + there.at[RATE] * row.rate;
-            let posterior = there.density(row.square, noise).posterior;
-            let spike: f64 = posterior.iter().zip(there.more).map(|(p, s)| p * s).sum();
-            Belief {
-                noise,
-                whole: noise + spike,
-                sound: posterior[0],
-            }
+            let v = there.own(row) + there.at[RATE] * row.rate;
+            [v, there.density(row, v).posterior[0]]
         }
     }
 
@@ -144,7 +138,7 @@ impl Model {
         let (mut sum, mut product) = (0.0, LogProduct::default());
         for row in rows.iter().filter(|r| of(r)) {
             let v = levels.own(&there, row) + at[RATE] * row.rate;
-            let density = there.density(row.square, v);
+            let density = there.density(row, v);
             sum += density.exponent;
             product.times(density.factor);
         }
@@ -415,9 +409,7 @@ impl Model {
         let (mut sum, mut weight) = (0.0, 0.0);
         let belief = self.belief(at);
         for row in rows {
-            let Belief {
-                noise: v, sound, ..
-            } = belief(row);
+            let [v, sound] = belief(row);
             if sound > 0.5 {
                 sum += (0.5 * row.square / v - 1.0).powi(2);
                 weight += 1.0;
@@ -465,20 +457,26 @@ impl There {
         (self.at[LEVEL] + PER_MAG * self.at[MAGNITUDE] * mag).exp()
     }
 
+    /// What spikes add to the variance of a row as its square shows it.
+    fn more(&self, row: &Row) -> [f64; 3] {
+        self.more.map(|more| more * row.shows)
+    }
+
     /// The density where `v` is the variance without a spike.
-    fn density(&self, square: f64, v: f64) -> Density {
-        let half = 0.5 * square;
+    fn density(&self, row: &Row, v: f64) -> Density {
+        let half = 0.5 * row.square;
+        let more = self.more(row);
         let most = (1..3)
             .filter(|&k| self.share[k] > 0.0)
-            .fold(0.0_f64, |most, k| most.max(self.more[k]));
+            .fold(0.0_f64, |most, k| most.max(more[k]));
         // relative to the widest component, which no square makes impossible
         let exponent = -half / (v + most);
         let parts: [f64; 3] = std::array::from_fn(|k| {
             if self.share[k] <= 0.0 {
                 return 0.0;
             }
-            let inverse = 1.0 / (v + self.more[k]);
-            let relative = if self.more[k] < most {
+            let inverse = 1.0 / (v + more[k]);
+            let relative = if more[k] < most {
                 (-half * inverse - exponent).exp()
             } else {
                 1.0
@@ -497,10 +495,11 @@ impl There {
     /// variance.
     fn row(&self, row: &Row, own: f64) -> (Density, Vector) {
         let v = own + self.at[RATE] * row.rate;
-        let density = self.density(row.square, v);
+        let density = self.density(row, v);
+        let more = self.more(row);
         let posterior = &density.posterior;
         let slope = |k: usize| {
-            let v = v + self.more[k];
+            let v = v + more[k];
             posterior[k] * (0.5 * row.square / v - 1.0) / v
         };
         let spike = slope(1);
@@ -513,7 +512,7 @@ impl There {
             all * own * PER_MAG * row.mag,
             all * row.rate,
             share,
-            spike * self.more[1],
+            spike * more[1],
         ]);
         (density, gradient)
     }

@@ -19,7 +19,7 @@
 //!
 //! k parameters (instant, frequency and lag too), q the square of the amplitudes over
 //! their errors: the evidence if effects are spread like what was found. One slow error may act about X and Y
-//! alike; what differs about them, or acts about one alone, pays ln 6 more. Without a slow
+//! alike; what differs about them, or acts about one alone, pays ln 3 more. Without a slow
 //! error the noise is white, so that what such an error would add is taken off. The
 //! likelier explanation is named; an effect that is worth less than a slow error in its
 //! place is not, even if that error would not be named either. The log-odds of a step of
@@ -58,8 +58,8 @@ pub(crate) const WIDENING: f64 = 1.3;
 /// known to a fifth and a time to a factor of two, within the decades that they may have.
 const SLOW_PRICE: f64 = 4.0;
 /// How much less likely a slow error about X alone, one about Y alone, or another about each is than one that is
-/// the same about both: two references of three err alike, the third in one of three ways.
-const APART: f64 = 6.0;
+/// the same about both: every other reference errs alike, and the others in one of three ways.
+const APART: f64 = 3.0;
 /// Most effects that are added.
 const MOST: usize = 8;
 /// Parts of a long run of which one is searched before the whole is.
@@ -629,7 +629,7 @@ mod tests {
             };
             paid_by_slow(&gains, SLOW_PRICE)
         };
-        assert!((of([0.0, 18.6, 0.0], 18.6, 15.0) - 4.0 - 6.0_f64.ln()).abs() < 1e-12);
+        assert!((of([0.0, 18.6, 0.0], 18.6, 15.0) - 4.0 - 3.0_f64.ln()).abs() < 1e-12);
         assert!((of([20.0, 25.0, 0.0], 45.0, 45.0) - 4.0).abs() < 1e-12);
         // no more than it gains, and the one about Z by itself
         assert!((of([0.0, 2.0, 30.0], 2.0, 1.0) - 6.0).abs() < 1e-12);
