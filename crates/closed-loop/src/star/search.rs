@@ -19,7 +19,7 @@
 //!
 //! k parameters (instant, frequency and lag too), q the square of the amplitudes over
 //! their errors: the evidence if effects are spread like what was found. One slow error may act about X and Y
-//! alike; what differs about them, or acts about one alone, pays ln 3 more. Without a slow
+//! alike; what differs about them, or acts about one alone, pays ln 2 more. Without a slow
 //! error the noise is white, so that what such an error would add is taken off. The
 //! likelier explanation is named; an effect that is worth less than a slow error in its
 //! place is not, even if that error would not be named either. The log-odds of a step of
@@ -57,9 +57,8 @@ pub(crate) const WIDENING: f64 = 1.3;
 /// What a slow error of an axis pays for its size and correlation time, nats: a size is
 /// known to a fifth and a time to a factor of two, within the decades that they may have.
 const SLOW_PRICE: f64 = 4.0;
-/// How much less likely a slow error about X alone, one about Y alone, or another about each is than one that is
-/// the same about both: every other reference errs alike, and the others in one of three ways.
-const APART: f64 = 3.0;
+/// What slow errors pay beside that if they are not the same about X and Y, nats: every other one is so.
+const APART: f64 = std::f64::consts::LN_2;
 /// Most effects that are added.
 const MOST: usize = 8;
 /// Parts of a long run of which one is searched before the whole is.
@@ -443,7 +442,7 @@ impl Trial<'_> {
 fn paid_by_slow(slow: &SlowGains, price: f64) -> f64 {
     let paid = slow.axes.map(|gain| gain.min(price));
     let alike = slow.across - slow.alike + price;
-    let apart = paid[0] + paid[1] + APART.ln();
+    let apart = paid[0] + paid[1] + APART;
     slow.across.min(alike.max(0.0)).min(apart) + paid[2]
 }
 
@@ -618,9 +617,9 @@ mod tests {
     use super::*;
 
     /// What a step about Y alone makes of a slow error (18.6 nats about Y, nothing about X), and a reference that
-    /// wanders about both alike. One about Y alone pays as well for being one of three kinds that are rare.
+    /// wanders about both alike. One about Y alone pays for that as well.
     #[test]
-    fn a_slow_error_about_one_axis_pays_for_its_kind() {
+    fn a_slow_error_about_one_axis_pays_for_that() {
         let of = |axes: [f64; 3], across: f64, alike: f64| {
             let gains = SlowGains {
                 axes,
@@ -629,7 +628,7 @@ mod tests {
             };
             paid_by_slow(&gains, SLOW_PRICE)
         };
-        assert!((of([0.0, 18.6, 0.0], 18.6, 15.0) - 4.0 - 3.0_f64.ln()).abs() < 1e-12);
+        assert!((of([0.0, 18.6, 0.0], 18.6, 15.0) - 4.0 - APART).abs() < 1e-12);
         assert!((of([20.0, 25.0, 0.0], 45.0, 45.0) - 4.0).abs() < 1e-12);
         // no more than it gains, and the one about Z by itself
         assert!((of([0.0, 2.0, 30.0], 2.0, 1.0) - 6.0).abs() < 1e-12);
