@@ -218,6 +218,7 @@ pub(super) mod tests {
             let t = k as f64 / 1200.0 - 1.0;
             table.rows.push(Row {
                 square: 0.0,
+                shows: 1.0,
                 declared: 1.0,
                 mag: 0.0,
                 rate: 0.0,
