@@ -9,8 +9,13 @@
 //! q_i = sum over the axes of r_i^2 v_i / var_i           so that q/v ~ chi2_2
 //! ```
 //!
-//! A spike of the row's own is left to (1 - w_i h_i) of itself, so that it adds (1 - w_i h_i)^2 v_i / var_i of its
-//! square: held to add all of it, spikes beside nine other stars were told to be a fourteenth too small.
+//! A spike of the row's own turns its frame, too, so that less of its square is left:
+//!
+//! ```text
+//! shows_i = (1 - w_i h_i)^2 v_i / var_i
+//! ```
+//!
+//! Held to show all of it, spikes beside nine other stars were told to be a fourteenth too small.
 //!
 //! Source: leverage in linear regression (Hoaglin & Welsch 1978).
 
