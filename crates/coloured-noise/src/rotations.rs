@@ -25,6 +25,13 @@ use crate::smoother::slow_part;
 /// Sigmas beyond which changes from bin to bin show white noise of the reference.
 const BEYOND_CHANCE: f64 = 4.0;
 
+/// What bins are worth: as their stars say, or with the white noise of the reference beside them.
+#[derive(Clone, Copy, Debug)]
+enum Worth {
+    Stars,
+    BesideWhite,
+}
+
 /// The frames' rotations as three series, and the noise of the centroids.
 #[derive(Clone, Debug)]
 pub struct Rotations {
@@ -55,10 +62,10 @@ impl Rotations {
         inverse: Vec<Option<Matrix3<f64>>>,
         centroid: f64,
     ) -> Self {
-        let mean = std::array::from_fn(|a| theta.iter().skip(a).step_by(3).copied().collect());
+        let mean: [Vec<f64>; 3] =
+            std::array::from_fn(|a| theta.iter().skip(a).step_by(3).copied().collect());
         let worth = |a: usize| move |v: &Option<Matrix3<f64>>| v.map_or(0.0, |v| v[(a, a)].recip());
         let count: [Vec<f64>; 3] = std::array::from_fn(|a| inverse.iter().map(worth(a)).collect());
-        let mean: [Vec<f64>; 3] = mean;
         let beside_white =
             std::array::from_fn(|a| beside_white(centroid, &mean[a], &count[a], &frames));
         Self {
@@ -79,11 +86,11 @@ impl Rotations {
             // rotations are no whiter than their stars: a slow part of less than a step between frames is
             // white noise by another name
             let known = near.map(|n| n.reference[axis]).filter(|n| n.slow > 0.0);
-            let (fitted, count, _) = self.likeliest(axis, |y, count| match known {
+            let (fitted, worth, _) = self.likeliest(axis, |y, count| match known {
                 Some(known) => self.near(known, axis, y, count),
                 None => Coloured::fit_above(self.centroid, &self.t_s, y, count),
             });
-            self.beside_centroids(fitted, count, axis)
+            self.beside_centroids(fitted, self.of(worth, axis), axis)
         };
         let (x, (y, z)) = rayon::join(|| of(0), || rayon::join(|| of(1), || of(2)));
         let apart = CommonNoise {
@@ -129,13 +136,8 @@ impl Rotations {
     fn alike(&self, noise: &CommonNoise) -> Option<(Coloured, f64)> {
         let starts = (0..2).filter(|&axis| noise.reference[axis].slow > 0.0);
         let fitted = starts.filter_map(|axis| {
-            let (start, beside, _) = self.by_itself(axis, noise.reference[axis]);
-            let whole = std::ptr::eq(beside, &raw const self.count[axis]);
-            let both = [0, 1].map(|a| {
-                let count = self.beside_white[a].as_ref().filter(|_| !whole);
-                let count = count.unwrap_or(&self.count[a]);
-                (self.mean[a].as_slice(), count.as_slice())
-            });
+            let (start, worth, _) = self.by_itself(axis, noise.reference[axis]);
+            let both = [0, 1].map(|a| (self.mean[a].as_slice(), self.of(worth, a)));
             fit_alike(self.centroid, &self.t_s, &both, &start)
         });
         fitted.max_by(|a, b| a.1.total_cmp(&b.1))
@@ -201,23 +203,33 @@ impl Rotations {
 
     /// What `law` makes of an axis's rotations and the stars' worth of each bin, where that is likelier with the
     /// white noise of the changes or without; that worth, and the log-likelihood.
-    fn likeliest<'a>(
-        &'a self,
+    fn likeliest(
+        &self,
         axis: usize,
         law: impl Fn(&[f64], &[f64]) -> Coloured,
-    ) -> (Coloured, &'a Vec<f64>, f64) {
+    ) -> (Coloured, Worth, f64) {
         let y = &self.mean[axis];
-        let of = |count: &'a Vec<f64>| {
+        let under = |worth: Worth| {
+            let count = self.of(worth, axis);
             let fitted = law(y, count);
-            (fitted, count, fitted.log_likelihood(&self.t_s, y, count))
+            (fitted, worth, fitted.log_likelihood(&self.t_s, y, count))
         };
-        let whole = of(&self.count[axis]);
-        let beside = self.beside_white[axis].as_ref().map(of);
-        beside.filter(|b| b.2 > whole.2).unwrap_or(whole)
+        let stars = under(Worth::Stars);
+        let shown = self.beside_white[axis].is_some();
+        let beside = shown.then(|| under(Worth::BesideWhite));
+        beside.filter(|b| b.2 > stars.2).unwrap_or(stars)
+    }
+
+    /// Stars' worth of the bins of an axis: that of the stars where no white noise shows.
+    fn of(&self, worth: Worth, axis: usize) -> &[f64] {
+        match (worth, &self.beside_white[axis]) {
+            (Worth::BesideWhite, Some(count)) => count,
+            _ => &self.count[axis],
+        }
     }
 
     /// The noise of an axis's rotations by themselves, from `reference` uphill; it has a slow part.
-    fn by_itself(&self, axis: usize, reference: Coloured) -> (Coloured, &Vec<f64>, f64) {
+    fn by_itself(&self, axis: usize, reference: Coloured) -> (Coloured, Worth, f64) {
         self.likeliest(axis, |y, count| self.near(reference, axis, y, count))
     }
 
@@ -232,8 +244,8 @@ impl Rotations {
         if reference.slow <= 0.0 {
             return None;
         }
-        let (own, count, _) = self.by_itself(axis, reference);
-        own.relative_sigma(&self.t_s, &self.mean[axis], count)
+        let (own, worth, _) = self.by_itself(axis, reference);
+        own.relative_sigma(&self.t_s, &self.mean[axis], self.of(worth, axis))
     }
 
     /// Noise of a rotation with that of its centroids, in the unit of a centroid where bins are worth `count`.
@@ -274,17 +286,16 @@ impl Rotations {
 fn beside_white(centroid: f64, y: &[f64], count: &[f64], frames: &[usize]) -> Option<Vec<f64>> {
     let of_stars = |k: usize| centroid * centroid / count[k];
     let pairs = (1..y.len()).filter(|&k| count[k - 1] > 0.0 && count[k] > 0.0);
-    let (mut excess, mut parts, mut squares, mut pairs_seen) = (0.0, 0.0, 0.0, 0.0_f64);
+    let (mut excess, mut parts, mut squares) = (0.0, 0.0, 0.0_f64);
     for k in pairs {
         let known = of_stars(k) + of_stars(k - 1);
         excess += (y[k] - y[k - 1]).powi(2) - known;
         parts += (frames[k] as f64).recip() + (frames[k - 1] as f64).recip();
         squares += known * known;
-        pairs_seen += 1.0;
     }
     // squares of neighbouring changes share a half of each
     let chance = BEYOND_CHANCE * (3.0 * squares).sqrt();
-    if pairs_seen < 1.0 || excess <= chance {
+    if excess <= chance {
         return None;
     }
     let white = excess / parts;

@@ -108,12 +108,16 @@ fn at_best(described: &Described, set: &[usize], rest: &[usize], times: f64) -> 
         let (likelihood, part) = needed(fits, rest, part, price)?;
         Some(base + price.worth(likelihood - base, part.len()) - paid)
     };
-    without_ballast(set, &worth)
+    let (best, _) = without_ballast(set.to_vec(), &worth, 0.0)?;
+    Some(best)
 }
 
-/// The most that `set` is worth, one after the other left out whose absence is worth more.
-fn without_ballast(set: &[usize], worth: &dyn Fn(&[usize]) -> Option<f64>) -> Option<f64> {
-    let mut set = set.to_vec();
+/// `set` without those that are worth less than `price` after the other left out, and what is left of its `worth`.
+fn without_ballast(
+    mut set: Vec<usize>,
+    worth: &dyn Fn(&[usize]) -> Option<f64>,
+    price: f64,
+) -> Option<(f64, Vec<usize>)> {
     let mut best = worth(&set)?;
     while set.len() > 1 {
         let fewer = (0..set.len()).filter_map(|at| {
@@ -122,11 +126,11 @@ fn without_ballast(set: &[usize], worth: &dyn Fn(&[usize]) -> Option<f64>) -> Op
             Some((worth(&less)?, less))
         });
         match fewer.max_by(|a, b| a.0.total_cmp(&b.0)) {
-            Some((value, less)) if value > best => (best, set) = (value, less),
+            Some((value, less)) if best - value < price => (best, set) = (value, less),
             _ => break,
         }
     }
-    Some(best)
+    Some((best, set))
 }
 
 /// What columns pay.
@@ -152,30 +156,15 @@ impl Price {
     }
 }
 
-/// The columns of `part` that are needed beside `rest`, one that is worth less than its price after the
-/// other left out, and the likelihood with them.
+/// The columns of `part` that are needed beside `rest`, and the likelihood with them.
 fn needed(
     fits: &Fits,
     rest: &[usize],
-    mut part: Vec<usize>,
+    part: Vec<usize>,
     price: Price,
 ) -> Option<(f64, Vec<usize>)> {
-    let mut best = likelihood(fits, rest, &part)?;
-    while part.len() > 1 {
-        let fewer = (0..part.len()).filter_map(|at| {
-            let mut less = part.clone();
-            less.remove(at);
-            Some((likelihood(fits, rest, &less)?, less))
-        });
-        let Some((value, less)) = fewer.max_by(|a, b| a.0.total_cmp(&b.0)) else {
-            break;
-        };
-        if price.worth(best - value, 1) >= 0.0 {
-            break;
-        }
-        (best, part) = (value, less);
-    }
-    Some((best, part))
+    let likely = |part: &[usize]| likelihood(fits, rest, part);
+    without_ballast(part, &likely, price.times * price.each)
 }
 
 /// The term of a description that is worth most: by how much, and the likelihood with it.
@@ -289,7 +278,10 @@ mod tests {
     fn what_is_not_worth_its_price_tells_against_no_other() {
         let each = [59.0, 2.0 - 11.0, -1.0];
         let worth = |set: &[usize]| Some(set.iter().map(|&k| each[k]).sum());
-        let of = |set: &[usize]| without_ballast(set, &worth).unwrap_or(f64::NAN);
+        let of = |set: &[usize]| {
+            let left = without_ballast(set.to_vec(), &worth, 0.0);
+            left.map_or(f64::NAN, |(worth, _)| worth)
+        };
         assert!((of(&[0, 1]) - 59.0).abs() < 1e-12);
         assert!((of(&[2, 1, 0]) - 59.0).abs() < 1e-12);
         // one is left, whatever it is worth

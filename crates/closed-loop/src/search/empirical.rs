@@ -8,8 +8,8 @@
 //! ```
 //!
 //! a shift along each axis, a roll and a scale (the time by what bends the scale alone: a frame's turns would be
-//! those of a reference that errs slowly); on an attitude it drives each axis. Motion (a, b) drives each axis by each of its own, by its squares a^2, b^2 and ab and by its size; a
-//! pixel phase its own axis by its first six harmonics, the place within the window its own axis. A rate also
+//! those of a reference that errs slowly); on an attitude it drives each axis. Motion (a, b) drives each axis by
+//! each of its own, by its squares a^2, b^2 and ab and by its size; a pixel phase its own axis by its first six harmonics, the place within the window its own axis. A rate also
 //! drives by its direction alone, whatever its size: backlash does. Two variables together are what neither does
 //! alone,
 //!
@@ -510,10 +510,10 @@ impl Candidate for Empirical {
                 }
                 _ => {
                     // what turns whole frames to and fro is what a slow error of the reference does
-                    let straight = matches!(self.variable, Variable::Time);
+                    let is_time = matches!(self.variable, Variable::Time);
                     let g = legendre(self.scale.of(values[i]));
                     for (k, g) in g.into_iter().enumerate().take(count.div_ceil(4)) {
-                        if k == 0 || !straight {
+                        if k == 0 || !is_time {
                             put(4 * k, g, 0.0);
                             put(4 * k + 1, 0.0, g);
                             put(4 * k + 2, -y * g, x * g);
