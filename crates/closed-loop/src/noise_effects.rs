@@ -17,6 +17,7 @@ mod bursts;
 mod follows;
 mod judge;
 mod levels;
+mod quick;
 mod rows;
 mod squares;
 #[cfg(test)]
@@ -27,7 +28,6 @@ use std::collections::BTreeMap;
 
 use block_regression::Folds;
 use focal_plane::Pixel;
-use rayon::prelude::*;
 use star_tracker::StarView;
 use telemetry::report::{ConsideredEffect, Estimate, FoundEffect};
 use telemetry::{EffectEntry, EffectValue};
@@ -42,7 +42,8 @@ use crate::star::data::StarData;
 use crate::star::evidence::StarEvidence;
 pub(crate) use follows::{NoiseFollows, noise_follows};
 use judge::{Judged, Known, judge};
-use rows::{Row, Source};
+use quick::Quick;
+use rows::{Row, Source, squared_rates};
 
 /// Identities in the catalogue.
 const MAGNITUDE: &str = "magnitude_noise";
@@ -210,10 +211,12 @@ pub(crate) fn claim(
 ) -> Result<NoiseEffects, CloseError> {
     let data = level.data;
     let declared = declared_variance(situation, data)?;
+    let rate = squared_rates(data);
     let source = Source {
         data,
         residual,
         declared: &declared,
+        rate: &rate,
         folds,
     };
     let make = |belief: &dyn Fn(&Row) -> [f64; 2]| source.rows(belief);
@@ -232,9 +235,12 @@ pub(crate) fn claim(
         return Ok(NoiseEffects::default());
     };
     if verdicts.magnitude.stands || verdicts.rate.stands {
-        let quick = quick(data, residual);
+        let quick = Quick::of(data, residual, [&declared, &rate]);
+        let [declared, rate] = &quick.squares;
         let source = Source {
-            residual: &quick,
+            residual: &quick.residual,
+            declared,
+            rate,
             ..source
         };
         let make = |belief: &dyn Fn(&Row) -> [f64; 2]| source.rows(belief);
@@ -260,24 +266,6 @@ pub(crate) fn claim(
         &verdicts.outliers,
     );
     Ok(out)
-}
-
-/// What of the residuals changes from frame to frame: each less the mean of its neighbours,
-/// at the same white noise. Unknown where a neighbour is missing.
-fn quick(data: &StarData, residual: &[Vec<f64>]) -> Vec<Vec<f64>> {
-    let mut of_star = vec![Vec::new(); data.stars.len()];
-    for r in (0..data.t_s.len()).filter(|&r| !data.outlier[r]) {
-        of_star[data.star[r]].push(r);
-    }
-    let scale = (2.0_f64 / 3.0).sqrt();
-    let mut out = vec![vec![f64::NAN; data.t_s.len()]; residual.len()];
-    let axes = out.par_iter_mut().zip(residual);
-    axes.for_each(|(out, residual)| {
-        for w in of_star.iter().flat_map(|rows| rows.windows(3)) {
-            out[w[1]] = scale * (residual[w[1]] - 0.5 * (residual[w[0]] + residual[w[2]]));
-        }
-    });
-    out
 }
 
 /// The gentlest slope of either sign at which `gain` reaches `wanted`, by halving.

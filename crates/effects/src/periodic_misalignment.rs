@@ -32,8 +32,9 @@ const NAMES: [&str; 6] = [
 
 /// A line goes round at least twice in the data: what does not is a drift.
 const FEWEST_CYCLES: u32 = 2;
-/// Frequencies that the catalogue proposes: the first harmonics of the span. A line above them, or
-/// between them, is found in a spectrum, and [`line_at`] makes its candidate.
+/// Frequencies that the catalogue proposes: the first harmonics of the span, and those half-way between
+/// two, where a harmonic would see four tenths of a line's power. A line above them is found in a spectrum, and
+/// [`line_at`] makes its candidate.
 const HARMONICS: u32 = 24;
 
 /// The kind.
@@ -83,8 +84,8 @@ impl EffectKind for Kind {
         if !scene.sees_misalignment() || span <= 0.0 {
             return Vec::new();
         }
-        (FEWEST_CYCLES..=HARMONICS)
-            .map(|k| f64::from(k) / span)
+        (2 * FEWEST_CYCLES..=2 * HARMONICS)
+            .map(|k| 0.5 * f64::from(k) / span)
             .take_while(|f| *f < 0.5 / scene.step_s)
             .map(|f| line_at(f, span_s, 1))
             .collect()

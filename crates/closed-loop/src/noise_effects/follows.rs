@@ -13,9 +13,10 @@ use rayon::prelude::*;
 use telemetry::report::{Dependence, Unattributed};
 
 use super::bursts::burst;
-use super::rows::{Row, Source};
+use super::quick::Quick;
+use super::rows::{Row, Source, squared_rates};
 use super::squares::{Columns, Judged, Table, both};
-use super::{NoiseEffects, declared_variance, quick};
+use super::{NoiseEffects, declared_variance};
 use crate::error::CloseError;
 use crate::figures::first_of_each;
 use crate::search::empirical::Variable;
@@ -55,21 +56,27 @@ pub(crate) fn noise_follows(
 ) -> Result<NoiseFollows, CloseError> {
     let data = level.data;
     let mut declared = declared_variance(situation, data)?;
-    let scale = data.camera.arcsec_per_px().map(|s| s / 3600.0);
-    for (r, v) in declared.iter_mut().enumerate() {
-        let more =
-            claimed.rate * (data.velocity[0][r] * scale[0]).hypot(data.velocity[1][r] * scale[1]);
+    let rate = squared_rates(data);
+    for (v, rate) in declared.iter_mut().zip(&rate) {
+        let more = claimed.rate.powi(2) * rate;
         if more.is_finite() {
-            *v += more * more;
+            *v += more;
         }
     }
-    let tables: Vec<Table> = [residual, &quick(data, residual)]
+    let quick = Quick::of(data, residual, [&declared, &rate]);
+    let [its_declared, its_rate] = &quick.squares;
+    let of = [
+        (residual, &declared, &rate),
+        (&quick.residual, its_declared, its_rate),
+    ];
+    let tables: Vec<Table> = of
         .into_par_iter()
-        .filter_map(|residual| {
+        .filter_map(|(residual, declared, rate)| {
             Table::new(&Source {
                 data,
                 residual,
-                declared: &declared,
+                declared,
+                rate,
                 folds,
             })
         })

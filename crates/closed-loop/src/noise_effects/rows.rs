@@ -53,6 +53,16 @@ pub(super) struct Row {
     pub(super) marked: bool,
 }
 
+/// Squared rate across the detector of every row, (deg/s)^2.
+pub(super) fn squared_rates(data: &StarData) -> Vec<f64> {
+    let scale = data.camera.arcsec_per_px().map(|s| s / 3600.0);
+    let square = |r: usize| {
+        let of_axis = |a: usize| (data.velocity[a][r] * scale[a]).powi(2);
+        of_axis(0) + of_axis(1)
+    };
+    (0..data.t_s.len()).map(square).collect()
+}
+
 /// Where the rows come from.
 pub(super) struct Source<'a> {
     pub(super) data: &'a StarData,
@@ -60,6 +70,8 @@ pub(super) struct Source<'a> {
     pub(super) residual: &'a [Vec<f64>],
     /// Declared variance per axis of every row, arcsec^2.
     pub(super) declared: &'a [f64],
+    /// Squared rate across the detector of every row, (deg/s)^2.
+    pub(super) rate: &'a [f64],
     pub(super) folds: &'a Folds,
 }
 
@@ -84,22 +96,18 @@ impl Source<'_> {
         out: &mut Vec<Row>,
     ) {
         let data = self.data;
-        let scale = data.camera.arcsec_per_px();
         let members: Vec<(usize, Row, [f64; 2])> = data
             .frames
             .rows_of(frame)
             .filter(|&r| self.residual.iter().all(|axis| axis[r].is_finite()))
             .map(|r| {
-                let rate: f64 = (0..2)
-                    .map(|a| (data.velocity[a][r] * scale[a] / 3600.0).powi(2))
-                    .sum();
                 let mag = data.mag[r] - 5.0;
                 let row = Row {
                     square: self.residual[0][r].powi(2) + self.residual[1][r].powi(2),
                     shows: 1.0,
                     declared: self.declared[r],
                     mag: if mag.is_finite() { mag } else { 0.0 },
-                    rate,
+                    rate: self.rate[r],
                     at: r,
                     star: data.star[r],
                     block,

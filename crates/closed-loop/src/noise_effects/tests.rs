@@ -235,3 +235,51 @@ fn one_effect_is_not_taken_for_another() {
         }
     }
 }
+
+/// One row of 5.5 sigma calls for spikes, of which there are none: nothing bends the likelihood along their size, and
+/// that stops no other parameter short of its summit. Bounds as above, of 40 numbers: 1 +- 5 sqrt(2/40).
+#[test]
+fn where_there_are_no_spikes_a_rate_has_its_value_and_sigma() {
+    let (truth, seeds) = (2.6, 40);
+    let known = Known {
+        moving: true,
+        least_slope: super::SLOPE_OF_NONE,
+        outliers: None,
+    };
+    let mut squares = 0.0;
+    for seed in 0..seeds {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+        let folds = Folds::cut(443);
+        let mut rows = Vec::new();
+        for (block, range) in folds.blocks.iter().enumerate() {
+            for (frame, star) in range
+                .clone()
+                .flat_map(|frame| (0..15).map(move |s| (frame, s)))
+            {
+                let rate = 0.29 * (0.026 * frame as f64).sin().abs();
+                let variance = 1.0 + (truth * rate).powi(2);
+                let mut one = || -> f64 { StandardNormal.sample(&mut rng) };
+                rows.push(Row {
+                    at: 0,
+                    square: variance * (one().powi(2) + one().powi(2)),
+                    shows: 1.0,
+                    declared: 1.0,
+                    mag: 0.2 * f64::from(star) - 2.0,
+                    rate: rate * rate,
+                    star: star as usize,
+                    block,
+                    marked: false,
+                });
+            }
+        }
+        rows[3000].square = 30.0 * (1.0 + truth * truth * rows[3000].rate);
+        let verdicts = judge(&|_| rows.clone(), &folds, known).expect("enough rows");
+        let [value, sigma] = verdicts.rate.values[0];
+        assert!(
+            verdicts.rate.stands && sigma > 0.0,
+            "seed {seed}: {verdicts:?}"
+        );
+        squares += ((value - truth) / sigma).powi(2) / seeds as f64;
+    }
+    assert!((0.2..2.1).contains(&squares), "{squares}");
+}

@@ -46,6 +46,9 @@ const MOST_SHARE: f64 = 0.2;
 /// Least size of a spike, sigma of the usual row: smaller is no spike, but noise with tails.
 const LEAST_SIZE: f64 = 4.0;
 const ROUNDS: usize = 60;
+/// Farthest that a round moves the logarithms of share and size. Where there are next to no spikes, nothing bends
+/// the likelihood along them, and a step of thousands stops every parameter short of its summit.
+const FARTHEST: f64 = 3.0;
 /// Nats that a round gains at the summit, and that one more would, as the curvature has it.
 const CONVERGED: f64 = 1e-4;
 const NEXT_TO_NOTHING: f64 = 1e-5;
@@ -67,6 +70,14 @@ struct Sums {
     value: f64,
     gradient: Vector,
     outer: Matrix,
+}
+
+/// `step` without more of share and size than a round moves.
+fn shortened(mut step: Vector) -> Vector {
+    for k in [SHARE, SIZE] {
+        step[k] = step[k].clamp(-FARTHEST, FARTHEST);
+    }
+    step
 }
 
 impl Sums {
@@ -225,7 +236,7 @@ impl Model {
             if 0.5 * slope.dot(&step) < NEXT_TO_NOTHING && damping < 1e-2 {
                 break;
             }
-            let next = self.bounded(&(at + step));
+            let next = self.bounded(&(at + shortened(step)));
             let there = self.sums(&next, rows, of);
             if there.value >= value {
                 let gained = there.value - value;
@@ -307,10 +318,16 @@ impl Model {
         pieces.iter().fold(Sums::default(), Sums::add)
     }
 
-    /// Whether parameter `k` stands at a bound that `gradient` pushes it against.
+    /// Whether parameter `k` stands at a bound that `gradient` pushes it against, or is the size of no spikes.
     fn held(&self, at: &Vector, k: usize, gradient: f64) -> bool {
         let [low, high] = self.bounds()[k];
-        (at[k] <= low && gradient < 0.0) || (at[k] >= high && gradient > 0.0)
+        let pushed = (at[k] <= low && gradient < 0.0) || (at[k] >= high && gradient > 0.0);
+        pushed || self.is_of_none(at, k)
+    }
+
+    /// Whether parameter `k` is the size of spikes of which there are none.
+    fn is_of_none(&self, at: &Vector, k: usize) -> bool {
+        k == SIZE && at[SHARE] <= self.bounds()[SHARE][0]
     }
 
     fn bounds(&self) -> [[f64; 2]; PARAMETERS] {
@@ -329,7 +346,7 @@ impl Model {
         Vector::from_fn(|k, _| at[k].clamp(bounds[k][0], bounds[k][1]))
     }
 
-    /// Covariances of the free parameters. Parameters that are not free, or stand at a bound, have none.
+    /// Covariances of the free parameters. Parameters that are not free, stand at a bound, or act on nothing, have none.
     /// `None`: `fit` is no summit.
     pub(super) fn covariance<const N: usize>(
         &self,
@@ -340,6 +357,7 @@ impl Model {
         let bounds = self.bounds();
         let inside: Vec<usize> = (0..PARAMETERS)
             .filter(|&k| fit.free[k] && fit.at[k] > bounds[k][0] && fit.at[k] < bounds[k][1])
+            .filter(|&k| !self.is_of_none(&fit.at, k))
             .collect();
         let inverse = self.inverse_hessian(fit, rows, &inside)?;
         let spread = |small: &nalgebra::DMatrix<f64>| {
