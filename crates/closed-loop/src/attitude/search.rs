@@ -10,7 +10,8 @@
 //!
 //! by alternating generalised least squares and the noise fit. That climb ends on the hill it starts on:
 //! an effect that the noise has swallowed stays swallowed. So there are two, from the noise of the last
-//! choice and from little slow noise, and the likelier counts. The p-value pays
+//! choice and from little slow noise, and the likelier counts. What even so does not stand is held as a whole against
+//! slow noise in its place, each with all that its freedom costs. The p-value pays
 //! for the whole search; the gain that is reported and ranked is out of fold, each
 //! side predicted with amplitudes of the other folds under its own noise.
 //!
@@ -58,6 +59,10 @@ const FAINT_SHARE: f64 = 0.2;
 const EARNED: f64 = 2.0;
 /// Nats that an effect gains under white noise below which no noise makes it significant.
 const LITTLE: f64 = 8.0;
+/// What slow noise pays for its size and correlation time, nats, as at star level; and those by which an effect has to be
+/// worth more than it. The best step of a wander is worth 2 +- 2 less.
+const SLOW_PRICE: f64 = 4.0;
+const BY_FAR: f64 = 5.0;
 /// The ratio statistic of a noise model that is only nearly right runs this much
 /// wider than chi-squared (red-noise nulls: rms t of 1.13).
 const WIDENING: f64 = 1.3;
@@ -67,6 +72,8 @@ const WIDENING: f64 = 1.3;
 enum Start {
     Given,
     Faint,
+    /// No slow noise at all.
+    White,
 }
 
 /// Builds the evidence of one noise.
@@ -76,8 +83,9 @@ pub(crate) type WithNoise<'d> = dyn Fn([Coloured; 3]) -> AttitudeEvidence<'d> + 
 #[derive(Clone, Debug)]
 struct Scored {
     noise: [Coloured; 3],
-    /// Log-likelihood at the maximum, nats.
+    /// Log-likelihood at the maximum, nats, and of each axis.
     loglik: f64,
+    of_axis: [f64; 3],
     /// Log-likelihood predicted out of fold, nats.
     out_of_fold: f64,
     /// Amplitudes and their robust standard errors are within credible bounds.
@@ -356,6 +364,9 @@ impl<'a, 'd> Trial<'a, 'd> {
         let freedom = (group.columns.len() + group.choices) as f64;
         let p = ChiSquared::new(freedom).map_or(1.0, |law| law.sf(ratio.max(0.0)));
         let mut p = (p * self.cost[g]).min(1.0);
+        if p >= FAMILY_ALPHA && with.loglik - without.loglik > LITTLE {
+            p = p.min(self.instead_of_slow(&others, &set, g, &without));
+        }
         if p < FAMILY_ALPHA {
             p = p.max(self.as_declared(&set, g, &with));
         }
@@ -365,6 +376,30 @@ impl<'a, 'd> Trial<'a, 'd> {
             credible: with.credible,
             observable: true,
         }
+    }
+
+    /// Chance of `g` beside `others` under white noise, where it is likelier by far than slow noise in its place. A slow
+    /// effect makes any noise look slow, so that fitted beside such noise hardly one is beyond chance: each is held
+    /// against the other as a whole, with all that its freedom costs.
+    fn instead_of_slow(&self, others: &[usize], set: &[usize], g: usize, slow: &Scored) -> f64 {
+        let climbs = [others, set].map(|set| self.climb(set, Start::White));
+        let [Some(without), Some(with)] = climbs else {
+            return 1.0;
+        };
+        let group = &self.fitted.groups[g];
+        let square = 2.0 * (with.loglik - without.loglik);
+        let k = (group.columns.len() + group.choices + group.shapes) as f64;
+        let worth = 0.5 * square - 0.5 * k * (1.0 + (square / k).max(1.0).ln()) - self.cost[g].ln();
+        let gain: [f64; 3] = std::array::from_fn(|a| slow.of_axis[a] - without.of_axis[a]);
+        // one slow error may act about X and Y alike
+        let in_its_place =
+            (gain[0] + gain[1] - SLOW_PRICE).max(0.0) + (gain[2] - SLOW_PRICE).max(0.0);
+        if worth - in_its_place < BY_FAR {
+            return 1.0;
+        }
+        let freedom = (group.columns.len() + group.choices) as f64;
+        let p = ChiSquared::new(freedom).map_or(1.0, |law| law.sf(square / WIDENING));
+        (p * self.cost[g]).min(1.0)
     }
 
     /// Chance that the declared errors along this motion explain as much as `g` does beside the others of `set`.
@@ -455,7 +490,7 @@ impl<'a, 'd> Trial<'a, 'd> {
         let binned = self.columns(chosen);
         let mut noise = match start {
             Start::Given => self.noise,
-            Start::Faint => self.white,
+            Start::Faint | Start::White => self.white,
         };
         let mut last = None;
         for _ in 0..ALTERNATIONS {
@@ -470,6 +505,7 @@ impl<'a, 'd> Trial<'a, 'd> {
                     noise[axis].refit(&self.data.bins.t_s, &residual[axis], &self.data.count[axis])
                 }
                 Start::Faint => self.climbing_from_faint(axis, &residual[axis]),
+                Start::White => self.white_of(axis, &residual[axis]),
             });
             let credible = fitted.groups.iter().all(|group| {
                 group
@@ -486,9 +522,9 @@ impl<'a, 'd> Trial<'a, 'd> {
             for (value, &c) in estimate.value.iter().zip(&set) {
                 all[c] = *value;
             }
-            last = Some((self.loglik(&noise, &residual), credible, all));
+            last = Some((self.logliks(&noise, &residual), credible, all));
         }
-        let (loglik, credible, values) = last?;
+        let (of_axis, credible, values) = last?;
         let evidence = (self.with_noise)(noise);
         let design = evidence.whitened(&binned);
         let fitted = fit_design(&evidence, design.as_ref(), self.folds, &candidates).ok()?;
@@ -496,7 +532,8 @@ impl<'a, 'd> Trial<'a, 'd> {
         let out_of_fold = fitted.fits.out_of_fold(&set)?.total_loglik();
         Some(Scored {
             noise,
-            loglik,
+            loglik: of_axis.iter().sum(),
+            of_axis,
             out_of_fold: out_of_fold + self.log_scale(&noise),
             credible,
             amplitudes: values,
@@ -506,18 +543,24 @@ impl<'a, 'd> Trial<'a, 'd> {
     /// Noise of a residual: white, unless slow noise beside it earns its two parameters (Akaike).
     fn climbing_from_faint(&self, axis: usize, residual: &[f64]) -> Coloured {
         let (t_s, count) = (&self.data.bins.t_s, &self.data.count[axis]);
-        let rows = count.iter().filter(|n| **n > 0.0).count().max(1) as f64;
-        let square: f64 = residual.iter().zip(count).map(|(y, n)| n * y * y).sum();
-        let white = Coloured {
-            white: (square / rows).sqrt().max(f64::MIN_POSITIVE),
-            ..self.white[axis]
-        };
+        let white = self.white_of(axis, residual);
         let found = self.faint[axis].refit(t_s, residual, count);
         let loglik = |noise: &Coloured| noise.log_likelihood(t_s, residual, count);
         if loglik(&found) > loglik(&white) + EARNED {
             found
         } else {
             white
+        }
+    }
+
+    /// White noise of a residual.
+    fn white_of(&self, axis: usize, residual: &[f64]) -> Coloured {
+        let count = &self.data.count[axis];
+        let rows = count.iter().filter(|n| **n > 0.0).count().max(1) as f64;
+        let square: f64 = residual.iter().zip(count).map(|(y, n)| n * y * y).sum();
+        Coloured {
+            white: (square / rows).sqrt().max(f64::MIN_POSITIVE),
+            ..self.white[axis]
         }
     }
 
@@ -556,10 +599,12 @@ impl<'a, 'd> Trial<'a, 'd> {
     }
 
     fn loglik(&self, noise: &[Coloured; 3], residual: &[Vec<f64>; 3]) -> f64 {
-        (0..3)
-            .map(|a| {
-                noise[a].log_likelihood(&self.data.bins.t_s, &residual[a], &self.data.count[a])
-            })
-            .sum()
+        self.logliks(noise, residual).iter().sum()
+    }
+
+    fn logliks(&self, noise: &[Coloured; 3], residual: &[Vec<f64>; 3]) -> [f64; 3] {
+        std::array::from_fn(|a| {
+            noise[a].log_likelihood(&self.data.bins.t_s, &residual[a], &self.data.count[a])
+        })
     }
 }

@@ -5,6 +5,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::judge::{Known, Verdicts, judge};
 use super::rows::Row;
+use super::variance::{Fit, LEVEL, Model, PARAMETERS, SHARE, SIZE};
 
 /// What acts on synthetic rows.
 #[derive(Clone, Copy, Default)]
@@ -282,4 +283,37 @@ fn where_there_are_no_spikes_a_rate_has_its_value_and_sigma() {
         squares += ((value - truth) / sigma).powi(2) / seeds as f64;
     }
     assert!((0.2..2.1).contains(&squares), "{squares}");
+}
+
+/// The size of spikes of which there are none has no covariance, and takes none from the others.
+#[test]
+fn the_size_of_no_spikes_leaves_the_others_their_covariance() {
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(2);
+    let mut one = || -> f64 { StandardNormal.sample(&mut rng) };
+    let rows: Vec<Row> = (0..2000)
+        .map(|at| Row {
+            at,
+            square: one().powi(2) + one().powi(2),
+            shows: 1.0,
+            declared: 1.0,
+            mag: 0.0,
+            rate: 0.0,
+            star: at % 5,
+            block: at / 100,
+            marked: false,
+        })
+        .collect();
+    let model = Model::new(&rows, None);
+    let mut free = [false; PARAMETERS];
+    (free[LEVEL], free[SHARE], free[SIZE]) = (true, true, true);
+    let at = model.plain(&rows);
+    let fit = Fit {
+        at,
+        free,
+        loglik: model.loglik(&at, &rows, |_| true),
+    };
+    let covariance = model.covariance(&fit, &rows, [&|r: &Row| r.block]);
+    let variance = covariance.expect("a summit").model[(LEVEL, LEVEL)];
+    // of the logarithm of a level, n squares of two axes: 1/n
+    assert!((variance * 2000.0 - 1.0).abs() < 0.2, "{variance}");
 }
