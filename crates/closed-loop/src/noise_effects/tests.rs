@@ -255,7 +255,7 @@ fn where_there_are_no_spikes_a_rate_has_its_value_and_sigma() {
         for (block, range) in folds.blocks.iter().enumerate() {
             for (frame, star) in range
                 .clone()
-                .flat_map(|frame| (0..15).map(move |s| (frame, s)))
+                .flat_map(|frame| (0..15_u8).map(move |s| (frame, s)))
             {
                 let rate = 0.29 * (0.026 * frame as f64).sin().abs();
                 let variance = 1.0 + (truth * rate).powi(2);
@@ -267,7 +267,7 @@ fn where_there_are_no_spikes_a_rate_has_its_value_and_sigma() {
                     declared: 1.0,
                     mag: 0.2 * f64::from(star) - 2.0,
                     rate: rate * rate,
-                    star: star as usize,
+                    star: usize::from(star),
                     block,
                     marked: false,
                 });
