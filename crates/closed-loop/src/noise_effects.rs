@@ -93,10 +93,7 @@ impl NoiseEffects {
             let all = rows.iter().map(|&r| of(r)).filter(|v| v.is_finite());
             all.sum::<f64>() / rows.len().max(1) as f64
         };
-        let degrees = data.camera.arcsec_per_px().map(|s| s / 3600.0);
-        let square = |r: usize| {
-            (data.velocity[0][r] * degrees[0]).powi(2) + (data.velocity[1][r] * degrees[1]).powi(2)
-        };
+        let rate = squared_rates(data);
         // rows of one star grow alike
         let mut of_star = vec![0.0; data.stars.len()];
         for &r in rows.iter().filter(|&&r| declared[r].is_finite()) {
@@ -111,7 +108,7 @@ impl NoiseEffects {
         for entry in &mut self.considered {
             entry.needed = match entry.id.as_str() {
                 MAGNITUDE => steepest(wanted, &grown),
-                RATE => Some((wanted / mean(&square)).sqrt()),
+                RATE => Some((wanted / mean(&|r| rate[r])).sqrt()),
                 OUTLIERS => Some(wanted / (SPIKE * SPIKE * mean(&|r| declared[r]))),
                 _ => None,
             }

@@ -39,7 +39,9 @@ use crate::evidence::Evidence;
 use crate::figures;
 use crate::search::empirical::EMPIRICAL;
 use crate::search::refusal::{Refusal, Refused};
-use crate::search::selection::{FAMILY_ALPHA, Judgement, Selection, columns_of, costs, price};
+use crate::search::selection::{
+    FAMILY_ALPHA, Judgement, SLOW_PRICE, Selection, WIDENING, columns_of, costs, price,
+};
 use crate::search::{
     Fitted, Found, amplitudes, borrowed, family, first_column, fit, fit_design, polish,
 };
@@ -59,13 +61,9 @@ const FAINT_SHARE: f64 = 0.2;
 const EARNED: f64 = 2.0;
 /// Nats that an effect gains under white noise below which no noise makes it significant.
 const LITTLE: f64 = 8.0;
-/// What slow noise pays for its size and correlation time, nats, as at star level; and those by which an effect has to be
-/// worth more than it. The best step of a wander is worth 2 +- 2 less.
-const SLOW_PRICE: f64 = 4.0;
+/// Nats by which an effect has to be worth more than slow noise in its place. The best step of a wander is worth
+/// 2 +- 2 less.
 const BY_FAR: f64 = 5.0;
-/// The ratio statistic of a noise model that is only nearly right runs this much
-/// wider than chi-squared (red-noise nulls: rms t of 1.13).
-const WIDENING: f64 = 1.3;
 
 /// Where the climb to a hypothesis' own noise starts.
 #[derive(Clone, Copy, Debug)]
@@ -83,8 +81,7 @@ pub(crate) type WithNoise<'d> = dyn Fn([Coloured; 3]) -> AttitudeEvidence<'d> + 
 #[derive(Clone, Debug)]
 struct Scored {
     noise: [Coloured; 3],
-    /// Log-likelihood at the maximum, nats, and of each axis.
-    loglik: f64,
+    /// Log-likelihood of each axis at the maximum, nats.
     of_axis: [f64; 3],
     /// Log-likelihood predicted out of fold, nats.
     out_of_fold: f64,
@@ -92,6 +89,13 @@ struct Scored {
     credible: bool,
     /// Amplitudes of all columns of the candidates, in order; zero where not observable.
     amplitudes: Vec<f64>,
+}
+
+impl Scored {
+    /// Of all axes.
+    fn loglik(&self) -> f64 {
+        self.of_axis.iter().sum()
+    }
 }
 
 /// The search, the noise it ends with, and what it found and did not add; `rows` are the folds of the unbinned rows.
@@ -360,11 +364,9 @@ impl<'a, 'd> Trial<'a, 'd> {
         let Some((with, without)) = scores else {
             return Judgement::UNSEEN;
         };
-        let ratio = 2.0 * (with.loglik - without.loglik) / WIDENING;
-        let freedom = (group.columns.len() + group.choices) as f64;
-        let p = ChiSquared::new(freedom).map_or(1.0, |law| law.sf(ratio.max(0.0)));
-        let mut p = (p * self.cost[g]).min(1.0);
-        if p >= FAMILY_ALPHA && with.loglik - without.loglik > LITTLE {
+        let ratio = 2.0 * (with.loglik() - without.loglik());
+        let mut p = self.chance(g, group.columns.len(), ratio);
+        if p >= FAMILY_ALPHA && with.loglik() - without.loglik() > LITTLE {
             p = p.min(self.instead_of_slow(&others, &set, g, &without));
         }
         if p < FAMILY_ALPHA {
@@ -387,7 +389,7 @@ impl<'a, 'd> Trial<'a, 'd> {
             return 1.0;
         };
         let group = &self.fitted.groups[g];
-        let square = 2.0 * (with.loglik - without.loglik);
+        let square = 2.0 * (with.loglik() - without.loglik());
         let k = (group.columns.len() + group.choices + group.shapes) as f64;
         let worth = 0.5 * square - 0.5 * k * (1.0 + (square / k).max(1.0).ln()) - self.cost[g].ln();
         let gain: [f64; 3] = std::array::from_fn(|a| slow.of_axis[a] - without.of_axis[a]);
@@ -397,8 +399,13 @@ impl<'a, 'd> Trial<'a, 'd> {
         if worth - in_its_place < BY_FAR {
             return 1.0;
         }
-        let freedom = (group.columns.len() + group.choices) as f64;
-        let p = ChiSquared::new(freedom).map_or(1.0, |law| law.sf(square / WIDENING));
+        self.chance(g, group.columns.len(), square)
+    }
+
+    /// Chance that so many `columns` of `g` gain such a `ratio`, times what the search costs.
+    fn chance(&self, g: usize, columns: usize, ratio: f64) -> f64 {
+        let freedom = (columns + self.fitted.groups[g].choices) as f64;
+        let p = ChiSquared::new(freedom).map_or(1.0, |law| law.sf(ratio.max(0.0) / WIDENING));
         (p * self.cost[g]).min(1.0)
     }
 
@@ -410,10 +417,7 @@ impl<'a, 'd> Trial<'a, 'd> {
         let evidence = (self.with_noise)(scored.noise);
         let told = imagined.and_then(|i| likeness(i, &evidence, &self.columns(&order), own));
         told.map_or(0.0, |told| {
-            let freedom = (told.columns + self.fitted.groups[g].choices) as f64;
-            let square = told.square / (told.excess * WIDENING);
-            let p = ChiSquared::new(freedom).map_or(1.0, |law| law.sf(square));
-            (p * self.cost[g]).min(1.0)
+            self.chance(g, told.columns, told.square / told.excess)
         })
     }
 
@@ -463,7 +467,7 @@ impl<'a, 'd> Trial<'a, 'd> {
             },
         );
         let both = [given, faint].into_iter().flatten();
-        both.max_by(|a, b| a.loglik.total_cmp(&b.loglik))
+        both.max_by(|a, b| a.loglik().total_cmp(&b.loglik()))
     }
 
     /// Whether each of `chosen` explains something beside the others if the noise is white.
@@ -532,7 +536,6 @@ impl<'a, 'd> Trial<'a, 'd> {
         let out_of_fold = fitted.fits.out_of_fold(&set)?.total_loglik();
         Some(Scored {
             noise,
-            loglik: of_axis.iter().sum(),
             of_axis,
             out_of_fold: out_of_fold + self.log_scale(&noise),
             credible,

@@ -44,6 +44,12 @@ use rayon::prelude::*;
 
 /// Chance that a bundle which follows its model gets any effect at all.
 pub(crate) const FAMILY_ALPHA: f64 = 0.01;
+/// The ratio statistic of a noise model that is only nearly right runs this much
+/// wider than chi-squared (red-noise nulls: rms t of 1.13).
+pub(crate) const WIDENING: f64 = 1.3;
+/// What a slow error of an axis pays for its size and correlation time, nats: a size is
+/// known to a fifth and a time to a factor of two, within the decades that they may have.
+pub(crate) const SLOW_PRICE: f64 = 4.0;
 
 /// Candidate columns that enter or leave together.
 #[derive(Clone, Debug, PartialEq)]

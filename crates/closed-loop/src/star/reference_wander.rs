@@ -16,9 +16,10 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 use telemetry::report::{ConsideredEffect, Estimate, FoundEffect};
 use telemetry::{EffectEntry, EffectValue};
 
+use crate::search::selection::WIDENING;
 use crate::star::data::StarData;
 use crate::star::frame_rotation::rotation_of;
-use crate::star::search::{WIDENING, Wander};
+use crate::star::search::Wander;
 
 /// Identity in the catalogue.
 pub(crate) const REFERENCE_ERROR: &str = "reference_error";

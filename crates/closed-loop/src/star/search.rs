@@ -41,7 +41,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 use crate::error::CloseError;
 use crate::evidence::Evidence;
 use crate::search::selection::{
-    FAMILY_ALPHA, Group, Judgement, Selection, columns_of, costs, price,
+    FAMILY_ALPHA, Group, Judgement, SLOW_PRICE, Selection, WIDENING, columns_of, costs, price,
 };
 use crate::search::{Fitted, Found, borrowed, fit_grams, polish, search};
 use crate::star::evidence::StarEvidence;
@@ -51,12 +51,6 @@ use crate::star::moments::StarMoments;
 const SHORTLIST: usize = 3;
 /// Rounds of generalised least squares and noise fit.
 const ALTERNATIONS: usize = 2;
-/// The ratio of a noise model that is only nearly right runs this much wider than
-/// chi-squared (as at attitude level).
-pub(crate) const WIDENING: f64 = 1.3;
-/// What a slow error of an axis pays for its size and correlation time, nats: a size is
-/// known to a fifth and a time to a factor of two, within the decades that they may have.
-const SLOW_PRICE: f64 = 4.0;
 /// What slow errors pay beside that if they are not the same about X and Y, nats: every other one is so.
 const APART: f64 = std::f64::consts::LN_2;
 /// Most effects that are added.

@@ -17,7 +17,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::{MOST, Series, Track, WORTH_A_SEARCH};
 use crate::attitude::spatial_errors::SpatialErrors;
-use crate::star::search::WIDENING;
+use crate::search::selection::WIDENING;
 
 /// Instants tried before the neighbours of the best are.
 const MOST_STEPS: usize = 1200;
