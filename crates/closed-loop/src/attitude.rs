@@ -17,6 +17,7 @@ pub(crate) mod data;
 mod declared_effects;
 mod imagined;
 mod likeness;
+mod line_level;
 mod run;
 mod search;
 pub(crate) mod spatial_errors;

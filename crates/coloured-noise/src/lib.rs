@@ -21,6 +21,7 @@
 //! |---|---|
 //! | the noise of a series | [`Coloured::fit`], [`Coloured::refit`] |
 //! | the same beside a known white part | [`Coloured::fit_above`], [`Coloured::refit_above`] |
+//! | the same beside what is known of the slow part | [`Coloured::refit_near`], [`Foreknown`] |
 //! | how well the slow part is known | [`Coloured::relative_sigma`] |
 //! | the noise taken out of series and regressors | [`Coloured::whiten`] |
 //! | many steps at once | [`Coloured::steps`] |
@@ -72,7 +73,7 @@ mod joint;
 mod rotations;
 mod smoother;
 
-pub use coloured::{Coloured, LogProduct};
+pub use coloured::{Coloured, Foreknown, LogProduct};
 pub use common_noise::CommonNoise;
 pub use filter::Filter;
 pub use rotations::{Rotations, SlowGains};

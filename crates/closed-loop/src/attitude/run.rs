@@ -5,12 +5,12 @@
 use std::sync::Arc;
 
 use block_regression::Folds;
-use coloured_noise::Coloured;
+use coloured_noise::{Coloured, Foreknown};
 use effects::{Candidate, Scene};
 
 use crate::attitude::data::{AttitudeData, AttitudeEvidence};
 use crate::attitude::declared_effects;
-use crate::attitude::search;
+use crate::attitude::search::{self, Declared};
 use crate::attitude::spatial_errors::SpatialErrors;
 use crate::attitude::steadied::steadied;
 use crate::bins;
@@ -88,6 +88,10 @@ pub(crate) fn run(
     progress("searching for causes");
     let scene = scene(situation, &data);
     let changes = SpatialErrors::declared(situation, &data.t_s);
+    let declared = Declared {
+        changes: changes.as_ref(),
+        noise: declared_noise(situation),
+    };
     let search = |data: &AttitudeData, motion: &Around, put_forward: &[Arc<dyn Candidate>]| {
         let mut list = catalogue::candidates(&scene);
         list.retain(|c| c.acts_on_attitude());
@@ -95,15 +99,8 @@ pub(crate) fn run(
         list.extend(put_forward.iter().cloned());
         let with_noise = |noise: [Coloured; 3]| evidence(data, situation, noise, motion);
         let (bins, start) = (&data.bins.folds, fit_noise(data, &before));
-        let (found, noise, refused) = search::search(
-            &with_noise,
-            data,
-            bins,
-            &folds,
-            list,
-            changes.as_ref(),
-            start,
-        )?;
+        let (found, noise, refused) =
+            search::search(&with_noise, data, bins, &folds, list, declared, start)?;
         let inside = in_sample(&with_noise(noise), data.t_s.len(), &found);
         let series = inside
             .as_ref()
@@ -148,6 +145,7 @@ pub(crate) fn run(
             &data,
             &data.bins.folds,
             &again.0,
+            declared,
             again.1,
             search::follows_a_channel,
         )?;
@@ -167,7 +165,8 @@ pub(crate) fn run(
     let after = residuals(&with_noise(noise), &folds, &found, &found.selection.chosen)?;
     let mut rivals = Vec::new();
     let channels = search::is_a_channel;
-    for (set, gain) in search::rivals(&with_noise, &data, bins, &found, noise, channels)? {
+    for (set, gain) in search::rivals(&with_noise, &data, bins, &found, declared, noise, channels)?
+    {
         let residual = residuals(&with_noise(noise), &folds, &found, &set)?;
         rivals.push(Rival {
             what: names(&found, &set),
@@ -254,6 +253,20 @@ fn evidence<'a>(
         noise,
         motion: Some(motion),
     }
+}
+
+/// The slow noise that a hybrid model declares of each axis.
+fn declared_noise(situation: &Situation<'_>) -> [Option<Foreknown>; 3] {
+    let Some(hem) = &situation.model.hem else {
+        return [None; 3];
+    };
+    [&hem.x, &hem.y, &hem.z].map(|axis| {
+        let known = Foreknown {
+            slow: axis.sigma_hsf_arcsec,
+            tau_s: axis.tau_hsf_s,
+        };
+        (known.slow > 0.0 && known.tau_s > 0.0).then_some(known)
+    })
 }
 
 fn fit_noise(data: &AttitudeData, residual: &Residuals) -> [Coloured; 3] {

@@ -24,15 +24,16 @@
 use std::sync::Arc;
 
 use block_regression::Folds;
-use coloured_noise::Coloured;
+use coloured_noise::{Coloured, Foreknown};
 use effects::Candidate;
 use focal_plane::{ARCSEC_PER_RAD, SPEED_OF_LIGHT_M_S};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
-use statrs::distribution::{ChiSquared, ContinuousCDF};
+use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
 
 use crate::attitude::data::{AttitudeData, AttitudeEvidence};
 use crate::attitude::likeness::likeness;
+use crate::attitude::line_level::line_level;
 use crate::attitude::spatial_errors::SpatialErrors;
 use crate::error::CloseError;
 use crate::evidence::Evidence;
@@ -63,7 +64,7 @@ const EARNED: f64 = 2.0;
 const LITTLE: f64 = 8.0;
 /// Nats by which an effect has to be worth more than slow noise in its place. The best step of a wander is worth
 /// 2 +- 2 less.
-const BY_FAR: f64 = 5.0;
+const BY_FAR: f64 = 2.5;
 
 /// Where the climb to a hypothesis' own noise starts.
 #[derive(Clone, Copy, Debug)]
@@ -77,24 +78,46 @@ enum Start {
 /// Builds the evidence of one noise.
 pub(crate) type WithNoise<'d> = dyn Fn([Coloured; 3]) -> AttitudeEvidence<'d> + Sync + 'd;
 
+/// What the model declares of an attitude's errors.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Declared<'a> {
+    /// Jumps that are no step, and lines that are the declared model's.
+    pub(crate) changes: Option<&'a SpatialErrors>,
+    /// The slow noise of each axis.
+    pub(crate) noise: [Option<Foreknown>; 3],
+}
+
+impl Declared<'_> {
+    /// Logarithm of the weight of this noise, nats.
+    fn weight(&self, noise: &[Coloured; 3]) -> f64 {
+        let each = self.noise.iter().zip(noise);
+        each.filter_map(|(known, noise)| Some(known.as_ref()?.log_weight(noise)))
+            .sum()
+    }
+}
+
 /// A hypothesis at its best noise.
 #[derive(Clone, Debug)]
 struct Scored {
     noise: [Coloured; 3],
     /// Log-likelihood of each axis at the maximum, nats.
     of_axis: [f64; 3],
+    /// Weight of the noise by what is declared of it, nats.
+    weight: f64,
     /// Log-likelihood predicted out of fold, nats.
     out_of_fold: f64,
     /// Amplitudes and their robust standard errors are within credible bounds.
     credible: bool,
     /// Amplitudes of all columns of the candidates, in order; zero where not observable.
     amplitudes: Vec<f64>,
+    /// What is left of each axis, bin by bin, arcsec.
+    left: [Vec<f64>; 3],
 }
 
 impl Scored {
-    /// Of all axes.
+    /// Of all axes, weighed by what is declared of their noise.
     fn loglik(&self) -> f64 {
-        self.of_axis.iter().sum()
+        self.of_axis.iter().sum::<f64>() + self.weight
     }
 }
 
@@ -105,7 +128,7 @@ pub(crate) fn search<'d>(
     folds: &Folds,
     rows: &Folds,
     mut candidates: Vec<Arc<dyn Candidate>>,
-    changes: Option<&SpatialErrors>,
+    declared: Declared<'_>,
     start: [Coloured; 3],
 ) -> Result<(Found, [Coloured; 3], Refused), CloseError> {
     let mut chosen: Vec<usize> = Vec::new();
@@ -128,7 +151,7 @@ pub(crate) fn search<'d>(
             &fitted,
             binned,
             noise,
-            changes,
+            declared,
         )?;
         let base = trial.score(&chosen).ok_or(CloseError::Singular)?;
         let judged: Vec<Judgement> = (0..candidates.len())
@@ -191,6 +214,7 @@ pub(crate) fn rivals(
     data: &AttitudeData,
     folds: &Folds,
     found: &Found,
+    declared: Declared<'_>,
     noise: [Coloured; 3],
     is_rival: fn(&dyn Candidate) -> bool,
 ) -> Result<Vec<(Vec<usize>, f64)>, CloseError> {
@@ -204,7 +228,10 @@ pub(crate) fn rivals(
         &found.fitted,
         binned,
         noise,
-        None,
+        Declared {
+            changes: None,
+            ..declared
+        },
     )?;
     let mut sets: Vec<Vec<usize>> = vec![Vec::new()];
     sets.extend(found.selection.chosen.first().map(|&g| vec![g]));
@@ -252,8 +279,7 @@ struct Trial<'a, 'd> {
     candidates: &'a [Arc<dyn Candidate>],
     /// Columns of all candidates, averaged over the bins.
     binned: DMatrix<f64>,
-    /// Jumps that are no step, and lines that are the declared model's.
-    changes: Option<&'a SpatialErrors>,
+    declared: Declared<'a>,
     noise: [Coloured; 3],
     /// Its white part alone, and beside little slow noise.
     white: [Coloured; 3],
@@ -272,7 +298,7 @@ impl<'a, 'd> Trial<'a, 'd> {
         fitted: &'a Fitted,
         binned: DMatrix<f64>,
         noise: [Coloured; 3],
-        changes: Option<&'a SpatialErrors>,
+        declared: Declared<'a>,
     ) -> Result<Self, CloseError> {
         let t_s = &data.bins.t_s;
         let span_s = t_s.last().zip(t_s.first()).map_or(0.0, |(l, f)| l - f);
@@ -297,7 +323,7 @@ impl<'a, 'd> Trial<'a, 'd> {
             plain: fit_design(&evidence, design.as_ref(), folds, &list)?,
             candidates,
             binned,
-            changes,
+            declared,
             noise,
             white,
             faint,
@@ -365,7 +391,9 @@ impl<'a, 'd> Trial<'a, 'd> {
             return Judgement::UNSEEN;
         };
         let ratio = 2.0 * (with.loglik() - without.loglik());
-        let mut p = self.chance(g, group.columns.len(), ratio);
+        let mut p = self
+            .beside_its_neighbours(g, &with, ratio)
+            .unwrap_or_else(|| self.chance(g, group.columns.len(), ratio));
         if p >= FAMILY_ALPHA && with.loglik() - without.loglik() > LITTLE {
             p = p.min(self.instead_of_slow(&others, &set, g, &without));
         }
@@ -402,6 +430,19 @@ impl<'a, 'd> Trial<'a, 'd> {
         self.chance(g, group.columns.len(), square)
     }
 
+    /// Chance that a line gains such a `ratio`, times what the search costs: held against what `with` leaves at the
+    /// frequencies around it. `None` for what is no line, or too slow to have so many.
+    fn beside_its_neighbours(&self, g: usize, with: &Scored, ratio: f64) -> Option<f64> {
+        let candidate = self.candidates[g].as_ref();
+        let frequency_hz = (candidate.id() == LINE).then(|| candidate.nonlinear()[0].value)?;
+        let t_s = &self.data.bins.t_s;
+        let around = line_level(t_s, &with.left, &self.data.count, &with.noise, frequency_hz)?;
+        let k = self.fitted.groups[g].columns.len() as f64;
+        let law = FisherSnedecor::new(k, around.freedom).ok()?;
+        let p = law.sf(ratio.max(0.0) / k / around.level.max(1.0));
+        Some((p * self.cost[g]).min(1.0))
+    }
+
     /// Chance that so many `columns` of `g` gain such a `ratio`, times what the search costs.
     fn chance(&self, g: usize, columns: usize, ratio: f64) -> f64 {
         let freedom = (columns + self.fitted.groups[g].choices) as f64;
@@ -411,7 +452,7 @@ impl<'a, 'd> Trial<'a, 'd> {
 
     /// Chance that the declared errors along this motion explain as much as `g` does beside the others of `set`.
     fn by_likeness(&self, set: &[usize], g: usize, scored: &Scored) -> f64 {
-        let imagined = self.changes.and_then(|c| c.imagined.as_deref());
+        let imagined = self.declared.changes.and_then(|c| c.imagined.as_deref());
         let order: Vec<usize> = set.iter().copied().filter(|&c| c != g).chain([g]).collect();
         let own = self.candidates[g].coefficients().len();
         let evidence = (self.with_noise)(scored.noise);
@@ -424,7 +465,7 @@ impl<'a, 'd> Trial<'a, 'd> {
     /// Chance that `g` of `set` is what the declared model makes: a change of stars, stars that come by again, or that
     /// go on.
     fn as_declared(&self, set: &[usize], g: usize, scored: &Scored) -> f64 {
-        let Some(changes) = self.changes else {
+        let Some(changes) = self.declared.changes else {
             return 0.0;
         };
         let width = |c: &usize| self.candidates[*c].coefficients().len();
@@ -504,12 +545,14 @@ impl<'a, 'd> Trial<'a, 'd> {
             let set = columns_of(&fitted.groups, &all);
             let estimate = fitted.fits.estimate(&set)?;
             let residual = self.left(&evidence, &binned, &fitted, &set, &estimate.value);
-            noise = std::array::from_fn(|axis| match start {
-                Start::Given => {
-                    noise[axis].refit(&self.data.bins.t_s, &residual[axis], &self.data.count[axis])
+            noise = std::array::from_fn(|axis| {
+                let (t_s, count) = (&self.data.bins.t_s, &self.data.count[axis]);
+                match (start, &self.declared.noise[axis]) {
+                    (Start::White, _) => self.white_of(axis, &residual[axis]),
+                    (_, Some(known)) => noise[axis].refit_near(known, t_s, &residual[axis], count),
+                    (Start::Given, None) => noise[axis].refit(t_s, &residual[axis], count),
+                    (Start::Faint, None) => self.climbing_from_faint(axis, &residual[axis]),
                 }
-                Start::Faint => self.climbing_from_faint(axis, &residual[axis]),
-                Start::White => self.white_of(axis, &residual[axis]),
             });
             let credible = fitted.groups.iter().all(|group| {
                 group
@@ -526,9 +569,9 @@ impl<'a, 'd> Trial<'a, 'd> {
             for (value, &c) in estimate.value.iter().zip(&set) {
                 all[c] = *value;
             }
-            last = Some((self.logliks(&noise, &residual), credible, all));
+            last = Some((self.logliks(&noise, &residual), credible, all, residual));
         }
-        let (of_axis, credible, values) = last?;
+        let (of_axis, credible, values, left) = last?;
         let evidence = (self.with_noise)(noise);
         let design = evidence.whitened(&binned);
         let fitted = fit_design(&evidence, design.as_ref(), self.folds, &candidates).ok()?;
@@ -537,9 +580,14 @@ impl<'a, 'd> Trial<'a, 'd> {
         Some(Scored {
             noise,
             of_axis,
+            weight: match start {
+                Start::White => 0.0,
+                Start::Given | Start::Faint => self.declared.weight(&noise),
+            },
             out_of_fold: out_of_fold + self.log_scale(&noise),
             credible,
             amplitudes: values,
+            left,
         })
     }
 

@@ -8,10 +8,14 @@
 //!     c: how much wider than chi2_2 the squares scatter
 //!     L_without: at no rate, no spikes, and for the slope next to none: nearer is as declared
 //!     var: over blocks of time; for the slope also over stars, which may differ for no reason at all
-//! gain = sum over the folds of ln L - ln L_without on the fold, both fitted on the others
+//! gain = sum over the folds of ln L - ln L_without on the fold, both fitted on the others;
+//!        of slope and rate  Z(all) - Z(others) - the same without,   Z = max ln L - ln(I + I_all/N) / 2
 //! ```
 //!
-//! Spikes are told from stars that are noisier than others: every star has its own
+//! (I: information on the parameter beside the others, N: scalars). A rate that is seen in one fold alone is
+//! predicted by no other, but neither spoiled.
+//!
+//! A rate is no effect where noise that changes with the time explains as much. Spikes are told from stars that are noisier than others: every star has its own
 //! level there, from the median of its squares. And they are told from noise that merely
 //! has tails: spikes must be likelier than Student's t with the freedom that suits best.
 //!
@@ -252,6 +256,26 @@ impl Bench<'_> {
         self.model.fit(&self.rows, &at, free, &|_| true)
     }
 
+    /// Noise that changes with the time in place of what follows a rate in `full`: the slope of magnitudes, of which
+    /// that of `full` is taken out, serves for it.
+    fn changing(&self, full: &Fit) -> Fit {
+        let last = self.rows.iter().map(|r| r.block).max().unwrap_or(0).max(1);
+        let slope = full.at[MAGNITUDE];
+        let rows: Vec<Row> = self
+            .rows
+            .iter()
+            .map(|row| Row {
+                declared: row.declared * 10_f64.powf(0.4 * slope * row.mag),
+                mag: 2.0 * row.block as f64 / last as f64 - 1.0,
+                ..*row
+            })
+            .collect();
+        let (mut at, mut free) = (full.at, full.free);
+        (at[MAGNITUDE], free[MAGNITUDE]) = (0.0, true);
+        (at[RATE], free[RATE]) = (0.0, false);
+        self.model.fit(&rows, &at, free, &|_| true)
+    }
+
     /// How well the parameters of `fit` are known, by blocks, by stars and by both.
     fn known(&self, fit: &Fit) -> Option<Covariance<3>> {
         self.model.covariance(
@@ -299,7 +323,7 @@ impl Bench<'_> {
             p = p.max(wald(beyond, variance, count, 2));
             sigma2 = sigma2.max(variance);
         }
-        let gain = self.gain(&self.rows, full, &without);
+        let gain = self.gain_of(k, full, &without);
         let values = if k == MAGNITUDE {
             [value, sigma2.sqrt()]
         } else {
@@ -316,12 +340,20 @@ impl Bench<'_> {
             _ => values[0] <= CREDIBLE_RATE,
         };
         let p_value = (TRIED * p).min(1.0);
+        let significant = gain > 0.0 && p_value < FAMILY_ALPHA;
+        let against = if !credible {
+            Some("it would be larger than nature makes it")
+        } else if k == RATE && significant && self.changing(full).loglik >= full.loglik {
+            Some("noise that changes with time explains as much")
+        } else {
+            None
+        };
         Judged {
             gain,
             p_value,
             observable: true,
-            stands: credible && gain > 0.0 && p_value < FAMILY_ALPHA,
-            against: (!credible).then_some("it would be larger than nature makes it"),
+            stands: against.is_none() && significant,
+            against,
             fewest: None,
             values: [values, [0.0; 2]],
             least,
@@ -414,10 +446,29 @@ impl Bench<'_> {
             let each = self.model.without_each(rows, fit, self.folds);
             let held = each
                 .enumerate()
-                .map(|(f, at)| self.model.loglik(&at, rows, |r| fold(r) == f));
+                .map(|(f, others)| self.model.loglik(&others.at, rows, |r| fold(r) == f));
             held.sum::<f64>()
         });
         with - without
+    }
+
+    /// The same where what the others know of parameter `k` counts as it is known, which `without` holds at nothing.
+    fn gain_of(&self, k: usize, with: &Fit, without: &Fit) -> f64 {
+        let told = self.model.information(&self.rows, with, self.folds, k);
+        let all: f64 = told.iter().sum();
+        let one = all / (2 * self.rows.len()).max(1) as f64;
+        let [own, others] = [with, without].map(|fit| {
+            let each = self.model.without_each(&self.rows, fit, self.folds);
+            each.map(|others| fit.loglik - others.loglik)
+                .collect::<Vec<f64>>()
+        });
+        let folds = own.iter().zip(&others).zip(&told);
+        folds
+            .map(|((with, without), told)| {
+                let known = (all + one) / ((all - told).max(0.0) + one).max(f64::MIN_POSITIVE);
+                with - without - 0.5 * known.ln()
+            })
+            .sum()
     }
 }
 

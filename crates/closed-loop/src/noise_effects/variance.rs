@@ -270,7 +270,7 @@ impl Model {
         rows: &[Row],
         start: &Fit,
         folds: &Folds,
-    ) -> impl Iterator<Item = Vector> {
+    ) -> impl Iterator<Item = Fit> {
         let fold = |r: &Row| folds.fold_of_block[r.block];
         // at the start the sums of all folds come of one pass
         let own: Vec<Sums> = (0..folds.count)
@@ -281,8 +281,40 @@ impl Model {
             let others = own.iter().enumerate().filter(|(k, _)| *k != f);
             let others = others.fold(Sums::default(), |all, (_, own)| all.add(own));
             self.climb(others, rows, &start.at, start.free, &|r| fold(r) != f)
-                .at
         })
+    }
+
+    /// What the rows of each fold tell of parameter `k` at `fit`, if all know the others as well as all rows do.
+    pub(super) fn information(&self, rows: &[Row], fit: &Fit, folds: &Folds, k: usize) -> Vec<f64> {
+        let fold = |r: &Row| folds.fold_of_block[r.block];
+        let outer: Vec<Matrix> = (0..folds.count)
+            .into_par_iter()
+            .map(|f| self.sums(&fit.at, rows, &|r| fold(r) == f).outer)
+            .collect();
+        let mut whole: Matrix = outer.iter().sum();
+        let others: Vec<usize> = (0..PARAMETERS)
+            .filter(|&j| j != k && fit.free[j] && whole[(j, j)] > 0.0)
+            .collect();
+        // the direction in which k moves the rows when the others make up for it
+        let mut along = Vector::zeros();
+        along[k] = 1.0;
+        for j in (0..PARAMETERS).filter(|j| *j != k && !others.contains(j)) {
+            whole.row_mut(j).fill(0.0);
+            whole.column_mut(j).fill(0.0);
+            whole[(j, j)] = 1.0;
+        }
+        let mut slope = -whole.column(k).into_owned();
+        slope[k] = 0.0;
+        whole.row_mut(k).fill(0.0);
+        whole.column_mut(k).fill(0.0);
+        whole[(k, k)] = 1.0;
+        if let Some(factor) = Cholesky::new(whole) {
+            along += factor.solve(&slope);
+        }
+        outer
+            .iter()
+            .map(|o| (along.transpose() * o * along)[0])
+            .collect()
     }
 
     /// Of the rows that `of` keeps.

@@ -24,7 +24,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 use crate::unexplained::around::Around;
 use crate::unexplained::grid::Grid;
 
-use super::{MOST, Series, Track, WORTH_A_SEARCH};
+use super::{MOST, Series, Track};
 
 /// What a line's power is held against.
 const USUAL: Around = Around {
@@ -32,6 +32,9 @@ const USUAL: Around = Around {
     count: 15,
     guard: 2,
 };
+/// Chance below which a line is worth a search with it: that holds it against more of the noise, and pays for all
+/// frequencies.
+const LIKELY: f64 = 0.5;
 /// Fewer cycles in the span are no line but a trend.
 const MIN_CYCLES: f64 = 3.0;
 /// Grids whose points lie nearer than this share of their step are the same.
@@ -165,7 +168,7 @@ impl Series {
         let (best, sum) = least(&sums)?;
         let law = ChiSquared::new(2.0 * turns.len() as f64).ok()?;
         let frequency_hz = grid.at(best);
-        let likely = law.sf(-2.0 * sum) * (bins as f64) < WORTH_A_SEARCH;
+        let likely = law.sf(-2.0 * sum) * (bins as f64) < LIKELY;
         likely.then_some(SharedLine {
             frequency_hz,
             tried: bins,
