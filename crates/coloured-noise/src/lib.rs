@@ -69,11 +69,15 @@
 mod coloured;
 mod common_noise;
 mod filter;
+mod foreknown;
 mod joint;
+mod log_product;
 mod rotations;
 mod smoother;
 
-pub use coloured::{Coloured, Foreknown, LogProduct};
+pub use coloured::Coloured;
 pub use common_noise::CommonNoise;
 pub use filter::Filter;
+pub use foreknown::Foreknown;
+pub use log_product::LogProduct;
 pub use rotations::{Rotations, SlowGains};

@@ -17,10 +17,10 @@ use std::f64::consts::TAU;
 use coloured_noise::Coloured;
 
 /// Independent frequencies on each side, at most, and those nearer than the first, which hold the line's own power.
-const MOST: usize = 30;
-const GUARD: usize = 2;
+const MOST: u32 = 30;
+const GUARD: u32 = 2;
 /// Cycles in the span below which there is no line but a trend: no frequency is taken there.
-const FEWEST_CYCLES: usize = 2;
+const FEWEST_CYCLES: f64 = 2.0;
 /// Fewest frequencies on each side that tell a level.
 const LEAST: usize = 5;
 
@@ -43,13 +43,13 @@ pub(super) fn line_level(
     frequency_hz: f64,
 ) -> Option<LineLevel> {
     let span_s = t_s.last()? - t_s.first()?;
-    let cycles = (frequency_hz * span_s) as usize;
-    let fastest = t_s.len() / 2;
-    let room = cycles
-        .checked_sub(FEWEST_CYCLES)?
-        .min(fastest.checked_sub(cycles)?);
-    let apart = GUARD + 1..=room.min(GUARD + MOST);
-    if apart.clone().count() < LEAST {
+    let cycles = frequency_hz * span_s;
+    let room = (cycles - FEWEST_CYCLES).min(0.5 * t_s.len() as f64 - cycles);
+    let apart: Vec<f64> = (GUARD + 1..=GUARD + MOST)
+        .map(f64::from)
+        .take_while(|off| *off <= room)
+        .collect();
+    if apart.len() < LEAST {
         return None;
     }
     let (mut sum, mut frequencies) = (0.0, 0.0);
@@ -57,9 +57,9 @@ pub(super) fn line_level(
         let mut white = left[axis].clone();
         noise[axis].whiten(t_s, &count[axis], &mut [&mut white]);
         let rows = count[axis].iter().filter(|n| **n > 0.0).count().max(1) as f64;
-        for off in apart.clone() {
+        for off in &apart {
             for side in [-1.0, 1.0] {
-                let f = frequency_hz + side * off as f64 / span_s;
+                let f = frequency_hz + side * off / span_s;
                 let (mut cos, mut sin) = (0.0, 0.0);
                 for (t, e) in t_s.iter().zip(&white) {
                     let (s, c) = (TAU * f * (t - t_s[0])).sin_cos();
