@@ -46,6 +46,9 @@ const SLOW_GAIN: f64 = 20.0;
 /// A slow error of so many times the declared is as declared: over a few correlation times its size is known to
 /// a half.
 const WIDER: f64 = 2.0;
+/// Share of runs in which chance makes a line as likely as the least that is worth a search with it: that holds it
+/// against more of the noise, pays for all frequencies, and costs little.
+const LIKELY: f64 = 0.5;
 /// Fewest frames from which an effect and its noise can both be had.
 const MIN_FRAMES: usize = 20;
 
@@ -119,7 +122,7 @@ pub(crate) fn run(
         motion = steady;
         (found, noise, refused, series, _) = search(&data, motion, &[])?;
     }
-    let line = series.as_ref().and_then(Series::shared_line);
+    let line = series.as_ref().and_then(|s| s.shared_line(LIKELY));
     let jump = series.as_ref().and_then(Series::shared_jump);
     let mut put_forward: Vec<_> = line
         .map(|line| line.candidate(&scene))

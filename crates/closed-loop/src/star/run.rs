@@ -249,7 +249,9 @@ fn explain(
     };
     let mut outcome = named(&[])?;
     let mut inside = left(&mut outcome);
-    let line = inside.as_ref().and_then(|(_, series)| series.shared_line());
+    let line = inside
+        .as_ref()
+        .and_then(|(_, series)| series.shared_line(leftover::WORTH_A_SEARCH));
     let mut put_forward: Vec<_> = line
         .map(|line| line.candidate(&scene))
         .into_iter()

@@ -32,9 +32,6 @@ const USUAL: Around = Around {
     count: 15,
     guard: 2,
 };
-/// Chance below which a line is worth a search with it: that holds it against more of the noise, and pays for all
-/// frequencies.
-const LIKELY: f64 = 0.5;
 /// Fewer cycles in the span are no line but a trend.
 const MIN_CYCLES: f64 = 3.0;
 /// Grids whose points lie nearer than this share of their step are the same.
@@ -148,8 +145,9 @@ impl SharedLine {
 }
 
 impl Series {
-    /// The line that the tracker most likely turns with, if it is worth a search.
-    pub(crate) fn shared_line(&self) -> Option<SharedLine> {
+    /// The line that the tracker most likely turns with, if one as likely is there by chance in fewer than this share
+    /// of runs.
+    pub(crate) fn shared_line(&self, by_chance: f64) -> Option<SharedLine> {
         let turns: Vec<(&Track, &Spectrum)> = self
             .each
             .iter()
@@ -168,7 +166,7 @@ impl Series {
         let (best, sum) = least(&sums)?;
         let law = ChiSquared::new(2.0 * turns.len() as f64).ok()?;
         let frequency_hz = grid.at(best);
-        let likely = law.sf(-2.0 * sum) * (bins as f64) < LIKELY;
+        let likely = law.sf(-2.0 * sum) * (bins as f64) < by_chance;
         likely.then_some(SharedLine {
             frequency_hz,
             tried: bins,

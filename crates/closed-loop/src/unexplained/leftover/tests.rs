@@ -2,7 +2,7 @@ use rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-use super::{Leftover, Series, Track};
+use super::{Leftover, Series, Track, WORTH_A_SEARCH};
 
 fn describe(tracks: &[Track]) -> Leftover {
     Series::of(tracks).describe()
@@ -135,7 +135,7 @@ fn axes_together_show_what_none_does_alone() {
                 *v += line(*t);
             }
         }
-        let found = Series::of(&all).shared_line();
+        let found = Series::of(&all).shared_line(WORTH_A_SEARCH);
         shared += usize::from(found.is_some_and(|f| (f.frequency_hz - 0.231).abs() < 1e-3));
         alone += usize::from(!describe(&all).lines_hz.is_empty());
     }
@@ -149,7 +149,7 @@ fn noise_is_seldom_worth_another_search() {
         let again = (0..40)
             .filter(|&seed| {
                 let all = tracks(seed, 500, slow, &|_| 0.0);
-                Series::of(&all).shared_line().is_some()
+                Series::of(&all).shared_line(WORTH_A_SEARCH).is_some()
             })
             .count();
         assert!(again <= 14, "slow {slow}: {again}");
@@ -161,10 +161,10 @@ fn noise_is_seldom_worth_another_search() {
 fn what_does_not_turn_is_no_shared_line() {
     let line = |t: f64| (std::f64::consts::TAU * 0.231 * t).cos();
     let mut all = tracks(3, 500, 0.0, &line);
-    assert!(Series::of(&all).shared_line().is_some());
+    assert!(Series::of(&all).shared_line(WORTH_A_SEARCH).is_some());
     all.iter_mut().for_each(|t| t.turns = false);
     let series = Series::of(&all);
-    assert!(series.shared_line().is_none());
+    assert!(series.shared_line(WORTH_A_SEARCH).is_none());
     assert_eq!(series.describe().lines_hz.len(), 1);
 }
 
