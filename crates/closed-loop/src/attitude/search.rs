@@ -8,7 +8,8 @@
 //! L(H) = max over noise, amplitudes of ln p(data | H)       2 (L(H1) - L(H0)) ~ chi2_p
 //! ```
 //!
-//! by alternating generalised least squares and the noise fit. That climb ends on the hill it starts on:
+//! by alternating generalised least squares and the noise fit, which what is declared of slow noise weighs
+//! ([`coloured_noise::Foreknown`]). That climb ends on the hill it starts on:
 //! an effect that the noise has swallowed stays swallowed. So there are two, from the noise of the last
 //! choice and from little slow noise, and the likelier counts. What even so does not stand is held as a whole against
 //! slow noise in its place, each with all that its freedom costs. The p-value pays
