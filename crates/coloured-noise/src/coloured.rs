@@ -180,7 +180,7 @@ impl Coloured {
         if self.slow <= 0.0 {
             return Self::fit_above(least, t_s, y, count);
         }
-        let Some(problem) = self.neighbourhood(least, None, t_s, y, count) else {
+        let Some(problem) = Likelihood::of(least, None, t_s, y, count) else {
             return *self;
         };
         problem
@@ -203,33 +203,11 @@ impl Coloured {
             slow: known.slow,
             tau_s: known.tau_s,
         };
-        let Some(problem) = start.neighbourhood(0.0, Some(known), t_s, y, count) else {
+        let Some(problem) = Likelihood::of(0.0, Some(known), t_s, y, count) else {
             return start;
         };
         let at = [start.white, start.slow, start.tau_s].map(f64::ln);
         problem.climb(at, -0.3).map_or(start, |(_, noise)| noise)
-    }
-
-    /// The likelihood around this noise.
-    fn neighbourhood<'a>(
-        &self,
-        least: f64,
-        known: Option<&'a Foreknown>,
-        t_s: &'a [f64],
-        y: &'a [f64],
-        count: &'a [f64],
-    ) -> Option<Likelihood<'a>> {
-        let step = spectra::robust::median_step(t_s)?;
-        let span = t_s[t_s.len() - 1] - t_s[0];
-        Some(Likelihood {
-            t_s,
-            y,
-            count,
-            rms: 1.0,
-            least,
-            bounds: [0.5 * step, 3.0 * span],
-            known,
-        })
     }
 
     /// Standard errors of the slow part relative to it, of sigma and of tau, from
@@ -448,7 +426,27 @@ struct Likelihood<'a> {
     known: Option<&'a Foreknown>,
 }
 
-impl Likelihood<'_> {
+impl<'a> Likelihood<'a> {
+    /// With sizes in the unit of the series; `None` for a series without steps.
+    fn of(
+        least: f64,
+        known: Option<&'a Foreknown>,
+        t_s: &'a [f64],
+        y: &'a [f64],
+        count: &'a [f64],
+    ) -> Option<Self> {
+        let step = spectra::robust::median_step(t_s)?;
+        let span = t_s[t_s.len() - 1] - t_s[0];
+        Some(Self {
+            t_s,
+            y,
+            count,
+            rms: 1.0,
+            least,
+            bounds: [0.5 * step, 3.0 * span],
+            known,
+        })
+    }
     fn at(&self, p: &[f64]) -> Coloured {
         Coloured {
             white: (self.rms * p[0].clamp(-20.0, 20.0).exp()).hypot(self.least),

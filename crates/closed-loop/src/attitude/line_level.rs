@@ -52,27 +52,30 @@ pub(super) fn line_level(
     if apart.len() < LEAST {
         return None;
     }
-    let (mut sum, mut frequencies) = (0.0, 0.0);
-    for axis in 0..3 {
+    let rows = |axis: usize| count[axis].iter().filter(|n| **n > 0.0).count().max(1) as f64;
+    let white: [Vec<f64>; 3] = std::array::from_fn(|axis| {
         let mut white = left[axis].clone();
         noise[axis].whiten(t_s, &count[axis], &mut [&mut white]);
-        let rows = count[axis].iter().filter(|n| **n > 0.0).count().max(1) as f64;
-        for off in &apart {
-            for side in [-1.0, 1.0] {
-                let f = frequency_hz + side * off / span_s;
-                let (mut cos, mut sin) = (0.0, 0.0);
-                for (t, e) in t_s.iter().zip(&white) {
-                    let (s, c) = (TAU * f * (t - t_s[0])).sin_cos();
-                    cos += c * e;
-                    sin += s * e;
-                }
-                sum += (cos * cos + sin * sin) / rows;
-                frequencies += 1.0;
+        white
+    });
+    let both_sides = apart.iter().flat_map(|off| [-off, *off]);
+    let power = both_sides.map(|off| {
+        let mut sums = [[0.0; 2]; 3];
+        for (k, t) in t_s.iter().enumerate() {
+            let turns = TAU * (frequency_hz + off / span_s) * (t - t_s[0]);
+            let (sin, cos) = turns.sin_cos();
+            for (sum, white) in sums.iter_mut().zip(&white) {
+                sum[0] += cos * white[k];
+                sum[1] += sin * white[k];
             }
         }
-    }
+        let each = sums.iter().enumerate();
+        each.map(|(axis, [c, s])| (c * c + s * s) / rows(axis))
+            .sum::<f64>()
+    });
+    let frequencies = 6.0 * apart.len() as f64;
     Some(LineLevel {
-        level: sum / frequencies,
+        level: power.sum::<f64>() / frequencies,
         freedom: 2.0 * frequencies,
     })
 }

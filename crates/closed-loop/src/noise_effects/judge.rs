@@ -15,7 +15,9 @@
 //! (I: information on the parameter beside the others, N: scalars). A rate that is seen in one fold alone is
 //! predicted by no other, but neither spoiled.
 //!
-//! A rate is no effect where noise that changes with the time explains as much. Spikes are told from stars that are noisier than others: every star has its own
+//! A rate is no effect where noise that changes with the time explains as much.
+//!
+//! Spikes are told from stars that are noisier than others: every star has its own
 //! level there, from the median of its squares. And they are told from noise that merely
 //! has tails: spikes must be likelier than Student's t with the freedom that suits best.
 //!
@@ -26,7 +28,8 @@ use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
 
 use super::rows::Row;
 use super::variance::{
-    Covariance, Fit, LEVEL, MAGNITUDE, Model, PARAMETERS, RATE, SHARE, SIZE, Vector, logit, sigmoid,
+    Covariance, Fit, LEVEL, MAGNITUDE, Model, PARAMETERS, RATE, SHARE, SIZE, Vector, Without,
+    information, logit, sigmoid,
 };
 use crate::search::selection::FAMILY_ALPHA;
 
@@ -241,6 +244,11 @@ fn climb(model: &Model, rows: &[Row], free: Free) -> Option<Fit> {
         .max_by(|a, b| a.loglik.total_cmp(&b.loglik))
 }
 
+/// What the slope of `fit` makes of the variance of a row.
+fn grown(fit: &Fit, row: &Row) -> f64 {
+    10_f64.powf(0.4 * fit.at[MAGNITUDE] * row.mag)
+}
+
 impl Bench<'_> {
     /// `fit` without parameter `k`.
     fn without(&self, fit: &Fit, k: usize) -> Fit {
@@ -260,12 +268,11 @@ impl Bench<'_> {
     /// that of `full` is taken out, serves for it.
     fn changing(&self, full: &Fit) -> Fit {
         let last = self.rows.iter().map(|r| r.block).max().unwrap_or(0).max(1);
-        let slope = full.at[MAGNITUDE];
         let rows: Vec<Row> = self
             .rows
             .iter()
             .map(|row| Row {
-                declared: row.declared * 10_f64.powf(0.4 * slope * row.mag),
+                declared: row.declared * grown(full, row),
                 mag: 2.0 * row.block as f64 / last as f64 - 1.0,
                 ..*row
             })
@@ -379,12 +386,9 @@ impl Bench<'_> {
         let rows: Vec<Row> = self
             .rows
             .iter()
-            .map(|row| {
-                let slope = 10_f64.powf(0.4 * full.at[MAGNITUDE] * row.mag);
-                Row {
-                    declared: row.declared * slope * level[row.star],
-                    ..*row
-                }
+            .map(|row| Row {
+                declared: row.declared * grown(full, row) * level[row.star],
+                ..*row
             })
             .collect();
         let mut free = full.free;
@@ -446,7 +450,7 @@ impl Bench<'_> {
             let each = self.model.without_each(rows, fit, self.folds);
             let held = each
                 .enumerate()
-                .map(|(f, others)| self.model.loglik(&others.at, rows, |r| fold(r) == f));
+                .map(|(f, held)| self.model.loglik(&held.others.at, rows, |r| fold(r) == f));
             held.sum::<f64>()
         });
         with - without
@@ -454,19 +458,19 @@ impl Bench<'_> {
 
     /// The same where what the others know of parameter `k` counts as it is known, which `without` holds at nothing.
     fn gain_of(&self, k: usize, with: &Fit, without: &Fit) -> f64 {
-        let told = self.model.information(&self.rows, with, self.folds, k);
-        let all: f64 = told.iter().sum();
-        let one = all / (2 * self.rows.len()).max(1) as f64;
         let [own, others] = [with, without].map(|fit| {
             let each = self.model.without_each(&self.rows, fit, self.folds);
-            each.map(|others| fit.loglik - others.loglik)
-                .collect::<Vec<f64>>()
+            each.collect::<Vec<Without>>()
         });
+        let told = information(&own, with, k);
+        let all: f64 = told.iter().sum();
+        let one = all / (2 * self.rows.len()).max(1) as f64;
         let folds = own.iter().zip(&others).zip(&told);
         folds
-            .map(|((with, without), told)| {
+            .map(|((own, other), told)| {
+                let adds = |fit: &Fit, fold: &Without| fit.loglik - fold.others.loglik;
                 let known = (all + one) / ((all - told).max(0.0) + one).max(f64::MIN_POSITIVE);
-                with - without - 0.5 * known.ln()
+                adds(with, own) - adds(without, other) - 0.5 * known.ln()
             })
             .sum()
     }

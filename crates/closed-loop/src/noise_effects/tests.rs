@@ -21,6 +21,12 @@ struct Truth {
 }
 
 const STARS: usize = 14;
+/// Rates are known, and nothing is declared.
+const KNOWN: Known = Known {
+    moving: true,
+    least_slope: super::SLOPE_OF_NONE,
+    outliers: None,
+};
 
 /// 14 stars of magnitude 3 to 5.5 through slews of up to 0.3 deg/s; sigma 2.5 arcsec, declared as 1.
 fn verdicts(seed: u64, frames: usize, truth: Truth) -> Verdicts {
@@ -69,12 +75,7 @@ fn verdicts(seed: u64, frames: usize, truth: Truth) -> Verdicts {
             }
         }
     }
-    let known = Known {
-        moving: true,
-        least_slope: super::SLOPE_OF_NONE,
-        outliers: None,
-    };
-    judge(&|_| rows.clone(), &folds, known).expect("enough rows")
+    judge(&|_| rows.clone(), &folds, KNOWN).expect("enough rows")
 }
 
 /// Claims of slope, rate, spikes.
@@ -242,39 +243,14 @@ fn one_effect_is_not_taken_for_another() {
 #[test]
 fn where_there_are_no_spikes_a_rate_has_its_value_and_sigma() {
     let (truth, seeds) = (2.6, 40);
-    let known = Known {
-        moving: true,
-        least_slope: super::SLOPE_OF_NONE,
-        outliers: None,
-    };
+    let folds = Folds::cut(443);
+    let rate = |frame: usize| 0.29 * (0.026 * frame as f64).sin().abs();
     let mut squares = 0.0;
     for seed in 0..seeds {
-        let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-        let folds = Folds::cut(443);
-        let mut rows = Vec::new();
-        for (block, range) in folds.blocks.iter().enumerate() {
-            for (frame, star) in range
-                .clone()
-                .flat_map(|frame| (0..15_u8).map(move |s| (frame, s)))
-            {
-                let rate = 0.29 * (0.026 * frame as f64).sin().abs();
-                let variance = 1.0 + (truth * rate).powi(2);
-                let mut one = || -> f64 { StandardNormal.sample(&mut rng) };
-                rows.push(Row {
-                    at: 0,
-                    square: variance * (one().powi(2) + one().powi(2)),
-                    shows: 1.0,
-                    declared: 1.0,
-                    mag: 0.2 * f64::from(star) - 2.0,
-                    rate: rate * rate,
-                    star: usize::from(star),
-                    block,
-                    marked: false,
-                });
-            }
-        }
+        let variance = |frame: usize| 1.0 + (truth * rate(frame)).powi(2);
+        let mut rows = moving_rows(seed, &folds, 15, rate, variance);
         rows[3000].square = 30.0 * (1.0 + truth * truth * rows[3000].rate);
-        let verdicts = judge(&|_| rows.clone(), &folds, known).expect("enough rows");
+        let verdicts = judge(&|_| rows.clone(), &folds, KNOWN).expect("enough rows");
         let [value, sigma] = verdicts.rate.values[0];
         assert!(
             verdicts.rate.stands && sigma > 0.0,
@@ -358,18 +334,31 @@ fn noise_that_changes_with_time_is_no_rate() {
 
 /// 14 stars in 500 frames at this rate, deg/s, with noise of 2.5 arcsec and of `more` beside it.
 fn moving(seed: u64, rate: impl Fn(usize) -> f64, more: impl Fn(usize) -> f64) -> Verdicts {
-    let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
     let folds = Folds::cut(500);
+    let variance = |frame: usize| 2.5_f64.hypot(more(frame)).powi(2);
+    let rows = moving_rows(seed, &folds, 14, rate, variance);
+    judge(&|_| rows.clone(), &folds, KNOWN).expect("enough rows")
+}
+
+/// So many stars at this rate, deg/s, and with this variance in each frame.
+fn moving_rows(
+    seed: u64,
+    folds: &Folds,
+    stars: u8,
+    rate: impl Fn(usize) -> f64,
+    variance: impl Fn(usize) -> f64,
+) -> Vec<Row> {
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
     let mut rows = Vec::new();
     for (block, range) in folds.blocks.iter().enumerate() {
         for (frame, star) in range
             .clone()
-            .flat_map(|frame| (0..14_u8).map(move |s| (frame, s)))
+            .flat_map(|frame| (0..stars).map(move |s| (frame, s)))
         {
             let mut one = || -> f64 { StandardNormal.sample(&mut rng) };
             rows.push(Row {
                 at: 0,
-                square: 2.5_f64.hypot(more(frame)).powi(2) * (one().powi(2) + one().powi(2)),
+                square: variance(frame) * (one().powi(2) + one().powi(2)),
                 shows: 1.0,
                 declared: 1.0,
                 mag: 0.2 * f64::from(star) - 2.0,
@@ -380,10 +369,5 @@ fn moving(seed: u64, rate: impl Fn(usize) -> f64, more: impl Fn(usize) -> f64) -
             });
         }
     }
-    let known = Known {
-        moving: true,
-        least_slope: super::SLOPE_OF_NONE,
-        outliers: None,
-    };
-    judge(&|_| rows.clone(), &folds, known).expect("enough rows")
+    rows
 }

@@ -21,7 +21,7 @@
 
 use block_regression::Folds;
 use coloured_noise::LogProduct;
-use nalgebra::{Cholesky, SMatrix, SVector};
+use nalgebra::{Cholesky, DMatrix, DVector, SMatrix, SVector};
 use rayon::prelude::*;
 
 use super::rows::Row;
@@ -96,6 +96,41 @@ pub(super) struct Fit {
     pub(super) at: Vector,
     pub(super) free: [bool; PARAMETERS],
     pub(super) loglik: f64,
+}
+
+/// A fold that took no part in a fit.
+#[derive(Clone, Debug)]
+pub(super) struct Without {
+    /// The fit of all others.
+    pub(super) others: Fit,
+    /// What the fold itself tells where all rows are fitted best: the sum of the outer products of its gradients.
+    outer: Matrix,
+}
+
+/// What each of these folds tells of parameter `k` of `fit`, if the others are known as well as all rows know them.
+pub(super) fn information(folds: &[Without], fit: &Fit, k: usize) -> Vec<f64> {
+    let whole: Matrix = folds.iter().map(|f| f.outer).sum();
+    let others: Vec<usize> = (0..PARAMETERS)
+        .filter(|&j| j != k && fit.free[j] && whole[(j, j)] > 0.0)
+        .collect();
+    let normal = DMatrix::from_fn(others.len(), others.len(), |i, j| {
+        whole[(others[i], others[j])]
+    });
+    let beside = DVector::from_fn(others.len(), |i, _| whole[(others[i], k)]);
+    // the direction in which k moves the rows when the others make up for it
+    let mut along = Vector::zeros();
+    along[k] = 1.0;
+    if let Some(factor) = Cholesky::new(normal) {
+        let makes_up = factor.solve(&beside);
+        others
+            .iter()
+            .zip(&makes_up)
+            .for_each(|(&j, by)| along[j] = -by);
+    }
+    folds
+        .iter()
+        .map(|f| along.dot(&(f.outer * along)))
+        .collect()
 }
 
 impl Model {
@@ -264,13 +299,13 @@ impl Model {
         }
     }
 
-    /// Best points without each of the folds, from `start`, which is the best of all.
+    /// The best fits without each of the folds, from `start`, which is the best of all.
     pub(super) fn without_each(
         &self,
         rows: &[Row],
         start: &Fit,
         folds: &Folds,
-    ) -> impl Iterator<Item = Fit> {
+    ) -> impl Iterator<Item = Without> {
         let fold = |r: &Row| folds.fold_of_block[r.block];
         // at the start the sums of all folds come of one pass
         let own: Vec<Sums> = (0..folds.count)
@@ -280,41 +315,12 @@ impl Model {
         (0..folds.count).map(move |f| {
             let others = own.iter().enumerate().filter(|(k, _)| *k != f);
             let others = others.fold(Sums::default(), |all, (_, own)| all.add(own));
-            self.climb(others, rows, &start.at, start.free, &|r| fold(r) != f)
+            let others = self.climb(others, rows, &start.at, start.free, &|r| fold(r) != f);
+            Without {
+                others,
+                outer: own[f].outer,
+            }
         })
-    }
-
-    /// What the rows of each fold tell of parameter `k` at `fit`, if all know the others as well as all rows do.
-    pub(super) fn information(&self, rows: &[Row], fit: &Fit, folds: &Folds, k: usize) -> Vec<f64> {
-        let fold = |r: &Row| folds.fold_of_block[r.block];
-        let outer: Vec<Matrix> = (0..folds.count)
-            .into_par_iter()
-            .map(|f| self.sums(&fit.at, rows, &|r| fold(r) == f).outer)
-            .collect();
-        let mut whole: Matrix = outer.iter().sum();
-        let others: Vec<usize> = (0..PARAMETERS)
-            .filter(|&j| j != k && fit.free[j] && whole[(j, j)] > 0.0)
-            .collect();
-        // the direction in which k moves the rows when the others make up for it
-        let mut along = Vector::zeros();
-        along[k] = 1.0;
-        for j in (0..PARAMETERS).filter(|j| *j != k && !others.contains(j)) {
-            whole.row_mut(j).fill(0.0);
-            whole.column_mut(j).fill(0.0);
-            whole[(j, j)] = 1.0;
-        }
-        let mut slope = -whole.column(k).into_owned();
-        slope[k] = 0.0;
-        whole.row_mut(k).fill(0.0);
-        whole.column_mut(k).fill(0.0);
-        whole[(k, k)] = 1.0;
-        if let Some(factor) = Cholesky::new(whole) {
-            along += factor.solve(&slope);
-        }
-        outer
-            .iter()
-            .map(|o| (along.transpose() * o * along)[0])
-            .collect()
     }
 
     /// Of the rows that `of` keeps.
@@ -392,7 +398,7 @@ impl Model {
             .filter(|&k| !self.is_of_none(&fit.at, k))
             .collect();
         let inverse = self.inverse_hessian(fit, rows, &inside)?;
-        let spread = |small: &nalgebra::DMatrix<f64>| {
+        let spread = |small: &DMatrix<f64>| {
             let mut out = Matrix::zeros();
             for (i, &row) in inside.iter().enumerate() {
                 for (j, &column) in inside.iter().enumerate() {
@@ -417,9 +423,9 @@ impl Model {
                 seen[cluster(row)] = true;
             }
             let clusters = seen.iter().filter(|s| **s).count();
-            let mut middle = nalgebra::DMatrix::zeros(p, p);
+            let mut middle = DMatrix::zeros(p, p);
             for s in &score {
-                let s = nalgebra::DVector::from_fn(p, |i, _| s[inside[i]]);
+                let s = DVector::from_fn(p, |i, _| s[inside[i]]);
                 middle += &s * s.transpose();
             }
             let widened = clusters as f64 / (clusters.max(2) - 1) as f64;
@@ -431,14 +437,9 @@ impl Model {
         })
     }
 
-    fn inverse_hessian(
-        &self,
-        fit: &Fit,
-        rows: &[Row],
-        inside: &[usize],
-    ) -> Option<nalgebra::DMatrix<f64>> {
+    fn inverse_hessian(&self, fit: &Fit, rows: &[Row], inside: &[usize]) -> Option<DMatrix<f64>> {
         let everywhere: &(dyn Fn(&Row) -> bool + Sync) = &|_| true;
-        let mut hessian = nalgebra::DMatrix::zeros(inside.len(), inside.len());
+        let mut hessian = DMatrix::zeros(inside.len(), inside.len());
         let here = self.sums(&fit.at, rows, everywhere).gradient;
         for (j, &k) in inside.iter().enumerate() {
             let h = 1e-4 * fit.at[k].abs().max(if k == RATE { 0.0 } else { 1.0 });
