@@ -23,6 +23,8 @@
 //!
 //! Source: Wilks 1938; Liang & Zeger 1986; Satorra & Bentler 1994 (scaled ratio).
 
+use std::cell::OnceCell;
+
 use block_regression::Folds;
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
 
@@ -124,6 +126,20 @@ struct Bench<'a> {
     least_slope: f64,
 }
 
+/// A fit, how well its parameters are known, and what its folds tell where that is asked for.
+struct Shown {
+    fit: Fit,
+    known: Option<Covariance<3>>,
+    folds: OnceCell<Vec<Without>>,
+}
+
+/// Whether a gain is told in any case, or matters only to what is significant.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Gain {
+    Told,
+    IfSignificant,
+}
+
 /// What is known before the residuals are looked at.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Known {
@@ -166,8 +182,8 @@ pub(super) fn judge(make: &Make<'_>, folds: &Folds, known: Known) -> Option<Verd
     };
     let full = up(hill, &bench.model, &bench.rows, free)?;
     let outliers = bench.spikes(&full);
-    let shown = bench.known(&full);
-    let [mut magnitude, mut rate] = [MAGNITUDE, RATE].map(|k| bench.one(k, &full, shown.as_ref()));
+    let full = bench.shown(full);
+    let [mut magnitude, mut rate] = [MAGNITUDE, RATE].map(|k| bench.one(k, &full, Gain::Told));
     if magnitude.observable && rate.observable && magnitude.stands != rate.stands {
         // the one that stands, without the freedom of the other
         let (alone, other) = if magnitude.stands {
@@ -175,7 +191,7 @@ pub(super) fn judge(make: &Make<'_>, folds: &Folds, known: Known) -> Option<Verd
         } else {
             (RATE, MAGNITUDE)
         };
-        let again = bench.alone(alone, &full, other);
+        let again = bench.alone(alone, &full.fit, other);
         if again.stands {
             *(if alone == MAGNITUDE {
                 &mut magnitude
@@ -185,8 +201,8 @@ pub(super) fn judge(make: &Make<'_>, folds: &Folds, known: Known) -> Option<Verd
         }
     } else if magnitude.observable && rate.observable && !magnitude.stands {
         // they may hide behind each other
-        let alone = bench.alone(MAGNITUDE, &full, RATE);
-        let other = bench.alone(RATE, &full, MAGNITUDE);
+        let alone = bench.alone(MAGNITUDE, &full.fit, RATE);
+        let other = bench.alone(RATE, &full.fit, MAGNITUDE);
         if alone.stands && (!other.stands || alone.gain >= other.gain) {
             magnitude = alone;
         } else if other.stands {
@@ -283,32 +299,38 @@ impl Bench<'_> {
         self.model.fit(&rows, &at, free, &|_| true)
     }
 
-    /// How well the parameters of `fit` are known, by blocks, by stars and by both.
-    fn known(&self, fit: &Fit) -> Option<Covariance<3>> {
-        self.model.covariance(
-            fit,
+    /// `fit`, with how well its parameters are known: by blocks, by stars and by both.
+    fn shown(&self, fit: Fit) -> Shown {
+        let known = self.model.covariance(
+            &fit,
             &self.rows,
             [&|r| r.block, &|r| r.star, &|r| {
                 r.block * self.stars + r.star
             }],
-        )
+        );
+        Shown {
+            fit,
+            known,
+            folds: OnceCell::new(),
+        }
     }
 
     /// Slope or rate without the `other`.
     fn alone(&self, k: usize, full: &Fit, other: usize) -> Judged {
-        let fit = self.without(full, other);
-        self.one(k, &fit, self.known(&fit).as_ref())
+        let shown = self.shown(self.without(full, other));
+        self.one(k, &shown, Gain::IfSignificant)
     }
 
-    /// Slope or rate beside all else that is free in `full`, whose parameters are `known` so well.
-    fn one(&self, k: usize, full: &Fit, known: Option<&Covariance<3>>) -> Judged {
+    /// Slope or rate beside all else that is free in a fit.
+    fn one(&self, k: usize, shown: &Shown, wanted: Gain) -> Judged {
+        let full = &shown.fit;
         if !full.free[k] {
             return UNSEEN;
         }
         let without = self.without(full, k);
         let value = full.at[k];
         // variances, and of how many sums
-        let [blocks, stars, cells] = known.map_or([(0.0, 0); 3], |c| {
+        let [blocks, stars, cells] = shown.known.as_ref().map_or([(0.0, 0); 3], |c| {
             (c.clustered.each_ref()).map(|(matrix, count)| (matrix[(k, k)], *count))
         });
         let widened = self.model.widening(&full.at, &self.rows);
@@ -319,7 +341,12 @@ impl Bench<'_> {
             0.0
         };
         let nearest = value.clamp(-least, least);
-        let ratio = 2.0 * (full.loglik - self.with(full, k, nearest).loglik) / widened;
+        let there = if nearest == 0.0 {
+            without.loglik
+        } else {
+            self.with(full, k, nearest).loglik
+        };
+        let ratio = 2.0 * (full.loglik - there) / widened;
         let mut p = likely(ratio, 1.0);
         let beyond = value - nearest;
         p = p.max(wald(beyond, blocks.0, blocks.1, 1));
@@ -330,7 +357,12 @@ impl Bench<'_> {
             p = p.max(wald(beyond, variance, count, 2));
             sigma2 = sigma2.max(variance);
         }
-        let gain = self.gain_of(k, full, &without);
+        let p_value = (TRIED * p).min(1.0);
+        let gain = if wanted == Gain::Told || p_value < FAMILY_ALPHA {
+            self.gain_of(k, shown, &without)
+        } else {
+            0.0
+        };
         let values = if k == MAGNITUDE {
             [value, sigma2.sqrt()]
         } else {
@@ -346,7 +378,6 @@ impl Bench<'_> {
             MAGNITUDE => value.abs() <= CREDIBLE_SLOPE,
             _ => values[0] <= CREDIBLE_RATE,
         };
-        let p_value = (TRIED * p).min(1.0);
         let significant = gain > 0.0 && p_value < FAMILY_ALPHA;
         let against = if !credible {
             Some("it would be larger than nature makes it")
@@ -457,12 +488,14 @@ impl Bench<'_> {
     }
 
     /// The same where what the others know of parameter `k` counts as it is known, which `without` holds at nothing.
-    fn gain_of(&self, k: usize, with: &Fit, without: &Fit) -> f64 {
-        let [own, others] = [with, without].map(|fit| {
+    fn gain_of(&self, k: usize, with: &Shown, without: &Fit) -> f64 {
+        let folds_of = |fit: &Fit| -> Vec<Without> {
             let each = self.model.without_each(&self.rows, fit, self.folds);
-            each.collect::<Vec<Without>>()
-        });
-        let told = information(&own, with, k);
+            each.collect()
+        };
+        let own = with.folds.get_or_init(|| folds_of(&with.fit));
+        let others = folds_of(without);
+        let told = information(own, &with.fit, k);
         let all: f64 = told.iter().sum();
         let one = all / (2 * self.rows.len()).max(1) as f64;
         let folds = own.iter().zip(&others).zip(&told);
@@ -470,7 +503,7 @@ impl Bench<'_> {
             .map(|((own, other), told)| {
                 let adds = |fit: &Fit, fold: &Without| fit.loglik - fold.others.loglik;
                 let known = (all + one) / ((all - told).max(0.0) + one).max(f64::MIN_POSITIVE);
-                adds(with, own) - adds(without, other) - 0.5 * known.ln()
+                adds(&with.fit, own) - adds(without, other) - 0.5 * known.ln()
             })
             .sum()
     }
