@@ -332,6 +332,26 @@ fn noise_that_changes_with_time_is_no_rate() {
     }
 }
 
+/// Squared rates that grow with the magnitudes just as the noise does: beside each other neither slope nor rate is
+/// worth anything, without the other one of them explains all, and one is told.
+#[test]
+fn what_hides_behind_another_is_told_alone() {
+    let folds = Folds::cut(500);
+    for seed in 0..4 {
+        let mut rows = moving_rows(seed, &folds, 14, |_| 0.1, |_| 6.25);
+        for row in &mut rows {
+            let grown = 10_f64.powf(0.2 * row.mag);
+            row.square *= grown;
+            row.rate *= grown;
+        }
+        let found = judge(&|_| rows.clone(), &folds, KNOWN).expect("enough rows");
+        assert!(
+            found.magnitude.stands != found.rate.stands,
+            "seed {seed}: {found:?}"
+        );
+    }
+}
+
 /// 14 stars in 500 frames at this rate, deg/s, with noise of 2.5 arcsec and of `more` beside it.
 fn moving(seed: u64, rate: impl Fn(usize) -> f64, more: impl Fn(usize) -> f64) -> Verdicts {
     let folds = Folds::cut(500);
