@@ -136,25 +136,14 @@ impl Coloured {
             slow: 0.0,
             tau_s: 1.0,
         };
-        let (Some(step), Some((first, last))) = (
-            spectra::robust::median_step(t_s),
-            t_s.first().zip(t_s.last()),
-        ) else {
+        let Some(problem) = Likelihood::of(least, None, t_s, y, count) else {
             return white;
         };
-        let span = last - first;
+        let Scales { step, span } = problem.scales;
         if kept.len() < 30 || step <= 0.0 {
             return white;
         }
-        let problem = Likelihood {
-            t_s,
-            y,
-            count,
-            rms,
-            least,
-            bounds: [0.5 * step, 3.0 * span],
-            known: None,
-        };
+        let problem = Likelihood { rms, ..problem };
         let own = if least > 0.0 { 0.3_f64 } else { 0.7 }.ln();
         // A likelihood in the correlation time has more than one hill: start on each.
         let best = [3.0 * step, (step * span).sqrt(), 0.1 * span]
@@ -351,13 +340,11 @@ pub(crate) fn fit_alike(
     series: &[(&[f64], &[f64])],
     start: &Coloured,
 ) -> Option<(Coloured, f64)> {
-    let step = spectra::robust::median_step(t_s)?;
-    let span = t_s.last()? - t_s.first()?;
     let problem = Alike {
         t_s,
         series,
         least,
-        bounds: [0.5 * step, 3.0 * span],
+        scales: Scales::of(t_s)?,
     };
     let mut first = vec![start.slow.ln(), start.tau_s.ln()];
     first.extend(series.iter().map(|_| own_white(start.white, least).ln()));
@@ -385,7 +372,7 @@ struct Alike<'a> {
     /// Values and counts.
     series: &'a [(&'a [f64], &'a [f64])],
     least: f64,
-    bounds: [f64; 2],
+    scales: Scales,
 }
 
 impl Alike<'_> {
@@ -393,7 +380,7 @@ impl Alike<'_> {
         Coloured {
             white: p[2 + k].clamp(-40.0, 40.0).exp().hypot(self.least),
             slow: p[0].clamp(-40.0, 40.0).exp(),
-            tau_s: p[1].exp().clamp(self.bounds[0], self.bounds[1]),
+            tau_s: self.scales.tau_s(p[1]),
         }
     }
 
@@ -414,6 +401,28 @@ impl CostFunction for &Alike<'_> {
     }
 }
 
+/// Usual step and span of some times, s.
+#[derive(Clone, Copy)]
+struct Scales {
+    step: f64,
+    span: f64,
+}
+
+impl Scales {
+    /// `None` for times without steps.
+    fn of(t_s: &[f64]) -> Option<Self> {
+        Some(Self {
+            step: spectra::robust::median_step(t_s)?,
+            span: t_s.last()? - t_s.first()?,
+        })
+    }
+
+    /// A correlation time, s, of those that can be told.
+    fn tau_s(self, ln_tau: f64) -> f64 {
+        ln_tau.exp().clamp(0.5 * self.step, 3.0 * self.span)
+    }
+}
+
 struct Likelihood<'a> {
     t_s: &'a [f64],
     y: &'a [f64],
@@ -421,7 +430,7 @@ struct Likelihood<'a> {
     rms: f64,
     /// Least white part; the rest of it is fitted.
     least: f64,
-    bounds: [f64; 2],
+    scales: Scales,
     /// What is known of the slow part before.
     known: Option<&'a Foreknown>,
 }
@@ -435,28 +444,23 @@ impl<'a> Likelihood<'a> {
         y: &'a [f64],
         count: &'a [f64],
     ) -> Option<Self> {
-        let step = spectra::robust::median_step(t_s)?;
-        let span = t_s[t_s.len() - 1] - t_s[0];
         Some(Self {
             t_s,
             y,
             count,
             rms: 1.0,
             least,
-            bounds: [0.5 * step, 3.0 * span],
+            scales: Scales::of(t_s)?,
             known,
         })
     }
+
     fn at(&self, p: &[f64]) -> Coloured {
         Coloured {
             white: (self.rms * p[0].clamp(-20.0, 20.0).exp()).hypot(self.least),
             slow: self.rms * p[1].clamp(-20.0, 20.0).exp(),
-            tau_s: self.tau(p[2]),
+            tau_s: self.scales.tau_s(p[2]),
         }
-    }
-
-    fn tau(&self, ln_tau: f64) -> f64 {
-        ln_tau.exp().clamp(self.bounds[0], self.bounds[1])
     }
 
     /// Climbs from `start` (logarithms) with first steps of `step`; the height
@@ -510,7 +514,7 @@ impl Scaled<'_> {
         Coloured {
             white: 1.0,
             slow: p[0].clamp(-20.0, 20.0).exp(),
-            tau_s: self.0.tau(p[1]),
+            tau_s: self.0.scales.tau_s(p[1]),
         }
     }
 

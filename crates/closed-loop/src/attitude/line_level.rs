@@ -52,7 +52,8 @@ pub(super) fn line_level(
     if apart.len() < LEAST {
         return None;
     }
-    let rows = |axis: usize| count[axis].iter().filter(|n| **n > 0.0).count().max(1) as f64;
+    let rows = count.each_ref();
+    let rows = rows.map(|n| n.iter().filter(|n| **n > 0.0).count().max(1) as f64);
     let white: [Vec<f64>; 3] = std::array::from_fn(|axis| {
         let mut white = left[axis].clone();
         noise[axis].whiten(t_s, &count[axis], &mut [&mut white]);
@@ -69,8 +70,8 @@ pub(super) fn line_level(
                 sum[1] += sin * white[k];
             }
         }
-        let each = sums.iter().enumerate();
-        each.map(|(axis, [c, s])| (c * c + s * s) / rows(axis))
+        let each = sums.iter().zip(&rows);
+        each.map(|([c, s], rows)| (c * c + s * s) / rows)
             .sum::<f64>()
     });
     let frequencies = 6.0 * apart.len() as f64;
