@@ -209,10 +209,11 @@ pub(crate) fn finish(
             rayon::join(
                 || {
                     // frames whose attitudes are free have turned already
-                    let [own, alone]: [&[Vec<f64>]; 2] = if f.data.free_attitude {
-                        [residual, residual]
-                    } else {
-                        [&turned.known, &turned.whole]
+                    let free = f.data.free_attitude;
+                    let own = if free { residual } else { &turned.known };
+                    let alone = || match residual {
+                        [x, y] if free => [x.clone(), y.clone()],
+                        _ => turned.whole(),
                     };
                     // a learned spot errs by where the star lies, and so slowly
                     let own = if learned {
@@ -226,6 +227,7 @@ pub(crate) fn finish(
             )
         },
     );
+    drop(turned);
     let mut noise = noise?;
     let mut noise_left = noise_effects::NoiseFollows::default();
     if f.image.is_some_and(|(level, _)| level.new_noise()) {

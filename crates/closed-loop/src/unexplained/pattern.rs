@@ -153,7 +153,7 @@ impl Pattern {
 pub(crate) fn search(
     data: &StarData,
     residual: &[Vec<f64>],
-    turned: &Turned,
+    turned: &Turned<'_>,
     weight: &[f64],
     folds: &Folds,
     order: Option<u32>,
@@ -167,10 +167,11 @@ pub(crate) fn search(
                 .iter()
                 .all(|v| v[r].is_finite())
     };
-    let mut of_star: Vec<Vec<usize>> = vec![Vec::new(); data.stars.len()];
-    for row in (0..frame.len()).filter(|&r| counts(r)) {
-        of_star[data.star[row]].push(row);
-    }
+    let rows = || (0..frame.len()).filter(|&r| counts(r));
+    let mut count = vec![0; data.stars.len()];
+    rows().for_each(|row| count[data.star[row]] += 1);
+    let mut of_star: Vec<Vec<usize>> = count.into_iter().map(Vec::with_capacity).collect();
+    rows().for_each(|row| of_star[data.star[row]].push(row));
     let at = [data.modelled[0].as_slice(), &data.modelled[1]];
     let field = |[x, y]: [&Vec<f64>; 2]| Field {
         own_spots,
@@ -181,9 +182,8 @@ pub(crate) fn search(
     if !turning {
         return as_left().pattern(&as_left, folds, order);
     }
-    let known = field(turned.known.each_ref());
-    let found = known.pattern(&as_left, folds, order)?;
-    let power = field(turned.whole.each_ref()).power_at(found.wave)?;
+    let found = field(turned.known.each_ref()).pattern(&as_left, folds, order)?;
+    let power = field(turned.whole().each_ref()).power_at(found.wave)?;
     (power > LEAST_OWN * found.power).then_some(found)
 }
 
@@ -256,8 +256,17 @@ impl Field {
         of_star: &[Vec<usize>],
         weight: &[f64],
     ) -> Self {
-        let mut field = Self::default();
-        for rows in of_star.iter().filter(|rows| rows.len() > 1) {
+        let rows = || of_star.iter().filter(|rows| rows.len() > 1);
+        let count = rows().map(Vec::len).sum();
+        let room = || Vec::with_capacity(count);
+        let mut field = Self {
+            x_px: room(),
+            y_px: room(),
+            residual: [room(), room()],
+            frame: Vec::with_capacity(count),
+            ..Self::default()
+        };
+        for rows in rows() {
             let first = field.frame.len();
             let w = weight[rows[0]];
             for axis in 0..2 {

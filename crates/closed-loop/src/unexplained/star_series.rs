@@ -108,17 +108,17 @@ struct Own {
 }
 
 /// Searches what every star has of its `own`: residuals (arcsec, per axis over all rows) less what
-/// its frames are known to have turned by; `alone`: less all that the stars of a frame share.
+/// its frames are known to have turned by; `alone` forms them less all that the stars of a frame share.
 pub(crate) fn search(
     data: &StarData,
     own: &[Vec<f64>],
-    alone: &[Vec<f64>],
+    alone: impl FnOnce() -> [Vec<f64>; 2],
     weight: &[f64],
 ) -> OwnSeries {
     if data.frames_are_unrelated() || data.stars.len() > MOST_STARS {
         return OwnSeries::default();
     }
-    let by_itself = LazyCell::new(|| series(data, alone, weight));
+    let by_itself = LazyCell::new(|| series(data, &alone(), weight));
     let beside_rotation = LazyCell::new(|| Freedom::beside_rotation(data, weight));
     let freedom = if data.free_attitude {
         *beside_rotation
@@ -419,8 +419,8 @@ mod tests {
             axis.iter().enumerate().map(|(r, v)| v + swing(r)).collect()
         });
         // what all stars do alike turns the frame
-        let alone = if apart > 0.0 { &own } else { &noise };
-        search(&data, &own, alone, &vec![1.0; rows])
+        let alone = if apart > 0.0 { own.clone() } else { noise };
+        search(&data, &own, || alone, &vec![1.0; rows])
     }
 
     /// A line of 1500/16 nats an axis and star is beyond doubt, and the stars' own only where they differ.

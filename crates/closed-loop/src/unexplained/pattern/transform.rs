@@ -23,8 +23,10 @@ const CELLS: f64 = 2.0;
 const MOST_CELLS: usize = 2048;
 /// Peaks of the transform that the exact sums are formed of.
 const PEAKS: usize = 16;
-/// Columns of the transform turned over at a time.
+/// Columns of the transform, and as many opposite ones, turned over at a time.
 const STRIP: usize = 16;
+
+const NOTHING: Complex<f32> = Complex::new(0.0, 0.0);
 
 #[expect(
     clippy::cast_possible_truncation,
@@ -55,11 +57,10 @@ impl Field {
             }
         };
         let mut found: Vec<(f32, [f64; 2])> = Vec::new();
-        let zeros = || vec![Complex::new(0.0_f32, 0.0); cells[0] * cells[1]];
-        let mut space = [zeros(), zeros()];
+        let mut grid = vec![NOTHING; cells[0] * cells[1]];
         for &sx in shifts(0) {
             for &sy in shifts(1) {
-                found.extend(self.transform(cells, [sx, sy], variance, own, &mut space));
+                found.extend(self.transform(cells, [sx, sy], variance, own, &mut grid));
             }
         }
         found.sort_by(|a, b| b.0.total_cmp(&a.0));
@@ -90,7 +91,7 @@ impl Field {
         shift: [f64; 2],
         variance: [f64; 2],
         own: &Own,
-        [grid, columns]: &mut [Vec<Complex<f32>>; 2],
+        grid: &mut [Complex<f32>],
     ) -> Vec<(f32, [f64; 2])> {
         let [nx, ny] = cells;
         let mut planner = FftPlanner::<f32>::new();
@@ -120,35 +121,26 @@ impl Field {
             let twist = twists[axis][j % n];
             (j % n, if turned { -twist } else { twist })
         };
-        grid.fill(Complex::new(0.0, 0.0));
+        grid.fill(NOTHING);
+        // most lines lie between the stars' paths and hold nothing
+        let mut used = vec![false; ny];
         for (rows, weight) in self.stars.iter().zip(&self.weight) {
             for row in rows.clone() {
                 let (i, ti) = cell(0, self.x_px[row]);
                 let (j, tj) = cell(1, self.y_px[row]);
                 let r = [0, 1].map(|a| narrow(weight * self.residual[a][row] * scale[a]));
                 grid[j * nx + i] += Complex::new(r[0], r[1]) * ti * tj;
+                used[j] = true;
             }
         }
-        grid.par_chunks_mut(nx).for_each_init(
-            || vec![Complex::default(); plans[0].get_inplace_scratch_len()],
-            |scratch, line| plans[0].process_with_scratch(line, scratch),
-        );
-        columns
-            .par_chunks_mut(ny * STRIP)
-            .enumerate()
+        grid.par_chunks_mut(nx)
+            .zip(&used)
+            .filter(|(_, used)| **used)
             .for_each_init(
-                || vec![Complex::default(); plans[1].get_inplace_scratch_len()],
-                |scratch, (strip, out)| {
-                    for j in 0..ny {
-                        for i in 0..STRIP {
-                            out[i * ny + j] = grid[j * nx + strip * STRIP + i];
-                        }
-                    }
-                    for line in out.chunks_mut(ny) {
-                        plans[1].process_with_scratch(line, scratch);
-                    }
-                },
+                || vec![NOTHING; plans[0].get_inplace_scratch_len()],
+                |scratch, (line, _)| plans[0].process_with_scratch(line, scratch),
             );
+        let grid = &*grid;
         let frequency = |axis: usize, i: usize| {
             let n = cells[axis] as f64;
             let i = i as f64;
@@ -157,20 +149,47 @@ impl Field {
         let opposite = |axis: usize, i: usize| {
             (2 * cells[axis] - i - usize::from(shift[axis] > 0.0)) % cells[axis]
         };
-        (0..nx)
-            .into_par_iter()
-            .filter_map(|i| {
-                let kx = frequency(0, i);
-                let (line, other) = (i * ny, opposite(0, i) * ny);
-                (0..=ny / 2)
-                    .filter(|&j| !own.excludes([kx, frequency(1, j).abs()]))
-                    .map(|j| {
-                        let p = columns[line + j].norm_sqr()
-                            + columns[other + opposite(1, j)].norm_sqr();
-                        (p, [kx, frequency(1, j)])
-                    })
-                    .max_by(|a, b| a.0.total_cmp(&b.0))
-            })
-            .collect()
+        let strongest = |i: usize, line: &[Complex<f32>], other: &[Complex<f32>]| {
+            let kx = frequency(0, i);
+            (0..=ny / 2)
+                .filter(|&j| !own.excludes([kx, frequency(1, j).abs()]))
+                .map(|j| {
+                    let p = line[j].norm_sqr() + other[opposite(1, j)].norm_sqr();
+                    (p, [kx, frequency(1, j)])
+                })
+                .max_by(|a, b| a.0.total_cmp(&b.0))
+        };
+        let leading: Vec<usize> = (0..nx).filter(|&i| i <= opposite(0, i)).collect();
+        let mut strong: Vec<(usize, (f32, [f64; 2]))> = leading
+            .par_chunks(STRIP)
+            .map_init(
+                || {
+                    let scratch = vec![NOTHING; plans[1].get_inplace_scratch_len()];
+                    (scratch, vec![NOTHING; 2 * STRIP * ny])
+                },
+                |(scratch, columns), strip| {
+                    columns.fill(NOTHING);
+                    for (j, line) in grid.chunks(nx).enumerate().filter(|(j, _)| used[*j]) {
+                        for (pair, &i) in columns.chunks_mut(2 * ny).zip(strip) {
+                            (pair[j], pair[ny + j]) = (line[i], line[opposite(0, i)]);
+                        }
+                    }
+                    let mut found = Vec::new();
+                    for (pair, &i) in columns.chunks_mut(2 * ny).zip(strip) {
+                        plans[1].process_with_scratch(pair, scratch);
+                        let (own, other) = pair.split_at(ny);
+                        let back = opposite(0, i);
+                        found.extend(strongest(i, own, other).map(|s| (i, s)));
+                        if back != i {
+                            found.extend(strongest(back, other, own).map(|s| (back, s)));
+                        }
+                    }
+                    found
+                },
+            )
+            .flatten()
+            .collect();
+        strong.sort_by_key(|(i, _)| *i);
+        strong.into_iter().map(|(_, strongest)| strongest).collect()
     }
 }

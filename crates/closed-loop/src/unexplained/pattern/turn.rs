@@ -21,34 +21,54 @@ use crate::star::frame_rotation::{Turns, rotation_row};
 
 /// Residuals of both axes over all rows, arcsec, less rotations of their frames.
 #[derive(Clone, Debug)]
-pub(crate) struct Turned {
+pub(crate) struct Turned<'a> {
+    data: &'a StarData,
+    residual: [&'a [f64]; 2],
     /// Less as much as a reference with white noise turns a frame by.
     pub(crate) known: [Vec<f64>; 2],
-    /// Less all that the stars of a frame share.
-    pub(crate) whole: [Vec<f64>; 2],
+    /// What the stars of a frame share, arcsec.
+    shared: Vec<Vector3<f64>>,
 }
 
-impl Turned {
+impl<'a> Turned<'a> {
     /// See the module; rows count by their `weight`.
-    pub(crate) fn of(data: &StarData, residual: [&[f64]; 2], weight: &[f64]) -> Self {
+    pub(crate) fn of(data: &'a StarData, residual: [&'a [f64]; 2], weight: &[f64]) -> Self {
         let turns = Turns::of(data, residual, weight);
-        let start = || residual.map(<[f64]>::to_vec);
-        let (mut known, mut whole) = (start(), start());
-        for (k, turn) in turns.frames.iter().enumerate() {
-            let Some(turn) = turn else { continue };
-            let of_reference = turns.reference;
+        let of_reference = turns.reference;
+        let each = turns.frames.iter().map(|turn| {
+            let Some(turn) = turn else {
+                return (Vector3::zeros(), Vector3::zeros());
+            };
             let drawn = Vector3::from_fn(|a, _| {
                 let share = of_reference[a] / (of_reference[a] + turns.noise * turn.variance[a]);
                 turn.theta[a] * if share.is_finite() { share } else { 0.0 }
             });
-            for row in data.frames.rows_of(k) {
-                for (axis, a) in rotation_row(data, row).into_iter().enumerate() {
-                    let a = Vector3::from(a);
-                    known[axis][row] -= a.dot(&drawn);
-                    whole[axis][row] -= a.dot(&turn.theta);
-                }
+            (drawn, turn.theta)
+        });
+        let (drawn, shared): (Vec<_>, Vec<_>) = each.unzip();
+        Self {
+            data,
+            residual,
+            known: less(data, residual, &drawn),
+            shared,
+        }
+    }
+
+    /// Less all that the stars of a frame share: formed when it is asked for.
+    pub(crate) fn whole(&self) -> [Vec<f64>; 2] {
+        less(self.data, self.residual, &self.shared)
+    }
+}
+
+/// Residuals less what their frames are `turned` by, arcsec.
+fn less(data: &StarData, residual: [&[f64]; 2], turned: &[Vector3<f64>]) -> [Vec<f64>; 2] {
+    let mut left = residual.map(<[f64]>::to_vec);
+    for (k, turned) in turned.iter().enumerate() {
+        for row in data.frames.rows_of(k) {
+            for (left, a) in left.iter_mut().zip(rotation_row(data, row)) {
+                left[row] -= Vector3::from(a).dot(turned);
             }
         }
-        Self { known, whole }
     }
+    left
 }
