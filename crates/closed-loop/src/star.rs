@@ -49,6 +49,7 @@ mod reference_noise;
 mod reference_wander;
 mod run;
 pub(crate) mod search;
+mod seen_directions;
 mod settling;
 mod steadied;
 pub(crate) mod weights;

@@ -23,8 +23,8 @@ use std::sync::Arc;
 
 use centroid::CentroidError;
 use effects::{Effect, PixelWaves, StarRows};
-use focal_plane::{AttitudeSeries, AttitudeSource, Camera, Pixel, Points, PointsMut, StarFrames};
-use nalgebra::{UnitQuaternion, Vector3};
+use focal_plane::{AttitudeSeries, AttitudeSource, Camera, Points, PointsMut, StarFrames};
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use telemetry::WindowTable;
 
 use spectra::robust;
@@ -92,6 +92,9 @@ pub(crate) struct StarData {
     pub(crate) misalignment: Vector3<f64>,
     /// Attitude of each frame.
     pub(crate) attitude: Vec<UnitQuaternion<f64>>,
+    /// What turns the frames of a star back, in the mean; empty unless directions are unknown beside a
+    /// reference ([`crate::star::seen_directions`]).
+    pub(super) turned_back: Vec<Matrix3<f64>>,
     /// Projected position, px.
     pub(crate) projected: [Vec<f64>; 2],
     /// Modelled position, px: where regressors are evaluated.
@@ -159,6 +162,7 @@ impl StarData {
         let mut data = Self::keep(inputs, &star, stars, &attitude);
         data.free_attitude = free_attitude;
         data.free_directions = free_directions;
+        data.take_directions();
         let own = inputs
             .reference
             .is_none()
@@ -238,7 +242,7 @@ impl StarData {
         }
     }
 
-    /// Attitude of each frame, and directions where they are unknown.
+    /// Attitude of each frame, and directions where neither they nor the attitudes are known.
     fn solve(
         inputs: &Inputs<'_>,
         star: &[usize],
@@ -258,23 +262,6 @@ impl StarData {
             return (directions::attitudes(camera, frames, star, &known), true);
         };
         let attitude: Vec<_> = frames.t_s.iter().map(|&t| reference.attitude(t)).collect();
-        if free_directions {
-            let mut sum = vec![Vector3::zeros(); stars.len()];
-            for (k, q) in attitude.iter().enumerate() {
-                if let Some(q) = q {
-                    for row in frames.rows_of(k) {
-                        let at = Pixel {
-                            x: frames.x_px[row],
-                            y: frames.y_px[row],
-                        };
-                        sum[star[row]] += q.inverse() * camera.direction(at);
-                    }
-                }
-            }
-            for (s, u) in stars.iter_mut().zip(&sum) {
-                s.direction = u.try_normalize(0.0).unwrap_or_else(Vector3::z);
-            }
-        }
         (attitude, false)
     }
 
@@ -323,6 +310,7 @@ impl StarData {
             t_s,
             misalignment: Vector3::zeros(),
             attitude: kept_attitude,
+            turned_back: Vec::new(),
             projected: pair(),
             modelled: pair(),
             carried: None,
@@ -364,6 +352,7 @@ impl StarData {
             log_flux: pick(&self.log_flux),
             window_px: self.window_px.each_ref().map(seen),
             attitude: which.iter().map(|&k| self.attitude[k]).collect(),
+            turned_back: self.turned_back.clone(),
             projected: pair(&self.projected),
             modelled: pair(&self.modelled),
             carried: None,
@@ -450,10 +439,12 @@ impl StarData {
     /// formed anew), arcsec.
     pub(crate) fn residual_arcsec(&self, measured: Points<'_>) -> [Vec<f64>; 2] {
         let mut out = self.bare_residual(measured);
-        for row in 0..self.t_s.len() {
-            let turned = self.turned_arcsec(row);
-            for axis in 0..2 {
-                out[axis][row] += turned[axis];
+        for frame in 0..self.frames.frames() {
+            for row in self.frames.rows_of(frame) {
+                let turned = self.turned_arcsec(row, frame);
+                for axis in 0..2 {
+                    out[axis][row] += turned[axis];
+                }
             }
         }
         out

@@ -84,17 +84,18 @@ impl StarData {
     /// Where this takes each row from its projection, px.
     fn shifted(&self, shift_arcsec: &[Vec<f64>]) -> [Vec<f64>; 2] {
         let scale = self.camera.arcsec_per_px();
-        let rows = (0..self.t_s.len()).into_par_iter();
-        let (x, y) = rows
-            .map(|row| {
-                let turned = self.turned_arcsec(row);
+        let of_frame = |k: usize| {
+            self.frames.rows_of(k).map(move |row| {
+                let turned = self.turned_arcsec(row, k);
                 let at = |axis: usize| {
                     let shift = shift_arcsec[axis][row] - turned[axis];
                     self.projected[axis][row] + shift / scale[axis]
                 };
                 (at(0), at(1))
             })
-            .unzip();
+        };
+        let frames = (0..self.frames.frames()).into_par_iter();
+        let (x, y) = frames.flat_map_iter(of_frame).unzip();
         [x, y]
     }
 

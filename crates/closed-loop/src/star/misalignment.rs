@@ -22,7 +22,6 @@ use focal_plane::{ARCSEC_PER_RAD, AttitudeSource, rotation_from_vector};
 use nalgebra::{UnitQuaternion, Vector3};
 
 use crate::star::data::StarData;
-use crate::star::frame_rotation::rotation_row;
 
 /// What the square of a rotation may move all rows together by, in squared sigmas of one.
 const NEGLIGIBLE: f64 = 0.01;
@@ -53,6 +52,7 @@ impl StarData {
         for q in &mut self.attitude {
             *q = turn * back * *q;
         }
+        self.take_directions();
         let turned = Turned {
             source: reference,
             turn,
@@ -66,12 +66,13 @@ impl StarData {
         rotation_from_vector(&(self.misalignment / ARCSEC_PER_RAD))
     }
 
-    /// What the misalignment's columns make of it on a row, arcsec: in the projection already.
-    pub(crate) fn turned_arcsec(&self, row: usize) -> [f64; 2] {
+    /// What the misalignment's columns make of it on a row of `frame`, arcsec: in the projection already.
+    pub(crate) fn turned_arcsec(&self, row: usize, frame: usize) -> [f64; 2] {
         if self.misalignment == Vector3::zeros() {
             return [0.0; 2];
         }
-        rotation_row(self, row).map(|axis| Vector3::from(axis).dot(&self.misalignment))
+        self.misalignment_row(row, frame)
+            .map(|axis| Vector3::from(axis).dot(&self.misalignment))
     }
 }
 
@@ -180,8 +181,9 @@ mod tests {
         }
         assert!(!data.project_through(theta + Vector3::x() * 0.1, 1e-4, &askew, &effects));
         let shift: [Vec<f64>; 2] = [0, 1].map(|axis| {
-            (0..data.t_s.len())
-                .map(|row| data.turned_arcsec(row)[axis])
+            (0..data.frames.frames())
+                .flat_map(|k| data.frames.rows_of(k).map(move |row| (row, k)))
+                .map(|(row, k)| data.turned_arcsec(row, k)[axis])
                 .collect()
         });
         let (residual, bare) = (data.measured_residual(), truth.measured_residual());

@@ -2,7 +2,8 @@
 //!
 //! ```text
 //! misalignment   dx = J(P) theta                    three angles, prior: declared bias, or free;
-//!                                                   P is projected through theta itself
+//!                                                   P is projected through theta itself, and
+//!                                                   unknown directions turn with it
 //! distortion     dx = sum_jk a_jk (x^j y^k - m_jk)  (j,k) != (0,0), m_jk the mean over the field,
 //!                                                   the same for y; prior: that of a draw
 //! zeros          dx = e, dy = n                     two numbers a star, of centroids formed anew
@@ -45,6 +46,9 @@ pub(crate) struct StarNuisance {
     moments: Vec<f64>,
 }
 
+/// 1 sigma of a misalignment that nobody declared where directions are unknown, arcsec: a degree. A tracker that
+/// hardly turns tells nothing of it.
+const UNKNOWN_MOUNT: f64 = 3600.0;
 /// 1 sigma of a zero that is as good as known, arcsec.
 const LEAST_ZERO: f64 = 1e-4;
 
@@ -60,8 +64,13 @@ impl StarNuisance {
             .then(|| (order, coefficient_precision(order) / per_axis.powi(2)));
         Self {
             misalignment: (!data.free_attitude).then(|| {
-                noise.bias_arcsec.map_or([f64::INFINITY; 3], |b| {
-                    b.map(|sigma| if sigma > 0.0 { sigma } else { f64::INFINITY })
+                let unknown = if data.free_directions {
+                    UNKNOWN_MOUNT
+                } else {
+                    f64::INFINITY
+                };
+                noise.bias_arcsec.map_or([unknown; 3], |b| {
+                    b.map(|sigma| if sigma > 0.0 { sigma } else { unknown })
                 })
             }),
             distortion,
@@ -142,8 +151,6 @@ impl StarNuisance {
     /// Writes the entries of the rows of `frames`, arcsec per arcsec, into zeros.
     pub(crate) fn fill(&self, data: &StarData, frames: Range<usize>, out: &mut Filled) {
         let first = data.frames.first_row[frames.start];
-        let scale = data.camera.arcsec_per_px();
-        let per_rad = scale.map(|s| s / focal_plane::ARCSEC_PER_RAD);
         let (misalignment, _, _) = self.parts();
         let mut basis = vec![0.0; self.moments.len()];
         for frame in frames {
@@ -154,10 +161,10 @@ impl StarNuisance {
                     y: data.modelled[1][row],
                 };
                 if misalignment > 0 {
-                    let jacobian = data.camera.rotation_jacobian(at);
+                    let turned = data.misalignment_row(row, frame);
                     for axis in 0..2 {
                         for k in 0..3 {
-                            out.own[axis][(i, k)] = jacobian[axis][k] * per_rad[axis];
+                            out.own[axis][(i, k)] = turned[axis][k];
                         }
                     }
                 }

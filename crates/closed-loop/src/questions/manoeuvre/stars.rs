@@ -107,6 +107,7 @@ impl<'a> Sky<'a> {
             effects: &[],
         });
         [data.free_attitude, data.free_directions] = self.free;
+        data.turn_back();
         data.follow(Some(flown));
         let none = || vec![0.0; data.t_s.len()];
         let evidence = StarEvidence {
