@@ -242,8 +242,8 @@ pub(crate) fn claim(
         };
         let make = |belief: &dyn Fn(&Row) -> [f64; 2]| source.rows(belief);
         if let Some(fast) = judge(&make, folds, known) {
-            verdicts.magnitude.stands &= verdicts.magnitude.agrees(&fast.magnitude);
-            verdicts.rate.stands &= verdicts.rate.agrees(&fast.rate);
+            verdicts.magnitude = verdicts.magnitude.beside(&fast.magnitude);
+            verdicts.rate = verdicts.rate.beside(&fast.rate);
         }
     }
     let rate = &verdicts.rate;

@@ -159,7 +159,7 @@ impl<'a> Flight<'a> {
     ///
     /// As [`draw`](Self::draw).
     pub(crate) fn processes_alone(&self, draw: u64) -> Result<[Vec<f64>; 3], ComparisonError> {
-        debug_assert!(self.ideal.is_empty(), "only a hybrid model has processes");
+        assert!(self.ideal.is_empty(), "only a hybrid model has processes");
         let mut model = self.model.clone();
         model.noise.distortion_arcsec = None;
         self.of(&model, &[], draw)

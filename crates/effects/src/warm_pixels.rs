@@ -1,4 +1,4 @@
-//! Where a warm pixel may be: one look at all pixels under the stars.
+//! Where a warm pixel may be: one look at all pixels under the stars and beside them.
 //!
 //! ```text
 //! z(H) = sum w^2 c r / sqrt(sum w^2 c c)      c = H - P while |c| <= 1.5 px on both axes,  r what is left there
@@ -11,7 +11,7 @@
 //!
 //! Source: the score of a linear coefficient at zero (Rao 1948).
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, HashMap, HashSet};
 
 use focal_plane::{Camera, Pixel};
 use rayon::prelude::*;
@@ -63,7 +63,7 @@ struct Visit<'a> {
 }
 
 impl WarmPixels {
-    /// Looks at all pixels under `rows`, of which `left_px` is left (x, y), with these weights; a row of
+    /// Looks at all pixels under `rows` and next to these, of which `left_px` is left (x, y), with these weights; a row of
     /// weight 0 does not count.
     ///
     /// # Panics
@@ -98,8 +98,16 @@ impl WarmPixels {
             let of = |[i, j]: &[i64; 2]| visits.get(&[x + i, y + j]).copied();
             NEAR.iter().filter_map(of).sum()
         };
-        let mut pixels: Vec<([i64; 2], u32)> = visits.iter().map(|(p, n)| (*p, *n)).collect();
-        pixels.retain(|(pixel, _)| near(*pixel) >= LEAST_ROWS);
+        // a star that passes by a pixel is pulled, too
+        let around = visits
+            .keys()
+            .flat_map(|[x, y]| NEAR.map(|[i, j]| [x + i, y + j]));
+        let around: HashSet<[i64; 2]> = around.collect();
+        let mut pixels: Vec<([i64; 2], u32)> = around
+            .into_iter()
+            .filter(|pixel| near(*pixel) >= LEAST_ROWS)
+            .map(|pixel| (pixel, visits.get(&pixel).copied().unwrap_or(0)))
+            .collect();
         pixels.sort_unstable();
         let index: HashMap<[i64; 2], usize> =
             pixels.iter().enumerate().map(|(k, p)| (p.0, k)).collect();
@@ -235,10 +243,16 @@ mod tests {
     use super::*;
 
     const WARM: Pixel = Pixel { x: 30.5, y: 21.5 };
+    /// Below the path of the first star, which is at y = 21.7 there.
+    const WARM_BESIDE: Pixel = Pixel { x: 30.5, y: 20.5 };
 
     /// Twelve stars that drift over some 240 pixels, by `pace` px a frame, under noise of 0.02 px, with a warm
     /// pixel of this `strength`; and the same where it pushes.
     fn looked(pace: f64, strength: f64) -> [WarmPixels; 2] {
+        looked_at(WARM, pace, strength)
+    }
+
+    fn looked_at(warm: Pixel, pace: f64, strength: f64) -> [WarmPixels; 2] {
         let camera = Camera::from_fov_deg([1024, 1024], [20.0, 20.0]).unwrap();
         let mut state = 9_u64;
         let mut noise = || {
@@ -260,7 +274,7 @@ mod tests {
                     10.2 + t + 0.3 * (s as f64),
                     20.7 + 0.05 * t - 40.0 * (s as f64),
                 ];
-                let c = [WARM.x - at[0], WARM.y - at[1]];
+                let c = [warm.x - at[0], warm.y - at[1]];
                 let near = c.iter().all(|c| c.abs() <= 1.5);
                 for axis in 0..2 {
                     let pull = if near { strength * c[axis] } else { 0.0 };
@@ -308,6 +322,13 @@ mod tests {
         assert_eq!(found.middles[0], WARM, "{:?}", &found.middles[..4]);
         // a pixel that pushes is none
         assert!(!pushed.middles[..8].contains(&WARM));
+    }
+
+    /// All stars pass by the warm pixel 0.7 px and more beside its middle: none is ever in it.
+    #[test]
+    fn a_pixel_that_stars_pass_by_is_looked_at() {
+        let [found, _] = looked_at(WARM_BESIDE, 0.05, 0.02);
+        assert_eq!(found.middles[0], WARM_BESIDE, "{:?}", &found.middles[..4]);
     }
 
     /// Four rows fall in each pixel, twelve within its half-width: enough for a pull of 0.06 of up to 1.5 px,

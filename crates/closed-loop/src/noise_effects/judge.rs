@@ -83,17 +83,30 @@ pub(super) struct Judged {
 }
 
 impl Judged {
-    /// Whether noise that changes from frame to frame tells the same: what is slow is no noise.
-    /// The estimate on all of the residual is the better one if there is nothing else, so
+    /// Whether noise that changes from frame to frame tells the same: what is slow is no noise, and all of the
+    /// residual shows the more for it. The estimate on all of it is the better one if there is nothing else, so
     /// that the difference has the difference of the variances (Hausman 1978).
-    pub(super) fn agrees(&self, quick: &Self) -> bool {
+    fn agrees(&self, quick: &Self) -> bool {
         let ([value, sigma], [other, its]) = (self.values[0], quick.values[0]);
         if !quick.observable {
             return true;
         }
         let spread = (its * its - sigma * sigma).max(0.0).sqrt();
-        (value - other).abs() <= AGREEING * spread.max(LEAST_SPREAD * its)
-            && other.abs() > self.least + SEEN_QUICK * its
+        let [all, fast] = [value, other].map(|v| v * value.signum());
+        all - fast <= AGREEING * spread.max(LEAST_SPREAD * its)
+            && fast > self.least + SEEN_QUICK * its
+    }
+
+    /// The same beside what differences of rows tell.
+    pub(super) fn beside(self, quick: &Self) -> Self {
+        if !self.stands || self.agrees(quick) {
+            return self;
+        }
+        Self {
+            stands: false,
+            against: Some("what changes from one row of a star to the next does not show it"),
+            ..self
+        }
     }
 }
 
@@ -547,6 +560,15 @@ mod tests {
         // 0.08^2 - 0.05^2 = 0.062^2
         assert!(all.agrees(&judged(0.4, 0.08)));
         assert!(!all.agrees(&judged(0.2, 0.08)), "they differ by 4.8 sigma");
+        // more than all: the same noise with its memory
+        assert!(all.agrees(&judged(0.9, 0.08)));
+        assert!(!all.agrees(&judged(-0.5, 0.08)));
+        let refused = Judged {
+            stands: true,
+            ..all
+        }
+        .beside(&judged(0.2, 0.08));
+        assert!(!refused.stands && refused.against.is_some());
         // they agree, and there is nothing in either
         assert!(!judged(0.2, 0.05).agrees(&judged(0.2, 0.08)));
         assert!(all.agrees(&UNSEEN), "nothing to hold it against");

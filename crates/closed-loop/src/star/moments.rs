@@ -200,7 +200,7 @@ impl StarMoments {
             .blocks
             .into_iter()
             .map(|b| {
-                debug_assert!(b.inverse.is_empty(), "rotations are in no block");
+                assert!(b.inverse.is_empty(), "rotations are in no block");
                 (Gram::whole(b.rest), b.scalars)
             })
             .unzip();
