@@ -170,6 +170,7 @@ fn grouped(fits: &Fits, candidates: &[&dyn Candidate]) -> Vec<Group> {
             },
             kind: candidate.id(),
             stands_for: candidate.stands_for(),
+            credit: candidate.credit(),
         });
         column += p;
     }

@@ -7,7 +7,8 @@
 //! over the rows near a pixel of middle H: what one coefficient would gain, in units of the noise. What is
 //! constant for a star may be the catalogue's or the lens', so that z is also taken with the mean of c and
 //! r over each star's own rows there taken off, and the larger counts. A warm pixel pulls toward itself:
-//! z is positive. The best are proposed, and stand for all that were looked at.
+//! z is positive. The best are proposed, and stand for all that were looked at; for a pixel that no star was in
+//! the second z counts alone.
 //!
 //! Source: the score of a linear coefficient at zero (Rao 1948).
 
@@ -21,9 +22,13 @@ use crate::hot_pixel::{HALF_WIDTH_PX, middle_of, pixel_of};
 
 /// Pixels that are proposed.
 const MOST_PIXELS: usize = 48;
+/// The same of those that no star was in.
+const MOST_BESIDE: usize = 16;
 /// Rows within half-width of a pixel with which it is worth looking at: with fewer, the pixels of a slew are
 /// so many that all effects pay for them.
 const LEAST_ROWS: u32 = 8;
+/// Squares of the offsets from a star's mean place below which it does not move, px^2.
+const LEAST_SQUARE: f64 = 1e-9;
 /// Pixels within whose half-width a star may be: its own and those around.
 const NEAR: [[i64; 2]; 9] = [
     [-1, -1],
@@ -37,13 +42,27 @@ const NEAR: [[i64; 2]; 9] = [
     [1, 1],
 ];
 
-/// The pixels that are proposed, best first.
+/// Pixels of one sort, best first.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct WarmPixels {
-    /// Middles.
+pub(crate) struct Proposed {
+    /// Middles of those that are proposed.
     pub(crate) middles: Vec<Pixel>,
     /// How many were looked at.
     pub(crate) looked_at: usize,
+}
+
+impl Proposed {
+    /// How many that were looked at each of them is proposed for.
+    pub(crate) fn stands_for(&self) -> f64 {
+        self.looked_at as f64 / self.middles.len().max(1) as f64
+    }
+}
+
+/// The pixels that are proposed: those that stars have been in, and those next to these.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct WarmPixels {
+    pub(crate) under: Proposed,
+    pub(crate) beside: Proposed,
 }
 
 /// Weighted sums over the rows of one star near one pixel.
@@ -120,25 +139,39 @@ impl WarmPixels {
             whole[*p][0].join(own);
             whole[*p][1].join(&own.centred());
         }
-        let mut ranked: Vec<(f64, usize)> = whole
-            .iter()
-            .map(|both| both.each_ref().map(Sums::score))
-            .map(|[plain, centred]| plain.max(centred))
-            .zip(0..)
-            .collect();
-        // ties go to the longer visit, then to the lower coordinates
-        ranked.sort_by(|a, b| {
-            let visits = |k: usize| pixels[k].1;
-            let longer = visits(b.1).cmp(&visits(a.1));
-            b.0.total_cmp(&a.0).then(longer).then(a.1.cmp(&b.1))
-        });
+        // of a star at rest a pixel beside it is but another place
+        let moves = |k: usize| whole[k][1].cc > LEAST_SQUARE;
+        let score = |k: usize| {
+            let [plain, centred] = whole[k].each_ref().map(Sums::score);
+            if pixels[k].1 > 0 {
+                plain.max(centred)
+            } else {
+                centred
+            }
+        };
+        let best = |most: usize, of: &dyn Fn(usize) -> bool| {
+            let mut ranked: Vec<(f64, usize)> = (0..pixels.len())
+                .filter(|&k| of(k))
+                .map(|k| (score(k), k))
+                .collect();
+            // ties go to the longer visit, then to the lower coordinates
+            ranked.sort_by(|a, b| {
+                let visits = |k: usize| pixels[k].1;
+                let longer = visits(b.1).cmp(&visits(a.1));
+                b.0.total_cmp(&a.0).then(longer).then(a.1.cmp(&b.1))
+            });
+            Proposed {
+                looked_at: ranked.len(),
+                middles: ranked
+                    .iter()
+                    .take(most)
+                    .map(|(_, k)| middle_of(camera, pixels[*k].0))
+                    .collect(),
+            }
+        };
         Self {
-            middles: ranked
-                .iter()
-                .take(MOST_PIXELS)
-                .map(|(_, k)| middle_of(camera, pixels[*k].0))
-                .collect(),
-            looked_at: pixels.len(),
+            under: best(MOST_PIXELS, &|k| pixels[k].1 > 0),
+            beside: best(MOST_BESIDE, &|k| pixels[k].1 == 0 && moves(k)),
         }
     }
 }
@@ -230,7 +263,7 @@ impl Sums {
 
     fn score(&self) -> f64 {
         // what a star at rest leaves of its mean is rounding
-        if self.cc > 1e-9 {
+        if self.cc > LEAST_SQUARE {
             self.cr / self.cc.sqrt()
         } else {
             0.0
@@ -317,18 +350,21 @@ mod tests {
     #[test]
     fn a_warm_pixel_is_looked_at_first_however_short_its_visit() {
         let [found, pushed] = looked(0.05, 0.02);
-        assert!(found.looked_at > 1000, "{}", found.looked_at);
-        assert_eq!(found.middles.len(), MOST_PIXELS);
-        assert_eq!(found.middles[0], WARM, "{:?}", &found.middles[..4]);
+        let Proposed { middles, looked_at } = &found.under;
+        assert!(*looked_at > 1000, "{looked_at}");
+        assert_eq!(middles.len(), MOST_PIXELS);
+        assert_eq!(middles[0], WARM, "{:?}", &middles[..4]);
         // a pixel that pushes is none
-        assert!(!pushed.middles[..8].contains(&WARM));
+        assert!(!pushed.under.middles[..8].contains(&WARM));
     }
 
     /// All stars pass by the warm pixel 0.7 px and more beside its middle: none is ever in it.
     #[test]
     fn a_pixel_that_stars_pass_by_is_looked_at() {
         let [found, _] = looked_at(WARM_BESIDE, 0.05, 0.02);
-        assert_eq!(found.middles[0], WARM_BESIDE, "{:?}", &found.middles[..4]);
+        let beside = &found.beside.middles;
+        assert_eq!(beside[0], WARM_BESIDE, "{:?}", &beside[..4]);
+        assert_eq!(beside.len(), MOST_BESIDE);
     }
 
     /// Four rows fall in each pixel, twelve within its half-width: enough for a pull of 0.06 of up to 1.5 px,
@@ -336,6 +372,7 @@ mod tests {
     #[test]
     fn rows_around_a_pixel_count_not_those_in_it() {
         let [found, _] = looked(0.25, 0.06);
-        assert_eq!(found.middles[0], WARM, "{:?}", &found.middles[..4]);
+        let middles = &found.under.middles;
+        assert_eq!(middles[0], WARM, "{:?}", &middles[..4]);
     }
 }
