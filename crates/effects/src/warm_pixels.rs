@@ -7,8 +7,7 @@
 //! over the rows near a pixel of middle H: what one coefficient would gain, in units of the noise. What is
 //! constant for a star may be the catalogue's or the lens', so that z is also taken with the mean of c and
 //! r over each star's own rows there taken off, and the larger counts. A warm pixel pulls toward itself:
-//! z is positive. The best are proposed, and stand for all that were looked at; for a pixel that no star was in
-//! the second z counts alone.
+//! z is positive. The best are proposed, and stand for all that were looked at.
 //!
 //! Source: the score of a linear coefficient at zero (Rao 1948).
 
@@ -143,11 +142,7 @@ impl WarmPixels {
         let moves = |k: usize| whole[k][1].cc > LEAST_SQUARE;
         let score = |k: usize| {
             let [plain, centred] = whole[k].each_ref().map(Sums::score);
-            if pixels[k].1 > 0 {
-                plain.max(centred)
-            } else {
-                centred
-            }
+            plain.max(centred)
         };
         let best = |most: usize, of: &dyn Fn(usize) -> bool| {
             let mut ranked: Vec<(f64, usize)> = (0..pixels.len())
