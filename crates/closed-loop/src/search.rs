@@ -170,7 +170,6 @@ fn grouped(fits: &Fits, candidates: &[&dyn Candidate]) -> Vec<Group> {
             },
             kind: candidate.id(),
             stands_for: candidate.stands_for(),
-            credit: candidate.credit(),
         });
         column += p;
     }

@@ -208,11 +208,6 @@ pub trait Candidate: Debug + Send + Sync {
     fn stands_for(&self) -> f64 {
         1.0
     }
-    /// What its sort is thought to be worth looking for, 1 of most: of the chance of a mistake it takes so
-    /// much less, so that it pays more, and the others less for it.
-    fn credit(&self) -> f64 {
-        1.0
-    }
     /// The same candidate with other values of [`nonlinear`](Self::nonlinear), in its order; `None`
     /// when a value is out of range or there is nothing to change.
     fn with_nonlinear(&self, values: &[f64]) -> Option<Box<dyn Candidate>> {

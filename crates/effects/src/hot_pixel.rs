@@ -22,9 +22,6 @@ use crate::{
 
 const ID: &str = "hot_pixel";
 pub(crate) const HALF_WIDTH_PX: f64 = 1.5;
-/// Credit of pixels that no star was in. There are twice as many as of the others, and few stars come near one for
-/// long: with the same credit two of four warm pixels of seven sigma under stars were not named.
-const BESIDE: f64 = 0.1;
 
 /// The kind.
 #[derive(Debug)]
@@ -72,7 +69,6 @@ impl EffectKind for Kind {
                 at,
                 half_width_px,
                 stands_for: 1.0,
-                credit: 1.0,
             },
             vec![strength],
         )))
@@ -81,18 +77,17 @@ impl EffectKind for Kind {
         let Some(warm) = scene.warm.filter(|_| scene.has_stars) else {
             return Vec::new();
         };
-        let sorts = [(&warm.under, 1.0), (&warm.beside, BESIDE)];
-        let proposed = sorts.into_iter().flat_map(|(sort, credit)| {
-            sort.middles.iter().map(move |&at| {
+        let stands_for = warm.looked_at as f64 / warm.middles.len().max(1) as f64;
+        let proposed = warm.middles.iter();
+        proposed
+            .map(|&at| {
                 ShiftCandidate::boxed(HotPixel {
                     at,
                     half_width_px: HALF_WIDTH_PX,
-                    stands_for: sort.stands_for(),
-                    credit,
+                    stands_for,
                 })
             })
-        });
-        proposed.collect()
+            .collect()
     }
 }
 
@@ -102,7 +97,6 @@ pub fn hot_pixel_at(at: Pixel) -> Box<dyn Candidate> {
         at,
         half_width_px: HALF_WIDTH_PX,
         stands_for: 1.0,
-        credit: 1.0,
     })
 }
 
@@ -125,7 +119,6 @@ struct HotPixel {
     half_width_px: f64,
     /// How many that were looked at it is proposed for.
     stands_for: f64,
-    credit: f64,
 }
 
 impl Shift for HotPixel {
@@ -159,9 +152,6 @@ impl Shift for HotPixel {
     }
     fn stands_for(&self) -> f64 {
         self.stands_for
-    }
-    fn credit(&self) -> f64 {
-        self.credit
     }
     fn parameters(&self, values: &[f64]) -> Vec<Parameter> {
         vec![

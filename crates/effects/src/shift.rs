@@ -70,10 +70,6 @@ pub(crate) trait Shift: Clone + Debug + Send + Sync + 'static {
     fn stands_for(&self) -> f64 {
         1.0
     }
-    /// See [`Candidate::credit`].
-    fn credit(&self) -> f64 {
-        1.0
-    }
     /// See [`Candidate::part`].
     fn part(&self) -> Option<u32> {
         None
@@ -166,9 +162,6 @@ impl<S: Shift> Candidate for ShiftCandidate<S> {
     }
     fn stands_for(&self) -> f64 {
         self.shift.stands_for()
-    }
-    fn credit(&self) -> f64 {
-        self.shift.credit()
     }
     fn part(&self) -> Option<u32> {
         self.shift.part()

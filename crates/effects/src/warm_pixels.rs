@@ -1,4 +1,4 @@
-//! Where a warm pixel may be: one look at all pixels under the stars and beside them.
+//! Where a warm pixel may be: one look at all pixels under the stars.
 //!
 //! ```text
 //! z(H) = sum w^2 c r / sqrt(sum w^2 c c)      c = H - P while |c| <= 1.5 px on both axes,  r what is left there
@@ -11,7 +11,7 @@
 //!
 //! Source: the score of a linear coefficient at zero (Rao 1948).
 
-use std::collections::{BTreeMap, HashMap, HashSet};
+use std::collections::{BTreeMap, HashMap};
 
 use focal_plane::{Camera, Pixel};
 use rayon::prelude::*;
@@ -21,13 +21,9 @@ use crate::hot_pixel::{HALF_WIDTH_PX, middle_of, pixel_of};
 
 /// Pixels that are proposed.
 const MOST_PIXELS: usize = 48;
-/// The same of those that no star was in.
-const MOST_BESIDE: usize = 16;
 /// Rows within half-width of a pixel with which it is worth looking at: with fewer, the pixels of a slew are
 /// so many that all effects pay for them.
 const LEAST_ROWS: u32 = 8;
-/// Squares of the offsets from a star's mean place below which it does not move, px^2.
-const LEAST_SQUARE: f64 = 1e-9;
 /// Pixels within whose half-width a star may be: its own and those around.
 const NEAR: [[i64; 2]; 9] = [
     [-1, -1],
@@ -41,27 +37,13 @@ const NEAR: [[i64; 2]; 9] = [
     [1, 1],
 ];
 
-/// Pixels of one sort, best first.
+/// The pixels that are proposed, best first.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct Proposed {
-    /// Middles of those that are proposed.
+pub struct WarmPixels {
+    /// Middles.
     pub(crate) middles: Vec<Pixel>,
     /// How many were looked at.
     pub(crate) looked_at: usize,
-}
-
-impl Proposed {
-    /// How many that were looked at each of them is proposed for.
-    pub(crate) fn stands_for(&self) -> f64 {
-        self.looked_at as f64 / self.middles.len().max(1) as f64
-    }
-}
-
-/// The pixels that are proposed: those that stars have been in, and those next to these.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct WarmPixels {
-    pub(crate) under: Proposed,
-    pub(crate) beside: Proposed,
 }
 
 /// Weighted sums over the rows of one star near one pixel.
@@ -81,7 +63,7 @@ struct Visit<'a> {
 }
 
 impl WarmPixels {
-    /// Looks at all pixels under `rows` and next to these, of which `left_px` is left (x, y), with these weights; a row of
+    /// Looks at all pixels under `rows`, of which `left_px` is left (x, y), with these weights; a row of
     /// weight 0 does not count.
     ///
     /// # Panics
@@ -116,16 +98,8 @@ impl WarmPixels {
             let of = |[i, j]: &[i64; 2]| visits.get(&[x + i, y + j]).copied();
             NEAR.iter().filter_map(of).sum()
         };
-        // a star that passes by a pixel is pulled, too
-        let around = visits
-            .keys()
-            .flat_map(|[x, y]| NEAR.map(|[i, j]| [x + i, y + j]));
-        let around: HashSet<[i64; 2]> = around.collect();
-        let mut pixels: Vec<([i64; 2], u32)> = around
-            .into_iter()
-            .filter(|pixel| near(*pixel) >= LEAST_ROWS)
-            .map(|pixel| (pixel, visits.get(&pixel).copied().unwrap_or(0)))
-            .collect();
+        let mut pixels: Vec<([i64; 2], u32)> = visits.iter().map(|(p, n)| (*p, *n)).collect();
+        pixels.retain(|(pixel, _)| near(*pixel) >= LEAST_ROWS);
         pixels.sort_unstable();
         let index: HashMap<[i64; 2], usize> =
             pixels.iter().enumerate().map(|(k, p)| (p.0, k)).collect();
@@ -138,35 +112,25 @@ impl WarmPixels {
             whole[*p][0].join(own);
             whole[*p][1].join(&own.centred());
         }
-        // of a star at rest a pixel beside it is but another place
-        let moves = |k: usize| whole[k][1].cc > LEAST_SQUARE;
-        let score = |k: usize| {
-            let [plain, centred] = whole[k].each_ref().map(Sums::score);
-            plain.max(centred)
-        };
-        let best = |most: usize, of: &dyn Fn(usize) -> bool| {
-            let mut ranked: Vec<(f64, usize)> = (0..pixels.len())
-                .filter(|&k| of(k))
-                .map(|k| (score(k), k))
-                .collect();
-            // ties go to the longer visit, then to the lower coordinates
-            ranked.sort_by(|a, b| {
-                let visits = |k: usize| pixels[k].1;
-                let longer = visits(b.1).cmp(&visits(a.1));
-                b.0.total_cmp(&a.0).then(longer).then(a.1.cmp(&b.1))
-            });
-            Proposed {
-                looked_at: ranked.len(),
-                middles: ranked
-                    .iter()
-                    .take(most)
-                    .map(|(_, k)| middle_of(camera, pixels[*k].0))
-                    .collect(),
-            }
-        };
+        let mut ranked: Vec<(f64, usize)> = whole
+            .iter()
+            .map(|both| both.each_ref().map(Sums::score))
+            .map(|[plain, centred]| plain.max(centred))
+            .zip(0..)
+            .collect();
+        // ties go to the longer visit, then to the lower coordinates
+        ranked.sort_by(|a, b| {
+            let visits = |k: usize| pixels[k].1;
+            let longer = visits(b.1).cmp(&visits(a.1));
+            b.0.total_cmp(&a.0).then(longer).then(a.1.cmp(&b.1))
+        });
         Self {
-            under: best(MOST_PIXELS, &|k| pixels[k].1 > 0),
-            beside: best(MOST_BESIDE, &|k| pixels[k].1 == 0 && moves(k)),
+            middles: ranked
+                .iter()
+                .take(MOST_PIXELS)
+                .map(|(_, k)| middle_of(camera, pixels[*k].0))
+                .collect(),
+            looked_at: pixels.len(),
         }
     }
 }
@@ -258,7 +222,7 @@ impl Sums {
 
     fn score(&self) -> f64 {
         // what a star at rest leaves of its mean is rounding
-        if self.cc > LEAST_SQUARE {
+        if self.cc > 1e-9 {
             self.cr / self.cc.sqrt()
         } else {
             0.0
@@ -271,16 +235,10 @@ mod tests {
     use super::*;
 
     const WARM: Pixel = Pixel { x: 30.5, y: 21.5 };
-    /// Below the path of the first star, which is at y = 21.7 there.
-    const WARM_BESIDE: Pixel = Pixel { x: 30.5, y: 20.5 };
 
     /// Twelve stars that drift over some 240 pixels, by `pace` px a frame, under noise of 0.02 px, with a warm
     /// pixel of this `strength`; and the same where it pushes.
     fn looked(pace: f64, strength: f64) -> [WarmPixels; 2] {
-        looked_at(WARM, pace, strength)
-    }
-
-    fn looked_at(warm: Pixel, pace: f64, strength: f64) -> [WarmPixels; 2] {
         let camera = Camera::from_fov_deg([1024, 1024], [20.0, 20.0]).unwrap();
         let mut state = 9_u64;
         let mut noise = || {
@@ -302,7 +260,7 @@ mod tests {
                     10.2 + t + 0.3 * (s as f64),
                     20.7 + 0.05 * t - 40.0 * (s as f64),
                 ];
-                let c = [warm.x - at[0], warm.y - at[1]];
+                let c = [WARM.x - at[0], WARM.y - at[1]];
                 let near = c.iter().all(|c| c.abs() <= 1.5);
                 for axis in 0..2 {
                     let pull = if near { strength * c[axis] } else { 0.0 };
@@ -345,21 +303,11 @@ mod tests {
     #[test]
     fn a_warm_pixel_is_looked_at_first_however_short_its_visit() {
         let [found, pushed] = looked(0.05, 0.02);
-        let Proposed { middles, looked_at } = &found.under;
-        assert!(*looked_at > 1000, "{looked_at}");
-        assert_eq!(middles.len(), MOST_PIXELS);
-        assert_eq!(middles[0], WARM, "{:?}", &middles[..4]);
+        assert!(found.looked_at > 1000, "{}", found.looked_at);
+        assert_eq!(found.middles.len(), MOST_PIXELS);
+        assert_eq!(found.middles[0], WARM, "{:?}", &found.middles[..4]);
         // a pixel that pushes is none
-        assert!(!pushed.under.middles[..8].contains(&WARM));
-    }
-
-    /// All stars pass by the warm pixel 0.7 px and more beside its middle: none is ever in it.
-    #[test]
-    fn a_pixel_that_stars_pass_by_is_looked_at() {
-        let [found, _] = looked_at(WARM_BESIDE, 0.05, 0.02);
-        let beside = &found.beside.middles;
-        assert_eq!(beside[0], WARM_BESIDE, "{:?}", &beside[..4]);
-        assert_eq!(beside.len(), MOST_BESIDE);
+        assert!(!pushed.middles[..8].contains(&WARM));
     }
 
     /// Four rows fall in each pixel, twelve within its half-width: enough for a pull of 0.06 of up to 1.5 px,
@@ -367,7 +315,6 @@ mod tests {
     #[test]
     fn rows_around_a_pixel_count_not_those_in_it() {
         let [found, _] = looked(0.25, 0.06);
-        let middles = &found.under.middles;
-        assert_eq!(middles[0], WARM, "{:?}", &middles[..4]);
+        assert_eq!(found.middles[0], WARM, "{:?}", &found.middles[..4]);
     }
 }

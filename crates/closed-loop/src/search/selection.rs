@@ -72,8 +72,6 @@ pub(crate) struct Group {
     pub(crate) kind: &'static str,
     /// How many of its kind were looked at for each that is tried.
     pub(crate) stands_for: f64,
-    /// What its sort is worth looking for: it pays the more.
-    pub(crate) credit: f64,
 }
 
 /// One group's standing beside the chosen ones.
@@ -138,17 +136,14 @@ pub(crate) fn columns_of(groups: &[Group], chosen: &[usize]) -> Vec<usize> {
 
 /// What the p-value of each group is multiplied by where those that `may` be chosen are tried.
 pub(crate) fn costs(groups: &[Group], may: &[bool]) -> Vec<f64> {
-    let sort = |g: &Group| (g.kind, g.credit.to_bits());
-    let mut of_sort: BTreeMap<(&str, u64), f64> = BTreeMap::new();
+    let mut of_kind: BTreeMap<&str, f64> = BTreeMap::new();
     let tried = groups.iter().zip(may);
     for (group, _) in tried.filter(|(g, may)| **may && !g.columns.is_empty()) {
-        *of_sort.entry(sort(group)).or_default() += group.stands_for;
+        *of_kind.entry(group.kind).or_default() += group.stands_for;
     }
-    let share = |((_, credit), n): (&(&str, u64), &f64)| f64::from_bits(*credit) * n.sqrt();
-    let all: f64 = of_sort.iter().map(share).sum();
-    let root = |g: &Group| of_sort.get(&sort(g)).map_or(1.0, |n| n.sqrt());
-    let cost = |g: &Group| root(g) / g.credit * all.max(1.0);
-    groups.iter().map(cost).collect()
+    let all: f64 = of_kind.values().map(|n| n.sqrt()).sum();
+    let root = |g: &Group| of_kind.get(g.kind).map_or(1.0, |n| n.sqrt());
+    groups.iter().map(|g| root(g) * all.max(1.0)).collect()
 }
 
 /// What a group pays for its sizes and choices, nats.
@@ -463,7 +458,6 @@ mod tests {
             family: kind.to_owned(),
             kind,
             stands_for: 1.0,
-            credit: 1.0,
         }
     }
 
@@ -488,16 +482,6 @@ mod tests {
         let picked = costs(&groups, &may);
         let each = 20.0 * (1.0 + 20.0 + 14.0_f64.sqrt());
         assert!((picked[3] - each).abs() < 1e-9 && (picked[4] - each).abs() < 1e-9);
-        // a tenth of the credit costs the others a part of a tenth, and the sort itself ten times as much
-        groups[3].stands_for = 1.0;
-        groups[103..].iter_mut().for_each(|g| g.credit = 0.1);
-        let cost = costs(&groups, &may);
-        let all = 1.0 + 10.0 + 0.1 * 14.0_f64.sqrt();
-        assert!((cost[3] - 10.0 * all).abs() < 1e-9);
-        assert!((cost[103] - 10.0 * 14.0_f64.sqrt() * all).abs() < 1e-9);
-        let counted = (0..groups.len()).filter(|&g| may[g] && !groups[g].columns.is_empty());
-        let shares: f64 = counted.map(|g| cost[g].recip()).sum();
-        assert!((shares - 1.0).abs() < 1e-12, "{shares}");
     }
 
     /// Two columns that act in the same eight of fifty blocks, of which one changes its sign from block to block.
