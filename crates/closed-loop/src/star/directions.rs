@@ -57,15 +57,37 @@ pub(crate) fn attitudes(
     )
 }
 
+/// Where the camera sees the centroid of a row.
+pub(super) fn seen_at(camera: &Camera, frames: &StarFrames, row: usize) -> Vector3<f64> {
+    camera.direction(Pixel {
+        x: frames.x_px[row],
+        y: frames.y_px[row],
+    })
+}
+
+/// Sums of where frames of known attitude have seen each star, row by row.
+pub(super) fn sums(
+    frames: &StarFrames,
+    star: &[usize],
+    stars: usize,
+    attitude: impl Fn(usize) -> Option<UnitQuaternion<f64>>,
+    seen: impl Fn(usize) -> Vector3<f64>,
+) -> Vec<Vector3<f64>> {
+    let mut sum = vec![Vector3::zeros(); stars];
+    for k in 0..frames.frames() {
+        if let Some(q) = attitude(k) {
+            for row in frames.rows_of(k) {
+                sum[star[row]] += q.inverse() * seen(row);
+            }
+        }
+    }
+    sum
+}
+
 /// Directions and attitudes when neither is given. `star[row] < stars`.
 pub(crate) fn solve(camera: &Camera, frames: &StarFrames, star: &[usize], stars: usize) -> Solved {
     let seen: Vec<Vector3<f64>> = (0..frames.rows())
-        .map(|r| {
-            camera.direction(Pixel {
-                x: frames.x_px[r],
-                y: frames.y_px[r],
-            })
-        })
+        .map(|row| seen_at(camera, frames, row))
         .collect();
     let mut direction: Vec<Option<Vector3<f64>>> = vec![None; stars];
     let fullest =
@@ -77,14 +99,8 @@ pub(crate) fn solve(camera: &Camera, frames: &StarFrames, star: &[usize], stars:
     }
     let mut attitude = attitudes(camera, frames, star, &direction);
     for _ in 0..ALTERNATIONS {
-        let mut sum = vec![Vector3::zeros(); stars];
-        for (k, q) in attitude.iter().enumerate() {
-            if let Some(q) = q {
-                for row in frames.rows_of(k) {
-                    sum[star[row]] += q.inverse() * seen[row];
-                }
-            }
-        }
+        let known = |k: usize| attitude[k];
+        let sum = sums(frames, star, stars, known, |row| seen[row]);
         for (u, s) in direction.iter_mut().zip(&sum) {
             if s.norm_squared() > 0.0 {
                 *u = Some(s.normalize());

@@ -13,10 +13,10 @@
 //!
 //! Source: least squares for small errors; its derivative.
 
-use focal_plane::Pixel;
 use nalgebra::{Matrix3, Vector3};
 
 use crate::star::data::StarData;
+use crate::star::directions::{seen_at, sums};
 use crate::star::frame_rotation::rotation_row;
 
 impl StarData {
@@ -30,16 +30,10 @@ impl StarData {
         if !self.sees_directions() {
             return;
         }
-        let mut sum = vec![Vector3::zeros(); self.stars.len()];
-        for (k, q) in self.attitude.iter().enumerate() {
-            for row in self.frames.rows_of(k) {
-                let at = Pixel {
-                    x: self.frames.x_px[row],
-                    y: self.frames.y_px[row],
-                };
-                sum[self.star[row]] += q.inverse() * self.camera.direction(at);
-            }
-        }
+        let frames = &self.frames;
+        let seen = |row: usize| seen_at(&self.camera, frames, row);
+        let attitude = |k: usize| Some(self.attitude[k]);
+        let sum = sums(frames, &self.star, self.stars.len(), attitude, seen);
         for (star, sum) in self.stars.iter_mut().zip(sum) {
             star.direction = sum.try_normalize(0.0).unwrap_or_else(Vector3::z);
         }
