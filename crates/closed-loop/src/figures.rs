@@ -25,9 +25,10 @@ use crate::evidence::Residuals;
 use crate::questions::hypothesis::{Questions, Told};
 use crate::search::empirical::EMPIRICAL;
 use crate::search::refusal::Refused;
-use crate::search::selection::{FAMILY_ALPHA, columns_of, each};
+use crate::search::selection::{columns_of, each};
 use crate::search::{Found, family, first_column};
 use crate::star::data::StarData;
+use crate::unexplained::SEARCH_ALPHA;
 
 /// Shares within this factor are the same.
 const SAME: f64 = 3.0;
@@ -364,7 +365,7 @@ pub(crate) fn follows(
                 .collect();
             let worthy = all
                 .iter()
-                .filter(|p| p.p_value < FAMILY_ALPHA && p.worth > 0.0);
+                .filter(|p| p.p_value < SEARCH_ALPHA && p.worth > 0.0);
             let best = worthy
                 .max_by(|a, b| a.worth.total_cmp(&b.worth))
                 .or_else(|| all.iter().min_by(|a, b| a.p_value.total_cmp(&b.p_value)))?;
@@ -440,7 +441,7 @@ pub(crate) fn first_of_each<T>(entries: Vec<T>, variable: impl Fn(&T) -> &String
 
 /// Whether that is beyond chance.
 pub(crate) fn certain(d: &Dependence) -> bool {
-    d.p_value < FAMILY_ALPHA && d.variance_explained > 0.0
+    d.p_value < SEARCH_ALPHA && d.variance_explained > 0.0
 }
 
 /// The empirical term that explains most of what is left, if one that a model can declare does.

@@ -10,7 +10,7 @@
 //! with M frequencies on a grid four times finer than 1/span, and n independent ones
 //! around f that the mean is of ([`lines`]). What is found is refined to the top of z, taken
 //! out of the series as it was before whitening, and the search goes on. Steps then ([`jumps`]).
-//! alpha is 1 % over all series, lines and jumps together.
+//! alpha is a quarter of a hundredth over all series, lines and jumps together.
 //!
 //! Source: Scargle 1982 (periodogram), the F law of a ratio of two mean powers.
 
@@ -23,9 +23,9 @@ use spectra::robust::median_step;
 
 use crate::attitude::spatial_errors::SpatialErrors;
 use crate::bins::{self, Bins};
-use crate::search::selection::FAMILY_ALPHA;
 use crate::star::data::StarData;
 use crate::star::frame_rotation::rotation_row;
+use crate::unexplained::SEARCH_ALPHA;
 use lines::Spectrum;
 use telemetry::report::Unattributed;
 
@@ -100,7 +100,7 @@ impl Series {
         let spectra = lines::spectra(&thinned);
         Self {
             each: thinned.into_iter().zip(spectra).collect(),
-            alpha: FAMILY_ALPHA / (2.0 * tracks.len().max(1) as f64),
+            alpha: SEARCH_ALPHA / (2.0 * tracks.len().max(1) as f64),
         }
     }
 

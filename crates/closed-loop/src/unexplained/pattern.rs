@@ -41,8 +41,8 @@ use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 use telemetry::report::{Dependence, Unattributed};
 
-use crate::search::selection::FAMILY_ALPHA;
 use crate::star::data::StarData;
+use crate::unexplained::SEARCH_ALPHA;
 
 mod pixel_phase;
 #[cfg(test)]
@@ -130,7 +130,7 @@ impl Pattern {
         let variable = self.variable();
         let list = &mut unattributed.depends_on;
         let better =
-            |d: &Dependence| d.variance_explained >= self.explained && d.p_value < FAMILY_ALPHA;
+            |d: &Dependence| d.variance_explained >= self.explained && d.p_value < SEARCH_ALPHA;
         unattributed.present = true;
         let share = unattributed.variance_fraction.unwrap_or(0.0);
         unattributed.variance_fraction = Some(share.max(self.explained * left));
@@ -359,12 +359,12 @@ impl Field {
             return None;
         }
         let chance = self.chance(wave, folds)?;
-        if chance * trials >= FAMILY_ALPHA {
+        if chance * trials >= SEARCH_ALPHA {
             return None;
         }
         let p_value = trials * chance.max(self.chance_around(wave, variance, extent)?);
         let explained = as_left().share_out_of_fold(wave, folds)?;
-        (p_value < FAMILY_ALPHA && explained > 0.0).then_some(Pattern {
+        (p_value < SEARCH_ALPHA && explained > 0.0).then_some(Pattern {
             wave,
             power: best.0,
             p_value,

@@ -156,7 +156,7 @@ fn quiet_stars_count_for_more() {
     assert_eq!(mixed(false), None);
 }
 
-/// 1 % of nulls may raise an alarm: of 20, two or more one time in 60, none with these seeds.
+/// One null in 400 may raise an alarm: of 20, one or more one time in 20, none with these seeds.
 /// `BORESIGHT_SEEDS` takes more; then 5 sigma of a Poisson count are allowed.
 #[test]
 fn noise_holds_no_pattern() {
