@@ -70,7 +70,7 @@ impl<'a> Cells<'a> {
         let mut share = vec![0.0; self.table.stars.len()];
         for (&(_, star, cell), (rows, _)) in &self.sums {
             if within(cell) {
-                share[star] += *rows as f64 / self.table.stars[star].1 as f64;
+                share[star] += *rows as f64 / self.table.stars[star].rows as f64;
             }
         }
         let mut of_block = vec![Scores::zeros(1); self.table.blocks];

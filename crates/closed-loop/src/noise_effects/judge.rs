@@ -417,14 +417,14 @@ impl Bench<'_> {
         let belief = self.model.belief(&full.at);
         for row in self.rows.iter().filter(|r| !r.marked) {
             let [v, _] = belief(row);
-            squares[row.star].push(row.square / v);
+            squares[row.star].push(0.5 * row.square / v / row.median());
         }
         let level: Vec<f64> = squares
             .iter_mut()
             .map(|s| {
                 let enough = s.len() >= MIN_ROWS;
                 let median = spectra::robust::median(s).filter(|_| enough);
-                median.map_or(1.0, |m| m / (2.0 * std::f64::consts::LN_2))
+                median.unwrap_or(1.0)
             })
             .collect();
         let rows: Vec<Row> = self

@@ -5,7 +5,8 @@
 //! ```
 //!
 //! `r / n_s` is what the rows of a star leave open, which is certain: half a square of two axes has
-//! variance 1, and `r` is how much more the sums over blocks of time scatter than that. By how much stars
+//! variance 1 (more where they are nearly one number, [`super::rows`]), and `r` is how much more the sums over
+//! blocks of time scatter than that. By how much stars
 //! differ for no reason, `tau`, is small, and known as from [`PRIOR`] of them beside those that are seen
 //! (Smyth 2004), so that the sum of both has a freedom of its own (Satterthwaite 1946),
 //!
@@ -69,15 +70,15 @@ impl Spread {
 
 impl Table {
     fn compared(&self) -> Vec<Level> {
-        let most = self.stars.iter().map(|s| s.1).max().unwrap_or(0);
+        let most = self.stars.iter().map(|s| s.rows).max().unwrap_or(0);
         let enough = MIN_ROWS.max(most / SELDOM);
         let repeated = self.repeated();
         let each = self.stars.iter().enumerate();
-        each.filter(|(_, (level, rows, _))| *rows >= enough && *level > 0.0)
-            .map(|(star, (level, rows, mag))| Level {
-                ln: level.ln(),
-                mag: *mag,
-                of_rows: repeated / *rows as f64,
+        each.filter(|(_, s)| s.rows >= enough && s.level > 0.0)
+            .map(|(star, s)| Level {
+                ln: s.level.ln(),
+                mag: s.mag,
+                of_rows: repeated * s.scatter / (s.rows as f64).powi(2),
                 star,
             })
             .collect()
@@ -90,7 +91,8 @@ impl Table {
             sums[row.star * self.blocks + row.block] += z;
         }
         let square: f64 = sums.iter().map(|u| u * u).sum();
-        (square / self.rows.len().max(1) as f64).max(1.0)
+        let white: f64 = self.stars.iter().map(|s| s.scatter).sum();
+        (square / white.max(1.0)).max(1.0)
     }
 
     /// A column of a variable of stars beside a line in magnitude, held against the scatter of their levels.
@@ -208,13 +210,21 @@ fn beside_line(stars: &[Level], f: &[f64], of_rows: Option<f64>) -> Option<(f64,
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::noise_effects::squares::StarLevel;
 
     /// Stars of a level, so many rows and a magnitude.
     fn table(stars: impl Iterator<Item = (f64, usize, f64)>) -> Table {
         Table {
             rows: Vec::new(),
             relative: Vec::new(),
-            stars: stars.collect(),
+            stars: stars
+                .map(|(level, rows, mag)| StarLevel {
+                    level,
+                    rows,
+                    scatter: rows as f64,
+                    mag,
+                })
+                .collect(),
             blocks: 0,
         }
     }

@@ -25,7 +25,6 @@ const LEAST_CHANGE: f64 = 0.05;
 /// Fewest rows of a star with a level, and blocks of time.
 pub(super) const MIN_ROWS: usize = 50;
 const MIN_BLOCKS: usize = 10;
-const MEDIAN: f64 = std::f64::consts::LN_2;
 
 /// A chance, and the rms share of the variance that changes.
 pub(super) type Judged = [f64; 2];
@@ -41,9 +40,20 @@ pub(super) struct Table {
     pub(super) rows: Vec<Row>,
     /// Of each row, over the level of its star.
     pub(super) relative: Vec<f64>,
-    /// Level of each star over the declared one, its rows, and magnitude - 5.
-    pub(super) stars: Vec<(f64, usize, f64)>,
+    pub(super) stars: Vec<StarLevel>,
     pub(super) blocks: usize,
+}
+
+/// What a table knows of a star.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct StarLevel {
+    /// Its variance over the declared one.
+    pub(super) level: f64,
+    pub(super) rows: usize,
+    /// Variance of the sum of its rows' half squares over their noise's.
+    pub(super) scatter: f64,
+    /// Magnitude - 5.
+    pub(super) mag: f64,
 }
 
 /// A variable in the rows of a table.
@@ -58,7 +68,7 @@ impl Columns {
         let rows: Vec<[f64; 2]> = table.rows.iter().map(column).collect();
         let mut mean = vec![[0.0; 2]; table.stars.len()];
         for (row, f) in table.rows.iter().zip(&rows) {
-            let count = table.stars[row.star].1 as f64;
+            let count = table.stars[row.star].rows as f64;
             for k in 0..2 {
                 mean[row.star][k] += f[k] / count;
             }
@@ -94,13 +104,13 @@ impl Table {
             rows.retain(|r| !r.marked);
             let mut squares = vec![Vec::new(); stars];
             for row in &rows {
-                squares[row.star].push(0.5 * row.square / row.declared);
+                squares[row.star].push(0.5 * row.square / row.declared / row.median());
             }
             for (level, squares) in levels.iter_mut().zip(&mut squares) {
                 if squares.len() < MIN_ROWS {
                     *level = f64::NAN;
                 } else if let Some(median) = spectra::robust::median(squares) {
-                    *level = median / MEDIAN;
+                    *level = median;
                 }
             }
             if round == 0 {
@@ -119,17 +129,26 @@ impl Table {
             let level = levels[r.star];
             level > 0.0 && r.square < SPIKE * r.declared * level
         });
-        let mut sums = vec![(0.0, 0_usize, f64::NAN); stars];
+        let unseen = StarLevel {
+            level: 0.0,
+            rows: 0,
+            scatter: 0.0,
+            mag: f64::NAN,
+        };
+        let mut sums = vec![unseen; stars];
         for row in &rows {
             let sum = &mut sums[row.star];
-            *sum = (sum.0 + 0.5 * row.square / row.declared, sum.1 + 1, row.mag);
+            sum.level += 0.5 * row.square / row.declared;
+            sum.rows += 1;
+            sum.scatter += row.variance();
+            sum.mag = row.mag;
         }
         for sum in &mut sums {
-            sum.0 /= sum.1.max(1) as f64;
+            sum.level /= sum.rows.max(1) as f64;
         }
         let relative = rows
             .iter()
-            .map(|r| 0.5 * r.square / r.declared / sums[r.star].0 - 1.0)
+            .map(|r| 0.5 * r.square / r.declared / sums[r.star].level - 1.0)
             .collect();
         Some(Self {
             relative,
@@ -203,7 +222,12 @@ pub(super) mod tests {
         let mut table = Table {
             rows: Vec::new(),
             relative: Vec::new(),
-            stars: vec![(1.0, 2400, 0.0)],
+            stars: vec![StarLevel {
+                level: 1.0,
+                rows: 2400,
+                scatter: 2400.0,
+                mag: 0.0,
+            }],
             blocks: 12,
         };
         let mut columns = Columns {
@@ -219,6 +243,7 @@ pub(super) mod tests {
             table.rows.push(Row {
                 square: 0.0,
                 shows: 1.0,
+                alike: 0.0,
                 declared: 1.0,
                 mag: 0.0,
                 rate: 0.0,

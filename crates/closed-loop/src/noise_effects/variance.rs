@@ -138,7 +138,7 @@ impl Model {
         let mut ratio: Vec<f64> = rows
             .iter()
             .filter(|r| !r.marked)
-            .map(|r| r.square / (2.0 * std::f64::consts::LN_2))
+            .map(|r| 0.5 * r.square / r.median())
             .collect();
         Self {
             // the median of chi2_2 is 2 ln 2

@@ -75,8 +75,10 @@ const LEAST_MOTION: f64 = 0.1;
 const LEAST_CLUSTERS: usize = 40;
 /// Wave vectors that the mean power around the peak is of.
 const AROUND: usize = 64;
-/// From this many stars a frame on, what the reference turns a frame by is left out.
+/// From this many stars a frame on, what the reference turns a frame by is left out; of fewer, whose rotation takes
+/// most of a wave, where it is so much of all.
 const STARS_TO_TURN: usize = 5;
+const TURNS_FEW: f64 = 0.1;
 /// Least extent, px: less holds no waves to speak of.
 const LEAST_EXTENT_PX: f64 = 16.0;
 
@@ -178,8 +180,8 @@ pub(crate) fn search(
         ..Field::new(at, [x, y], &frame, &of_star, weight)
     };
     let as_left = || field([rx, ry]);
-    let turning = data.t_s.len() >= STARS_TO_TURN * data.frames.frames();
-    if !turning {
+    let many = data.t_s.len() >= STARS_TO_TURN * data.frames.frames();
+    if !many && turned.share() < TURNS_FEW {
         return as_left().pattern(&as_left, folds, order);
     }
     let found = field(turned.known.each_ref()).pattern(&as_left, folds, order)?;

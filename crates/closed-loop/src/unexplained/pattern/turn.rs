@@ -17,7 +17,7 @@
 use nalgebra::Vector3;
 
 use crate::star::data::StarData;
-use crate::star::frame_rotation::{Turns, rotation_row};
+use crate::star::frame_rotation::{Turns, counts, rotation_row};
 
 /// Residuals of both axes over all rows, arcsec, less rotations of their frames.
 #[derive(Clone, Debug)]
@@ -52,6 +52,15 @@ impl<'a> Turned<'a> {
             known: less(data, residual, &drawn),
             shared,
         }
+    }
+
+    /// The share of the residuals' squares that goes with what the reference is known to turn frames by.
+    pub(crate) fn share(&self) -> f64 {
+        let squares = |axes: [&[f64]; 2]| -> f64 {
+            let rows = (0..self.data.outlier.len()).filter(|&r| counts(self.data, axes, r));
+            rows.map(|r| axes[0][r].powi(2) + axes[1][r].powi(2)).sum()
+        };
+        1.0 - squares(self.known.each_ref().map(Vec::as_slice)) / squares(self.residual)
     }
 
     /// Less all that the stars of a frame share: formed when it is asked for.
