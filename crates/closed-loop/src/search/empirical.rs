@@ -9,9 +9,9 @@
 //!
 //! a shift along each axis, a roll and a scale (the time by what bends the scale alone: a frame's turns would be
 //! those of a reference that errs slowly); on an attitude it drives each axis. Motion (a, b) drives each axis by
-//! each of its own, by its squares a^2, b^2 and ab and by its size; a pixel phase its own axis by its first six harmonics, the place within the window its own axis. A rate also
-//! drives by its direction alone, whatever its size: backlash does. Two variables together are what neither does
-//! alone,
+//! each of its own, by its squares a^2, b^2 and ab and by its size; a pixel phase its own axis by its first six
+//! harmonics and the other by two, the place within the window its own axis. A rate also drives by its direction
+//! alone, whatever its size: backlash does. Two variables together are what neither does alone,
 //!
 //! ```text
 //! P_1(a) times the first columns of b, of a motion those of its size, too
@@ -37,8 +37,9 @@ pub(crate) const EMPIRICAL: &str = "empirical";
 
 /// Orders of the polynomial in a smooth variable.
 const ORDERS: usize = 3;
-/// Harmonics of a pixel phase.
+/// Harmonics of a pixel phase along its own axis, and across.
 pub(crate) const HARMONICS: usize = 6;
+const ACROSS: usize = 2;
 /// Columns of a variable that another one may multiply.
 const OF_A_PAIR: usize = 2;
 /// Where the columns of a motion start that are of its squares, of its size (the last that an acceleration has), along
@@ -225,7 +226,7 @@ impl Empirical {
         let count = match &variable {
             Variable::Star(ids) => 2 * ids.len(),
             Variable::Slot(slots) => 2 * slots.len(),
-            Variable::Phase(_) => 2 * HARMONICS,
+            Variable::Phase(_) => 2 * (HARMONICS + ACROSS),
             Variable::Position(_) | Variable::Window => 2 * ORDERS,
             Variable::Half(_) | Variable::Quarter => 2,
             Variable::Time if stars => 4 * ORDERS,
@@ -338,7 +339,13 @@ impl Empirical {
             }
         } else if self.has_size() {
             parts.push((OF_A_PAIR..n).collect());
-        } else if n == 4 * ORDERS && !matches!(self.variable, Variable::Phase(_)) {
+        } else if matches!(self.variable, Variable::Phase(_)) {
+            // its own axis, and the other
+            let own = 2 * HARMONICS;
+            if n > own {
+                parts.extend([(0..own).collect(), vec![own, own + 1], (own..n).collect()]);
+            }
+        } else if n == 4 * ORDERS {
             // what bends alone
             parts.extend([vec![4, 5], (4..8).collect()]);
         }
@@ -450,10 +457,15 @@ impl Candidate for Empirical {
                 }
                 Variable::Phase(axis) => {
                     let [along_x, along_y] = [1.0 - *axis as f64, *axis as f64];
-                    let orders = waves[i].orders().enumerate();
-                    for (k, [sin, cos]) in orders.take(HARMONICS.min(count.div_ceil(2))) {
+                    let orders = || waves[i].orders().enumerate();
+                    for (k, [sin, cos]) in orders().take(HARMONICS.min(count.div_ceil(2))) {
                         put(2 * k, sin * along_x, sin * along_y);
                         put(2 * k + 1, cos * along_x, cos * along_y);
+                    }
+                    let across = 2 * HARMONICS;
+                    for (k, [sin, cos]) in orders().take(ACROSS.min(count.saturating_sub(across))) {
+                        put(across + 2 * k, sin * along_y, sin * along_x);
+                        put(across + 2 * k + 1, cos * along_y, cos * along_x);
                     }
                 }
                 Variable::Window => {

@@ -26,7 +26,7 @@ use crate::star::columns::{CHUNK_FRAMES, StarColumns};
 use crate::star::data::StarData;
 use crate::star::frame_rotation::{rotation_of, rotation_row};
 use crate::star::layout::Filled;
-use crate::star::moments::{Keep, MOST_BINS, StarMoments};
+use crate::star::moments::{Keep, MOST_BINS, MOST_RESTLESS_BINS, StarMoments};
 use crate::star::nuisance::StarNuisance;
 use crate::star::reference_noise;
 use crate::star::weights;
@@ -131,7 +131,11 @@ impl<'a> StarEvidence<'a> {
 
     /// One pass over the data that serves every noise.
     pub(crate) fn moments(&self, folds: &Folds, candidates: &[&dyn Candidate]) -> StarMoments {
-        let bins = Bins::cut(&self.data.frames.t_s, folds, MOST_BINS);
+        let most = match self.drawn {
+            Some(_) => MOST_RESTLESS_BINS,
+            None => MOST_BINS,
+        };
+        let bins = Bins::cut(&self.data.frames.t_s, folds, most);
         let all = self.all(candidates);
         StarMoments::accumulate(&self.columns(&all), folds, Keep::Bins(&bins))
     }

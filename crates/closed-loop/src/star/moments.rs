@@ -36,6 +36,9 @@ use crate::star::columns::StarColumns;
 
 /// About as many bins as the rotations are averaged over at most.
 pub(crate) const MOST_BINS: usize = 1200;
+/// The same where the reference errs from one frame to the next by as much as the stars: within a bin, that would
+/// be noise of the centroids.
+pub(crate) const MOST_RESTLESS_BINS: usize = 6000;
 
 /// Rows from which on slow columns are not taken at every frame: with a fortieth of them it saves nothing.
 const PACED_ROWS: usize = 300_000;

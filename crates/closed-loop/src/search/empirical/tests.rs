@@ -155,7 +155,14 @@ fn harmonics_are_those_of_the_phase() {
             assert!((x[4 * k + 2 + row] - unit * cos).abs() < 1e-14);
         }
     }
-    assert!(y.iter().all(|v| *v == 0.0));
+    // across by the first two, and by nothing else
+    let own = 2 * HARMONICS * 2;
+    assert!(y[..own].iter().all(|v| *v == 0.0));
+    let [across, along] = [1, 0].map(|a| camera.arcsec_per_px()[a]);
+    for (y, x) in y[own..].iter().zip(&x[..8]) {
+        assert!((y * across - x * along).abs() < 1e-14);
+    }
+    assert!(x[own..].iter().all(|v| *v == 0.0));
 }
 
 #[test]
