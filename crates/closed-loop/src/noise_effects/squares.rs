@@ -309,12 +309,12 @@ pub(super) mod tests {
     }
 
     /// A frame of four stars leaves five numbers of eight, which its stars share: their levels scatter by little more
-    /// than rows by themselves. Believed as they are, they scatter by 1.7.
+    /// than rows by themselves. Of 240 levels the rms is known to 0.05; believed as they are, they scatter by 1.37.
     #[test]
     fn stars_that_are_quiet_by_chance_are_not_believed() {
         let z: Vec<f64> = (0..40).flat_map(four_a_frame).collect();
         let rms = (z.iter().map(|z| z * z).sum::<f64>() / z.len() as f64).sqrt();
-        assert!((0.8..1.3).contains(&rms), "{rms}");
+        assert!((0.85..1.15).contains(&rms), "{rms}");
         let shown = [(1.1, 400), (1.0, 400), (0.9, 400), (4.0, 400)];
         let [one, _, _, loud] = believed(&shown).unwrap()[..] else {
             panic!("four stars")

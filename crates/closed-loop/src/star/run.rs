@@ -252,10 +252,16 @@ fn explain(
     let line = inside
         .as_ref()
         .and_then(|(_, series)| series.shared_line(leftover::WORTH_A_SEARCH));
+    // beside a reference that wanders a jump shows at its instant alone, which no grid has
+    let jump = inside
+        .as_ref()
+        .filter(|_| scene.has_reference && outcome.searched.wander.is_some())
+        .and_then(|(_, series)| series.shared_jump());
     let mut put_forward: Vec<_> = line
         .map(|line| line.candidate(&scene))
         .into_iter()
         .collect();
+    put_forward.extend(jump.map(|jump| jump.candidate(&scene)));
     let tracks = inside.as_ref().and_then(|(_, series)| series.across());
     let look = tracks.zip(level.motion).filter(|_| scene.has_reference);
     let look = look.and_then(|(tracks, path)| Look::at(&scene.surroundings, path, tracks));
@@ -263,7 +269,7 @@ fn explain(
         put_forward.extend(orbit(level, folds, &scene, &outcome.searched, look)?);
     }
     if !put_forward.is_empty() {
-        progress("searching again with the line or orbit that is left");
+        progress("searching again with the line, jump or orbit that is left");
         let mut again = named(&put_forward)?;
         // what was put forward in vain changes nothing
         if again
