@@ -276,14 +276,16 @@ impl Track {
             turns: self.turns,
         };
         for rows in rows {
-            let (mut t, mut v, mut w) = (0.0, 0.0, 0.0);
+            let (mut t, mut v, mut w, mut n) = (0.0, 0.0, 0.0, 0.0);
             for k in rows.filter(|&k| !spike[k]) {
-                t += self.weight[k] * self.t_s[k];
+                t += self.t_s[k];
                 v += self.weight[k] * self.value[k];
                 w += self.weight[k];
+                n += 1.0;
             }
             if w > 0.0 {
-                out.t_s.push(t / w);
+                // whatever the weights: series of the same points have the same times
+                out.t_s.push(t / n);
                 out.value.push(v / w);
                 out.weight.push(w);
             }

@@ -201,3 +201,26 @@ fn noise_seldom_holds_a_shared_jump() {
         assert!(again <= 14, "slow {slow}: {again}");
     }
 }
+
+/// Axes whose rows weigh differently, one with a spike, have the same times still: what they share is found. The step
+/// is that of `axes_together_show_a_step_that_none_does_alone`.
+#[test]
+fn axes_that_weigh_differently_share_a_step() {
+    let shared = (0..20)
+        .filter(|&seed| {
+            let mut all = tracks(seed, 500, 0.0, &|_| 0.0);
+            for (axis, track) in all.iter_mut().enumerate() {
+                for (v, t) in track.value.iter_mut().zip(&track.t_s) {
+                    *v += if *t > 110.2 { 0.34 } else { 0.0 };
+                }
+                for (k, w) in track.weight.iter_mut().enumerate() {
+                    *w = 0.1 + 0.3 * axis as f64 + 1e-3 * (k % 7) as f64;
+                }
+                track.value[37 + 100 * axis] = 50.0;
+            }
+            let found = Series::of(&all).shared_jump();
+            found.is_some_and(|f| (f.at_s - 110.25).abs() < 30.0)
+        })
+        .count();
+    assert!(shared >= 12, "{shared}");
+}
