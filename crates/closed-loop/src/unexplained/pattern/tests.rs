@@ -248,7 +248,7 @@ fn spots_of_their_own_are_no_pattern() {
     let phase = |x: f64, y: f64| {
         // paths start at least a few pixels apart
         let star = ((x / 64.0).floor() * 5.0 + (y / 64.0).floor() * 3.0).sin();
-        4.0 * star * (TAU * (x + 0.3 * star)).sin()
+        6.0 * star * (TAU * (x + 0.3 * star)).sin()
     };
     let fringe = wave([0.31, 0.17], 2.0);
     let own = |field: Field| Field {
