@@ -4,7 +4,7 @@
 //! stars     dP = sum_k c_k field_k(v)   arcsec over arcsec per pixel,   z = (v - middle) / half
 //!   smooth  (g, 0)  (0, g)  (-y g, x g)  (x g, y g)        g = P_1(z), P_2(z), P_3(z), x and y over half the detector
 //!   x_px    (g, 0)  (0, g)                                 v the position
-//!   phase   sin, cos of the pixel phase and of 2 to 6 times it, along its axis
+//!   phase   sin, cos of the pixel phase and of 2 to 6 times it, along its axis, then of it and of twice it, across
 //!   two    the first two columns of x_px, y_px or a pixel phase times P_1(z) of the second variable
 //! attitude  theta = sum_k c_k g_k(z) about x, then y, then z    arcsec, tracker axes
 //! ```
@@ -28,14 +28,16 @@ use crate::{
 const ID: &str = "empirical";
 /// Orders of the polynomials.
 const ORDERS: usize = 3;
-/// Harmonics of a pixel phase.
+/// Harmonics of a pixel phase along its axis, and across.
 const HARMONICS: usize = 6;
+const ACROSS: usize = 2;
 /// Coefficients of two variables together.
 const OF_A_PAIR: usize = 2;
-/// Most coefficients: four fields of each order.
-const MOST: usize = 4 * ORDERS;
+/// Most coefficients: those of a pixel phase.
+const MOST: usize = 2 * (HARMONICS + ACROSS);
 const NAMES: [&str; MOST] = [
-    "c0", "c1", "c2", "c3", "c4", "c5", "c6", "c7", "c8", "c9", "c10", "c11",
+    "c0", "c1", "c2", "c3", "c4", "c5", "c6", "c7", "c8", "c9", "c10", "c11", "c12", "c13", "c14",
+    "c15",
 ];
 const CHANNEL: &str = "housekeeping:";
 
@@ -225,7 +227,7 @@ impl EffectKind for Kind {
             .map_or(0, |k| k + 1);
         let most = match (&variable, on_attitude) {
             _ if by.is_some() => OF_A_PAIR,
-            (Variable::Phase(_), _) => 2 * HARMONICS,
+            (Variable::Phase(_), _) => 2 * (HARMONICS + ACROSS),
             (Variable::Position(_), _) => 2 * ORDERS,
             (_, true) => 3 * ORDERS,
             (_, false) => 4 * ORDERS,
@@ -303,6 +305,11 @@ impl Empirical {
                     let (sin, cos) = ((k + 1) as f64 * phase).sin_cos();
                     put(2 * k, sin * along[0], sin * along[1]);
                     put(2 * k + 1, cos * along[0], cos * along[1]);
+                    if k < ACROSS {
+                        let first = 2 * (HARMONICS + k);
+                        put(first, sin * along[1], sin * along[0]);
+                        put(first + 1, cos * along[1], cos * along[0]);
+                    }
                 }
             }
             smooth => {

@@ -1,4 +1,6 @@
 use super::*;
+use focal_plane::Pixel;
+use star_tracker::StarView;
 
 fn camera() -> Camera {
     let model = telemetry::Model::parse(
@@ -163,6 +165,39 @@ fn harmonics_are_those_of_the_phase() {
         assert!((y * across - x * along).abs() < 1e-14);
     }
     assert!(x[own..].iter().all(|v| *v == 0.0));
+}
+
+/// A model that declares what was found shifts stars by what the columns say.
+#[test]
+fn a_declared_phase_is_the_one_that_was_found() {
+    for axis in 0..2 {
+        let term = Empirical::new(Variable::Phase(axis), [0.0, 1.0], true).unwrap();
+        let count = term.coefficients().len();
+        let values: Vec<f64> = (0..count).map(|k| 1.0 + 0.3 * k as f64).collect();
+        let (camera, channels) = (camera(), BTreeMap::new());
+        let surroundings = Surroundings {
+            camera: &camera,
+            span_s: [0.0, 4.0],
+            channels: &channels,
+            frames: None,
+        };
+        let declared = term.realise(&values, &surroundings).unwrap();
+        let columns = columns(&term);
+        for (row, (x, y)) in [(-100.3, 50.7), (200.2, -300.1)].into_iter().enumerate() {
+            let shift = declared.centroid_shift_px(&StarView {
+                t_s: 1.0,
+                slot: 0,
+                star_id: 7,
+                mag: 3.0,
+                bv: 0.5,
+                at: Pixel { x, y },
+            });
+            for (column, shift) in columns.iter().zip(shift) {
+                let sum: f64 = (0..count).map(|k| values[k] * column[2 * k + row]).sum();
+                assert!((sum - shift).abs() < 1e-12, "{axis}: {sum} {shift}");
+            }
+        }
+    }
 }
 
 #[test]
