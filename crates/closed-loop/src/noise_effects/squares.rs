@@ -285,8 +285,10 @@ pub(super) mod tests {
             frames.begin(k as f64);
             t_s.push(k as f64);
             let missing = [k % 6, (k + 1 + k / 6 % 5) % 6];
-            for s in (0..6).filter(|s| !missing.contains(s)) {
-                frames.push(s as i32, s as i64, STARS[s][0], STARS[s][1]);
+            for (s, [x, y]) in (0_u8..).zip(STARS) {
+                if !missing.contains(&usize::from(s)) {
+                    frames.push(i32::from(s), i64::from(s), x, y);
+                }
             }
         }
         let still = vec![UnitQuaternion::identity(); t_s.len()];
