@@ -38,6 +38,8 @@ use crate::star::frame_rotation::rotation_row;
 const MIN_STARS: usize = 3;
 /// A row whose rotation takes more than this share of its variance says too little.
 const MOST_LEVERAGE: f64 = 0.8;
+/// Chance to be sound of a row that is looked at again beside its frame's rotation.
+const DOUBTFUL: f64 = 0.5;
 /// Rows beyond which frames are thinned evenly: variances are known to 1 % from half of them.
 const MOST_ROWS: usize = 100_000;
 
@@ -111,6 +113,23 @@ impl Source<'_> {
         out
     }
 
+    /// The rotation of a frame by its rows and their weights, and its covariance.
+    fn turn(
+        &self,
+        rows: impl Iterator<Item = (usize, f64)>,
+    ) -> Option<(Matrix3<f64>, Vector3<f64>)> {
+        let (mut normal, mut moment) = (Matrix3::zeros(), Vector3::zeros());
+        for (r, weight) in rows {
+            for (a, residual) in rotation_row(self.data, r).into_iter().zip(self.residual) {
+                let a = Vector3::from(a);
+                normal += a * a.transpose() * weight;
+                moment += a * (residual[r] * weight);
+            }
+        }
+        let covariance = normal.try_inverse()?;
+        Some((covariance, covariance * moment))
+    }
+
     fn frame(
         &self,
         frame: usize,
@@ -119,7 +138,7 @@ impl Source<'_> {
         out: &mut Vec<Row>,
     ) {
         let data = self.data;
-        let members: Vec<(usize, Row, [f64; 2])> = data
+        let mut members: Vec<(usize, Row, [f64; 2])> = data
             .frames
             .rows_of(frame)
             .filter(|&r| self.residual.iter().all(|axis| axis[r].is_finite()))
@@ -145,19 +164,24 @@ impl Source<'_> {
         if members.iter().filter(|m| !m.1.marked).count() < MIN_STARS {
             return;
         }
-        let (mut normal, mut moment) = (Matrix3::zeros(), Vector3::zeros());
-        for (r, _, [_, weight]) in &members {
-            let jacobian = rotation_row(data, *r);
-            for axis in 0..2 {
-                let a = Vector3::from(jacobian[axis]);
-                normal += a * a.transpose() * *weight;
-                moment += a * (self.residual[axis][*r] * weight);
+        // stars that a wandering reference moves, all together, are no spikes
+        let doubtful = |m: &(usize, Row, [f64; 2])| !m.1.marked && m.2[0] * m.2[1] < DOUBTFUL;
+        if members.iter().any(doubtful) {
+            let whole = |m: &(usize, Row, [f64; 2])| f64::from(u8::from(!m.1.marked)) / m.2[0];
+            let Some((_, theta)) = self.turn(members.iter().map(|m| (m.0, whole(m)))) else {
+                return;
+            };
+            for (r, row, [variance, weight]) in members.iter_mut().filter(|m| doubtful(m)) {
+                let left: f64 = (rotation_row(data, *r).into_iter().zip(self.residual))
+                    .map(|(a, residual)| (residual[*r] - Vector3::from(a).dot(&theta)).powi(2))
+                    .sum();
+                let square = row.square.min(left);
+                *weight = belief(&Row { square, ..*row })[1] / *variance;
             }
         }
-        let Some(covariance) = normal.try_inverse() else {
+        let Some((covariance, theta)) = self.turn(members.iter().map(|m| (m.0, m.2[1]))) else {
             return;
         };
-        let theta = covariance * moment;
         for (r, mut row, [variance, weight]) in members {
             let jacobian = rotation_row(data, r);
             let (mut square, mut shows) = (0.0, 0.0);

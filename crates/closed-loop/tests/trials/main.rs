@@ -12,5 +12,6 @@ mod nulls;
 mod orbits;
 mod patterns;
 mod power;
+mod restless;
 mod snapshots;
 mod unknown;
