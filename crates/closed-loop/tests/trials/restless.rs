@@ -31,7 +31,7 @@ fn what_stars_do_among_each_other_is_not_hidden() {
     for seed in 0..2 {
         let mut case = Case::new(Path::Drift, 5000 + seed);
         case.duration_s = 1300.0;
-        let lens = "channel = \"optics_c\"\nppm_per_c = 0.35";
+        let lens = "channel = \"optics_c\"\nppm_per_c = 0.25";
         let report = report(case.with("focal_length_drift", lens), 5.0);
         assert_eq!(
             named(&report),
