@@ -92,12 +92,9 @@ pub(crate) struct Series {
 
 impl Series {
     pub(crate) fn of(tracks: &[Track]) -> Self {
-        let mut spikes: Vec<Vec<bool>> = tracks.par_iter().map(Track::spikes).collect();
-        share_spikes(tracks, &mut spikes);
         let thinned: Vec<Track> = tracks
             .par_iter()
-            .zip(&spikes)
-            .map(|(track, spikes)| track.thinned(spikes))
+            .map(Track::thinned)
             .filter(|track| track.t_s.len() >= MIN_POINTS)
             .collect();
         let spectra = lines::spectra(&thinned);
@@ -145,20 +142,6 @@ impl Series {
         out.lines_hz.sort_by(f64::total_cmp);
         out.jumps_s.sort_by(f64::total_cmp);
         out
-    }
-}
-
-/// A spike about one axis is none of the others' points either: what they share is looked for at common times.
-fn share_spikes(tracks: &[Track], spikes: &mut [Vec<bool>]) {
-    let turns: Vec<usize> = (0..tracks.len()).filter(|&k| tracks[k].turns).collect();
-    let Some(longest) = turns.iter().map(|&k| spikes[k].len()).max() else {
-        return;
-    };
-    let any: Vec<bool> = (0..longest)
-        .map(|i| turns.iter().any(|&k| spikes[k].get(i) == Some(&true)))
-        .collect();
-    for k in turns {
-        spikes[k].copy_from_slice(&any[..tracks[k].t_s.len()]);
     }
 }
 
@@ -251,17 +234,12 @@ impl Track {
             .map_or(0.0, |(l, f)| l - f)
     }
 
-    /// Points that do not count, or are spikes.
-    fn spikes(&self) -> Vec<bool> {
-        let mut spike: Vec<bool> = self.weight.iter().map(|w| *w <= 0.0).collect();
-        robust::mark_outliers(&self.value, &vec![0; spike.len()], 1, &mut spike);
-        spike
-    }
-
-    /// Points that are no `spike`, about their mean, averaged where they are too many.
-    fn thinned(&self, spike: &[bool]) -> Self {
+    /// Points that count, about their mean, without spikes, averaged where they are too many.
+    fn thinned(&self) -> Self {
         let folds = Folds::whole(self.t_s.len());
         let size = self.t_s.len().div_ceil(MOST_POINTS).max(1);
+        let mut spike: Vec<bool> = self.weight.iter().map(|w| *w <= 0.0).collect();
+        robust::mark_outliers(&self.value, &vec![0; spike.len()], 1, &mut spike);
         let mut rows: Vec<std::ops::Range<usize>> = Vec::new();
         if size == 1 {
             rows.extend((0..self.t_s.len()).map(|k| k..k + 1));
