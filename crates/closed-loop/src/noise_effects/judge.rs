@@ -29,6 +29,7 @@ use block_regression::Folds;
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
 
 use super::rows::Row;
+use super::squares::{MIN_ROWS, levels_shown};
 use super::variance::{
     Covariance, Fit, LEVEL, MAGNITUDE, Model, PARAMETERS, RATE, SHARE, SIZE, Vector, Without,
     information, logit, sigmoid,
@@ -45,8 +46,6 @@ const MIN_SPREAD_RATE: f64 = 0.05;
 /// Largest slope, and noise of a rate in arcsec/(deg/s), that nature makes.
 const CREDIBLE_SLOPE: f64 = 4.0;
 const CREDIBLE_RATE: f64 = 300.0;
-/// Rows of a star from which it has a level of its own.
-const MIN_ROWS: usize = 50;
 /// Fewest spikes that are a rate.
 const MIN_SPIKES: f64 = 3.0;
 /// Nats by which spikes must beat noise with tails.
@@ -413,25 +412,13 @@ impl Bench<'_> {
 
     /// Spikes, every star at its own level.
     fn spikes(&self, full: &Fit) -> Judged {
-        let mut squares = vec![Vec::new(); self.stars];
         let belief = self.model.belief(&full.at);
-        for row in self.rows.iter().filter(|r| !r.marked) {
-            let [v, _] = belief(row);
-            squares[row.star].push(0.5 * row.square / v / row.median());
-        }
-        let level: Vec<f64> = squares
-            .iter_mut()
-            .map(|s| {
-                let enough = s.len() >= MIN_ROWS;
-                let median = spectra::robust::median(s).filter(|_| enough);
-                median.unwrap_or(1.0)
-            })
-            .collect();
+        let shown = levels_shown(&self.rows, self.stars, |row| belief(row)[0]);
         let rows: Vec<Row> = self
             .rows
             .iter()
             .map(|row| Row {
-                declared: row.declared * grown(full, row) * level[row.star],
+                declared: row.declared * grown(full, row) * shown[row.star].level.unwrap_or(1.0),
                 ..*row
             })
             .collect();

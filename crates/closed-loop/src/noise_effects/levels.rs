@@ -6,9 +6,9 @@
 //!
 //! `r / n_s` is what the rows of a star leave open, which is certain: half a square of two axes has
 //! variance 1 (more where they are nearly one number, [`super::rows`]), and `r` is how much more the sums over
-//! blocks of time scatter than that. By how much stars
-//! differ for no reason, `tau`, is small, and known as from [`PRIOR`] of them beside those that are seen
-//! (Smyth 2004), so that the sum of both has a freedom of its own (Satterthwaite 1946),
+//! blocks of time scatter than that. By how much stars differ for no reason, `tau`, is small, and known as from
+//! [`PRIOR`] of them beside those that are seen (Smyth 2004), so that the sum of both has a freedom of its own
+//! (Satterthwaite 1946),
 //!
 //! ```text
 //! nu = (PRIOR + n - k) (var e / tau^2)^2

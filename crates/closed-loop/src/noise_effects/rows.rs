@@ -72,9 +72,30 @@ impl Row {
         1.0 + self.alike
     }
 
-    /// Median of half its square over the variance of its noise.
-    pub(super) fn median(&self) -> f64 {
-        std::f64::consts::LN_2 * (1.0 - 0.344 * self.alike)
+    /// The level that it shows: half its square over `variance`, such that the median of many is theirs.
+    pub(super) fn level_over(&self, variance: f64) -> f64 {
+        let median = std::f64::consts::LN_2 * (1.0 - 0.344 * self.alike);
+        0.5 * self.square / variance / median
+    }
+}
+
+/// A row of a frame, and what is believed of it.
+struct Member {
+    row: Row,
+    /// Its rotation columns, arcsec per arcsec.
+    turns: [Vector3<f64>; 2],
+    variance: f64,
+    /// Chance that it is no spike; 0 where it is left out.
+    sound: f64,
+}
+
+impl Member {
+    fn weight(&self) -> f64 {
+        self.sound / self.variance
+    }
+
+    fn is_doubtful(&self) -> bool {
+        !self.row.marked && self.sound < DOUBTFUL
     }
 }
 
@@ -116,14 +137,15 @@ impl Source<'_> {
     /// The rotation of a frame by its rows and their weights, and its covariance.
     fn turn(
         &self,
-        rows: impl Iterator<Item = (usize, f64)>,
+        members: &[Member],
+        weight: impl Fn(&Member) -> f64,
     ) -> Option<(Matrix3<f64>, Vector3<f64>)> {
         let (mut normal, mut moment) = (Matrix3::zeros(), Vector3::zeros());
-        for (r, weight) in rows {
-            for (a, residual) in rotation_row(self.data, r).into_iter().zip(self.residual) {
-                let a = Vector3::from(a);
+        for member in members {
+            let weight = weight(member);
+            for (a, residual) in member.turns.iter().zip(self.residual) {
                 normal += a * a.transpose() * weight;
-                moment += a * (residual[r] * weight);
+                moment += a * (residual[member.row.at] * weight);
             }
         }
         let covariance = normal.try_inverse()?;
@@ -138,7 +160,7 @@ impl Source<'_> {
         out: &mut Vec<Row>,
     ) {
         let data = self.data;
-        let mut members: Vec<(usize, Row, [f64; 2])> = data
+        let mut members: Vec<Member> = data
             .frames
             .rows_of(frame)
             .filter(|&r| self.residual.iter().all(|axis| axis[r].is_finite()))
@@ -157,41 +179,50 @@ impl Source<'_> {
                     marked: data.outlier[r],
                 };
                 let [variance, sound] = belief(&row);
-                let sound = if row.marked { 0.0 } else { sound };
-                (r, row, [variance, sound / variance])
+                Member {
+                    turns: rotation_row(data, r).map(Vector3::from),
+                    variance,
+                    sound: if row.marked { 0.0 } else { sound },
+                    row,
+                }
             })
             .collect();
-        if members.iter().filter(|m| !m.1.marked).count() < MIN_STARS {
+        if members.iter().filter(|m| !m.row.marked).count() < MIN_STARS {
             return;
         }
         // stars that a wandering reference moves, all together, are no spikes
-        let doubtful = |m: &(usize, Row, [f64; 2])| !m.1.marked && m.2[0] * m.2[1] < DOUBTFUL;
-        if members.iter().any(doubtful) {
-            let whole = |m: &(usize, Row, [f64; 2])| f64::from(u8::from(!m.1.marked)) / m.2[0];
-            let Some((_, theta)) = self.turn(members.iter().map(|m| (m.0, whole(m)))) else {
+        if members.iter().any(Member::is_doubtful) {
+            let whole = |m: &Member| f64::from(u8::from(!m.row.marked)) / m.variance;
+            let Some((_, theta)) = self.turn(&members, whole) else {
                 return;
             };
-            for (r, row, [variance, weight]) in members.iter_mut().filter(|m| doubtful(m)) {
-                let left: f64 = (rotation_row(data, *r).into_iter().zip(self.residual))
-                    .map(|(a, residual)| (residual[*r] - Vector3::from(a).dot(&theta)).powi(2))
+            for member in members.iter_mut().filter(|m| m.is_doubtful()) {
+                let row = member.row;
+                let left: f64 = (member.turns.iter().zip(self.residual))
+                    .map(|(a, residual)| (residual[row.at] - a.dot(&theta)).powi(2))
                     .sum();
                 let square = row.square.min(left);
-                *weight = belief(&Row { square, ..*row })[1] / *variance;
+                [_, member.sound] = belief(&Row { square, ..row });
             }
         }
-        let Some((covariance, theta)) = self.turn(members.iter().map(|m| (m.0, m.2[1]))) else {
+        let Some((covariance, theta)) = self.turn(&members, Member::weight) else {
             return;
         };
-        for (r, mut row, [variance, weight]) in members {
-            let jacobian = rotation_row(data, r);
+        for member in members {
+            let weight = member.weight();
+            let Member {
+                mut row,
+                turns,
+                variance,
+                ..
+            } = member;
             let (mut square, mut shows) = (0.0, 0.0);
-            let turns = jacobian.map(Vector3::from);
             let taken = 1.0 / variance - 2.0 * weight;
             let mut shares = [0.0; 2];
             for (axis, a) in turns.iter().enumerate() {
                 let leverage = a.dot(&(covariance * a));
                 let share = 1.0 + taken * leverage;
-                let left = self.residual[axis][r] - a.dot(&theta);
+                let left = self.residual[axis][row.at] - a.dot(&theta);
                 square += left * left / share;
                 shows += 0.5 * (1.0 - weight * leverage).powi(2) / share;
                 shares[axis] = share;

@@ -97,14 +97,40 @@ impl Scores {
     }
 }
 
+/// What the rows of a star show.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct LevelShown {
+    /// Its level; `None` where they are too few.
+    pub(super) level: Option<f64>,
+    rows: usize,
+}
+
+/// What each of so many stars shows in `rows` that are not marked, over their `variance`; spikes tell nothing.
+pub(super) fn levels_shown(
+    rows: &[Row],
+    stars: usize,
+    variance: impl Fn(&Row) -> f64,
+) -> Vec<LevelShown> {
+    let mut levels = vec![Vec::new(); stars];
+    for row in rows.iter().filter(|r| !r.marked) {
+        levels[row.star].push(row.level_over(variance(row)));
+    }
+    let each = levels.iter_mut().map(|levels| LevelShown {
+        level: spectra::robust::median(levels).filter(|_| levels.len() >= MIN_ROWS),
+        rows: levels.len(),
+    });
+    each.collect()
+}
+
 /// Levels of stars, by which their rows are weighed, from what so many rows of each show: all alike but those that
 /// stand out, by as much as they do. A star that is quiet by chance turned its frames to itself if it were believed,
 /// and was quieter still: levels of four stars a frame scattered twice as much as their rows.
-fn believed(shown: &[(f64, usize)]) -> Option<Vec<f64>> {
-    let mut known: Vec<f64> = shown.iter().map(|s| s.0).filter(|l| *l > 0.0).collect();
+fn believed(shown: &[LevelShown]) -> Option<Vec<f64>> {
+    let known = shown.iter().filter_map(|s| s.level);
+    let mut known: Vec<f64> = known.filter(|l| *l > 0.0).collect();
     let usual = spectra::robust::median(&mut known)?;
-    let each = shown.iter().map(|&(level, rows)| {
-        let off = (level / usual).ln();
+    let each = shown.iter().map(|&LevelShown { level, rows }| {
+        let off = level.map_or(0.0, |level| (level / usual).ln());
         let chance = STANDS_OUT * STANDS_OUT * OF_A_MEDIAN / rows as f64;
         if off * off > chance && off.is_finite() {
             usual * (off - chance / off).exp()
@@ -119,24 +145,15 @@ impl Table {
     pub(super) fn new(source: &Source<'_>) -> Option<Self> {
         let stars = source.data.stars.len();
         let of = |believed: &[f64]| {
-            let mut rows = source.rows(&|row: &Row| [row.declared * believed[row.star], 1.0]);
-            rows.retain(|r| !r.marked);
-            let mut squares = vec![Vec::new(); stars];
-            for row in &rows {
-                squares[row.star].push(0.5 * row.square / row.declared / row.median());
-            }
-            let levels = squares.iter_mut().map(|squares| {
-                let known = spectra::robust::median(squares).filter(|_| squares.len() >= MIN_ROWS);
-                (known.unwrap_or(f64::NAN), squares.len())
-            });
-            let levels: Vec<(f64, usize)> = levels.collect();
-            (rows, levels)
+            let rows = source.rows(&|row: &Row| [row.declared * believed[row.star], 1.0]);
+            let shown = levels_shown(&rows, stars, |row| row.declared);
+            (rows, shown)
         };
-        let (_, levels) = of(&vec![1.0; stars]);
-        let (mut rows, levels) = of(&believed(&levels)?);
+        let (_, first) = of(&vec![1.0; stars]);
+        let (mut rows, shown) = of(&believed(&first)?);
         rows.retain(|r| {
-            let (level, _) = levels[r.star];
-            level > 0.0 && r.square < SPIKE * r.declared * level
+            let sound = |level: f64| level > 0.0 && r.square < SPIKE * r.declared * level;
+            !r.marked && shown[r.star].level.is_some_and(sound)
         });
         let unseen = StarLevel {
             level: 0.0,
@@ -317,7 +334,10 @@ pub(super) mod tests {
         let z: Vec<f64> = (0..40).flat_map(four_a_frame).collect();
         let rms = (z.iter().map(|z| z * z).sum::<f64>() / z.len() as f64).sqrt();
         assert!((0.85..1.15).contains(&rms), "{rms}");
-        let shown = [(1.1, 400), (1.0, 400), (0.9, 400), (4.0, 400)];
+        let shown = [1.1, 1.0, 0.9, 4.0].map(|level| LevelShown {
+            level: Some(level),
+            rows: 400,
+        });
         let [one, _, _, loud] = believed(&shown).unwrap()[..] else {
             panic!("four stars")
         };

@@ -138,7 +138,7 @@ impl Model {
         let mut ratio: Vec<f64> = rows
             .iter()
             .filter(|r| !r.marked)
-            .map(|r| 0.5 * r.square / r.median())
+            .map(|r| r.level_over(1.0))
             .collect();
         Self {
             // the median of chi2_2 is 2 ln 2

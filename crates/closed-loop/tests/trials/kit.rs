@@ -4,6 +4,7 @@
 
 use closed_loop::{CloseError, Closed, close};
 use scenarios::{Scenario, simulate};
+use telemetry::report::Report;
 use telemetry::{Bundle, Model};
 
 /// How the tracker moves.
@@ -160,6 +161,16 @@ impl Case {
         Scenario::parse(&text, "trial.toml").expect("the trial's scenario is one")
     }
 
+    /// The scenario with nothing but this noise of the stars, circular, arcsec.
+    pub(crate) fn quiet(&self, temporal_arcsec: f64) -> Scenario {
+        let mut scenario = self.scenario();
+        let noise = &mut scenario.model.noise;
+        noise.temporal_arcsec = Some(temporal_arcsec);
+        noise.centroid_arcsec = None;
+        noise.distortion_arcsec = None;
+        scenario
+    }
+
     /// The model of somebody who does not know what acts, and the bundle.
     pub(crate) fn make(&self) -> (Model, Bundle) {
         let scenario = self.scenario();
@@ -206,6 +217,13 @@ radius_km = 149597870.7
 period_s = 31558149.5
 inclination_deg = 23.44
 "#;
+
+/// The report of somebody who does not know what acts in a scenario.
+pub(crate) fn reported(scenario: &Scenario) -> Report {
+    let bundle = simulate(scenario).expect("a bundle");
+    let closed = closed(&scenario.model_without_effects(), &bundle);
+    closed.expect("the loop closes").report
+}
 
 pub(crate) fn closed(model: &Model, bundle: &Bundle) -> Result<Closed, CloseError> {
     close(model, bundle, &|_| {})

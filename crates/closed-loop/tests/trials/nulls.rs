@@ -91,12 +91,9 @@ fn a_wandering_reference_under_slews_is_no_effect() {
 fn what_a_wander_seems_to_accelerate_by_is_not_left() {
     let mut left = Vec::new();
     for seed in 0..6 {
-        let mut scenario = Case::new(Path::Nods, 3000 + seed)
+        let scenario = Case::new(Path::Nods, 3000 + seed)
             .reference(WANDER)
-            .scenario();
-        scenario.model.noise.temporal_arcsec = Some(0.4);
-        scenario.model.noise.centroid_arcsec = None;
-        scenario.model.noise.distortion_arcsec = None;
+            .quiet(0.4);
         let mut bundle = simulate(&scenario).expect("a bundle");
         let reference = bundle.reference.as_mut().expect("it has one");
         reference.rates_rad_s = None;

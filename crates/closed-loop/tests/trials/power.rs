@@ -4,10 +4,9 @@
 //! Sizes are ten standard errors of these very runs. An honest estimate is off by more than 4 sigma
 //! once in 16 000 runs.
 
-use scenarios::simulate;
 use telemetry::report::{Report, Verdict};
 
-use crate::kit::{Case, Path, VELOCITY, closed, power};
+use crate::kit::{Case, Path, VELOCITY, closed, power, reported};
 
 /// Closes the loop where `id` acts with `lines` (`{}`: its size) and checks what is said of `parameter`.
 fn finds(path: Path, id: &str, lines: &str, parameter: &str, size: f64) -> Report {
@@ -107,17 +106,10 @@ fn beside_a_large_effect_the_declared_distortion_is_what_it_was() {
 
 /// Closes the loop where quiet stars are exposed for `exposure_s`.
 fn exposed(path: Path, exposure_s: f64, reference: &str) -> Report {
-    let mut scenario = Case::new(path, 1)
+    let case = Case::new(path, 1)
         .with("exposure_smear", &format!("exposure_s = {exposure_s:?}"))
-        .reference(reference)
-        .scenario();
-    scenario.model.noise.temporal_arcsec = Some(1.0);
-    scenario.model.noise.centroid_arcsec = None;
-    scenario.model.noise.distortion_arcsec = None;
-    let bundle = simulate(&scenario).expect("a bundle");
-    closed(&scenario.model_without_effects(), &bundle)
-        .expect("the loop closes")
-        .report
+        .reference(reference);
+    reported(&case.quiet(1.0))
 }
 
 /// Whether a smear is found first, with its size.

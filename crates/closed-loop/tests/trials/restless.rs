@@ -1,22 +1,15 @@
 //! Precise stars beside a reference that wanders by more than they scatter, from one frame to the next: what a frame's
 //! stars do among each other, and what they do together at one instant, is as certain as without it.
 
-use scenarios::simulate;
 use telemetry::report::Report;
 
-use crate::kit::{Case, Path, closed};
+use crate::kit::{Case, Path, reported};
 
 /// Stars of 0.1 arcsec per axis, without any error of the lens, beside 0.5 arcsec over `tau_s`.
 fn report(case: Case, tau_s: f64) -> Report {
     let tau = format!("wander_tau_s = [{tau_s:?}, {tau_s:?}, {tau_s:?}]");
     let case = case.reference(&format!("wander_arcsec = [0.5, 0.5, 0.5]\n{tau}"));
-    let mut scenario = case.scenario();
-    scenario.model.noise.temporal_arcsec = Some(0.14);
-    scenario.model.noise.centroid_arcsec = None;
-    scenario.model.noise.distortion_arcsec = None;
-    let bundle = simulate(&scenario).expect("a bundle");
-    let closed = closed(&scenario.model_without_effects(), &bundle);
-    closed.expect("the loop closes").report
+    reported(&case.quiet(0.14))
 }
 
 fn named(report: &Report) -> Vec<&str> {

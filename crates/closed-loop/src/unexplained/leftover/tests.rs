@@ -35,6 +35,27 @@ fn tracks(seed: u64, points: usize, slow: f64, signal: &dyn Fn(f64) -> f64) -> V
         .collect()
 }
 
+/// White noise of 1 arcsec, and `signal` on all axes.
+fn on_all_axes(seed: u64, signal: &dyn Fn(f64) -> f64) -> Vec<Track> {
+    let mut all = tracks(seed, 500, 0.0, &|_| 0.0);
+    for track in &mut all {
+        for (v, t) in track.value.iter_mut().zip(&track.t_s) {
+            *v += signal(*t);
+        }
+    }
+    all
+}
+
+/// A step of a third of the noise on all axes.
+fn all_step(seed: u64) -> Vec<Track> {
+    on_all_axes(seed, &|t| if t > 110.2 { 0.34 } else { 0.0 })
+}
+
+fn shows_the_step(all: &[Track]) -> bool {
+    let found = Series::of(all).shared_jump();
+    found.is_some_and(|f| (f.at_s - 110.25).abs() < 30.0)
+}
+
 fn alarms(seeds: std::ops::Range<u64>, slow: f64) -> [usize; 2] {
     let mut count = [0; 2];
     for seed in seeds {
@@ -129,12 +150,7 @@ fn axes_together_show_what_none_does_alone() {
     let (mut shared, mut alone) = (0, 0);
     for seed in 0..20 {
         let line = |t: f64| 0.22 * (std::f64::consts::TAU * 0.231 * t).cos();
-        let mut all = tracks(seed, 500, 0.0, &|_| 0.0);
-        for track in &mut all {
-            for (v, t) in track.value.iter_mut().zip(&track.t_s) {
-                *v += line(*t);
-            }
-        }
+        let all = on_all_axes(seed, &line);
         let found = Series::of(&all).shared_line(WORTH_A_SEARCH);
         shared += usize::from(found.is_some_and(|f| (f.frequency_hz - 0.231).abs() < 1e-3));
         alone += usize::from(!describe(&all).lines_hz.is_empty());
@@ -175,14 +191,8 @@ fn what_does_not_turn_is_no_shared_line() {
 fn axes_together_show_a_step_that_none_does_alone() {
     let (mut shared, mut alone) = (0, 0);
     for seed in 0..20 {
-        let mut all = tracks(seed, 500, 0.0, &|_| 0.0);
-        for track in &mut all {
-            for (v, t) in track.value.iter_mut().zip(&track.t_s) {
-                *v += if *t > 110.2 { 0.34 } else { 0.0 };
-            }
-        }
-        let found = Series::of(&all).shared_jump();
-        shared += usize::from(found.is_some_and(|f| (f.at_s - 110.25).abs() < 30.0));
+        let all = all_step(seed);
+        shared += usize::from(shows_the_step(&all));
         alone += usize::from(!describe(&all).jumps_s.is_empty());
     }
     assert!(shared >= 12 && alone < shared, "{shared} {alone}");
@@ -208,17 +218,13 @@ fn noise_seldom_holds_a_shared_jump() {
 fn axes_that_weigh_differently_share_a_step() {
     let shared = (0..20)
         .filter(|&seed| {
-            let mut all = tracks(seed, 500, 0.0, &|_| 0.0);
+            let mut all = all_step(seed);
             for (axis, track) in all.iter_mut().enumerate() {
-                for (v, t) in track.value.iter_mut().zip(&track.t_s) {
-                    *v += if *t > 110.2 { 0.34 } else { 0.0 };
-                }
                 for (k, w) in track.weight.iter_mut().enumerate() {
                     *w = 0.1 + 0.3 * axis as f64 + 1e-3 * (k % 7) as f64;
                 }
             }
-            let found = Series::of(&all).shared_jump();
-            found.is_some_and(|f| (f.at_s - 110.25).abs() < 30.0)
+            shows_the_step(&all)
         })
         .count();
     assert!(shared >= 12, "{shared}");
