@@ -160,7 +160,7 @@ fn quiet_stars_count_for_more() {
 /// `BORESIGHT_SEEDS` takes more; then 5 sigma of a Poisson count are allowed.
 #[test]
 fn noise_holds_no_pattern() {
-    let (seeds, most) = crate::many_seeds(20, 1, 100);
+    let (seeds, most) = crate::many_seeds(20, 1, 400);
     for (path, slow) in [(60.0, 0.0), (60.0, 3.0), (2.0, 0.0), (0.1, 2.0)] {
         let alarms = (0..seeds)
             .filter(|&seed| search(&field(100 + seed, path, [5.0, slow], &|_, _| 0.0)).is_some())
