@@ -9,6 +9,7 @@
 //! | [`distortion`] | low spatial frequency error: distortion residual polynomials |
 //! | [`centroid`] | high spatial frequency error, and centroids of pixel windows |
 //! | [`quest`] | attitude from star vectors, one frame or a batch |
+//! | [`fourier`] | plans of Fourier transforms |
 //! | [`spectra`] | one-sided densities, coherence, lines, Allan deviations of error series |
 //! | [`fogm_fit`] | first-order Gauss-Markov processes: simulation, densities, fits |
 //! | [`block_regression`] | fits from sums over blocks of time: errors out of fold, honest variances |
@@ -72,8 +73,8 @@
 #[doc(inline)]
 pub use {
     assess, block_regression, centroid, closed_loop, coloured_noise, comparison, distortion,
-    effects, figures, focal_plane, fogm_fit, imager, quest, report, scenarios, spectra,
-    star_tracker, telemetry,
+    effects, figures, focal_plane, fogm_fit, fourier, imager, quest, report, scenarios, spectra,
+    star_images, star_tracker, telemetry,
 };
 
 /// The names that almost every program needs.

@@ -13,7 +13,7 @@
 
 use std::ops::Range;
 
-use realfft::num_complex::Complex;
+use fourier::Complex;
 
 use crate::{Coverage, SpectraError, Welch, WelchScratch};
 

@@ -50,7 +50,7 @@ mod slepian;
 mod welch;
 mod window;
 
-pub use realfft::num_complex::Complex;
+pub use fourier::Complex;
 
 pub use allan::{Allan, AllanData, AllanDeviation, AllanKind, AllanScratch, PowerLaw, allan_edf};
 pub use averaging::LogAverage;

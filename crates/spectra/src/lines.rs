@@ -22,7 +22,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use realfft::num_complex::Complex;
+use fourier::Complex;
 
 use crate::multitaper::LineFit;
 use crate::{Multitaper, MultitaperScratch, SpectraError};

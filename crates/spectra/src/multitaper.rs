@@ -17,8 +17,7 @@
 
 use std::sync::Arc;
 
-use realfft::num_complex::Complex;
-use realfft::{RealFftPlanner, RealToComplex};
+use fourier::{Complex, RealToComplex};
 
 use crate::welch::{frequencies, trimmed};
 use crate::{Psd, Slepian, SpectraError};
@@ -109,7 +108,7 @@ impl Multitaper {
                 _ => 0.0,
             })
             .collect();
-        let fft = RealFftPlanner::new().plan_fft_forward(settings.transform);
+        let fft = fourier::real_forward(settings.transform);
         Ok(Self {
             settings,
             tapers: slepian,

@@ -14,8 +14,6 @@
 
 use std::f64::consts::{PI, TAU};
 
-use realfft::RealFftPlanner;
-
 use crate::SpectraError;
 
 /// Slepian tapers of one length and bandwidth.
@@ -299,11 +297,8 @@ fn set_sign(v: &mut [f64]) {
 /// Share of the energy of each taper within +-`w` cycles a sample, from its autocorrelation.
 fn concentrations(samples: usize, tapers: &[f64], w: f64) -> Vec<f64> {
     let length = (2 * samples).next_power_of_two();
-    let mut planner = RealFftPlanner::<f64>::new();
-    let (forward, inverse) = (
-        planner.plan_fft_forward(length),
-        planner.plan_fft_inverse(length),
-    );
+    let forward = fourier::real_forward(length);
+    let inverse = fourier::real_inverse(length);
     let (mut padded, mut spectrum) = (forward.make_input_vec(), forward.make_output_vec());
     let mut of_taper = |taper: &[f64]| {
         padded.fill(0.0);

@@ -15,8 +15,7 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use realfft::num_complex::Complex;
-use realfft::{RealFftPlanner, RealToComplex};
+use fourier::{Complex, RealToComplex};
 
 use crate::{Detrend, Psd, SpectraError, Window, gaps};
 
@@ -104,7 +103,7 @@ impl Welch {
             overlap_correlation,
             window_power,
             window,
-            fft: RealFftPlanner::new().plan_fft_forward(segment),
+            fft: fourier::real_forward(segment),
         })
     }
 

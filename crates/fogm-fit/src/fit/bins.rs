@@ -11,7 +11,6 @@
 //!
 //! Source: Percival & Walden, Spectral Analysis for Physical Applications (1993), section 6.3 and 6.6.
 
-use realfft::RealFftPlanner;
 use spectra::Psd;
 
 use crate::FogmError;
@@ -117,7 +116,7 @@ impl Bins {
     pub(crate) fn of_series(y: &[f64], fs_hz: f64, chosen: &Chosen<'_>) -> Result<Self, FogmError> {
         chosen.check()?;
         let n = y.len();
-        let plan = RealFftPlanner::<f64>::new().plan_fft_forward(n);
+        let plan = fourier::real_forward(n);
         let mean = y.iter().sum::<f64>() / n as f64;
         let mut input: Vec<f64> = y.iter().map(|v| v - mean).collect();
         let mut output = plan.make_output_vec();

@@ -12,8 +12,7 @@
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
-use realfft::num_complex::Complex;
-use rustfft::{Fft, FftPlanner};
+use fourier::{Complex, Fft};
 
 /// Part of a step by which a sample may be off the grid: its phase is off by 3e-6 at most.
 const OFF_GRID: f64 = 1e-6;
@@ -100,11 +99,7 @@ impl Chirp {
         let length = (places + bins).next_power_of_two();
         let half = 0.5 * step_hz * grid.step_s;
         let chirp = |m: usize| phasor(half, (m * m) as f64);
-        let mut planner = FftPlanner::new();
-        let (forward, inverse) = (
-            planner.plan_fft_forward(length),
-            planner.plan_fft_inverse(length),
-        );
+        let (forward, inverse) = (fourier::forward(length), fourier::inverse(length));
         let mut filter = vec![Complex::new(0.0, 0.0); length];
         for m in 0..places.max(bins) {
             // neither transform is normalised

@@ -11,9 +11,8 @@
 
 use std::f64::consts::TAU;
 
+use fourier::Complex;
 use rayon::prelude::*;
-use rustfft::FftPlanner;
-use rustfft::num_complex::Complex;
 
 use super::{Field, Own};
 
@@ -94,8 +93,7 @@ impl Field {
         grid: &mut [Complex<f32>],
     ) -> Vec<(f32, [f64; 2])> {
         let [nx, ny] = cells;
-        let mut planner = FftPlanner::<f32>::new();
-        let plans = cells.map(|n| planner.plan_fft_forward(n));
+        let plans = cells.map(fourier::forward_single);
         let twist = |axis: usize| -> Vec<Complex<f32>> {
             let n = cells[axis];
             (0..n)
