@@ -32,7 +32,7 @@ fn nothing_is_found_where_nothing_acts() {
 
 /// A reference that wanders by 0.5 arcsec is named as that, alone, with its size. White evidence takes
 /// each of these for steps or heaters. A sigma over nine correlation times is known to some 25 %. (Over
-/// four, a wander does look like one step in about one run of ten; docs/closed-loop.md.)
+/// four, a wander does look like one step in about one run of ten; docs/closed-loop/reference.md.)
 #[test]
 fn a_wandering_reference_is_an_error_of_its_own() {
     let mut left = Vec::new();
