@@ -15,9 +15,13 @@
 use std::ops::Range;
 
 use nalgebra::{DMatrix, Matrix3, Vector3};
+use rayon::prelude::*;
 
 use crate::coloured::Coloured;
 use crate::common_noise::CommonNoise;
+
+/// Columns that one thread filters at a time.
+const TOGETHER: usize = 32;
 
 /// One bin of the filter.
 #[derive(Clone, Debug)]
@@ -96,20 +100,37 @@ impl Filter {
         columns: &[usize],
         state: &mut [Vector3<f64>],
     ) -> DMatrix<f64> {
-        let mut out = DMatrix::zeros(theta.nrows(), columns.len());
-        for ((&column, state), mut out) in columns.iter().zip(state).zip(out.column_iter_mut()) {
-            let theta = theta.column(column);
-            for (bin, step) in self.steps[steps.clone()].iter().enumerate() {
-                let mut mean = state.component_mul(&step.decay);
-                if let Some(whitening) = &step.whitening {
-                    let innovation = theta.fixed_rows::<3>(3 * bin) - mean;
-                    out.fixed_rows_mut::<3>(3 * bin)
-                        .copy_from(&(whitening * innovation));
-                    mean += step.gain * innovation;
+        let rows = theta.nrows();
+        let mut out = DMatrix::zeros(rows, columns.len());
+        let some = out.as_mut_slice().par_chunks_mut(TOGETHER * rows.max(1));
+        let some = some.zip(columns.par_chunks(TOGETHER));
+        some.zip(state.par_chunks_mut(TOGETHER))
+            .for_each(|((out, columns), state)| {
+                let each = columns.iter().zip(state);
+                for ((&column, state), out) in each.zip(out.chunks_exact_mut(rows)) {
+                    self.follow(steps.clone(), theta.column(column).as_slice(), state, out);
                 }
-                *state = mean;
-            }
-        }
+            });
         out
+    }
+
+    /// Whitened innovations of one column at the bins `steps`, three values a bin.
+    fn follow(
+        &self,
+        steps: Range<usize>,
+        theta: &[f64],
+        state: &mut Vector3<f64>,
+        out: &mut [f64],
+    ) {
+        let each = self.steps[steps].iter().zip(theta.chunks_exact(3));
+        for ((step, theta), out) in each.zip(out.chunks_exact_mut(3)) {
+            let mut mean = state.component_mul(&step.decay);
+            if let Some(whitening) = &step.whitening {
+                let innovation = Vector3::from_column_slice(theta) - mean;
+                out.copy_from_slice((whitening * innovation).as_slice());
+                mean += step.gain * innovation;
+            }
+            *state = mean;
+        }
     }
 }
