@@ -68,6 +68,7 @@ use rayon::prelude::*;
 use crate::folds::Folds;
 use crate::gram::{BlockGrams, FoldSums, Gram};
 
+mod alone;
 mod elimination;
 mod estimate;
 mod moderation;
@@ -75,7 +76,7 @@ mod out_of_fold;
 #[cfg(test)]
 mod tests;
 
-use elimination::{Eliminated, less, quadratic, symmetric, transformed};
+use elimination::{Eliminated, less_into, quadratic, symmetric, transformed};
 pub use estimate::Estimate;
 use moderation::Usual;
 pub use out_of_fold::OutOfFold;
@@ -87,8 +88,6 @@ const OBSERVABLE_SHARE: f64 = 1e-7;
 const FREE: f64 = 1e-4;
 /// Share of a nuisance column's squared length outside a fold below which it lives in the fold alone.
 const UNSEEN: f64 = 1e-9;
-/// What all columns say counts for no more than this many times the blocks that there are.
-const MOST_BLOCKS: f64 = 2.0;
 
 /// The columns of a Gram matrix, in their order: nuisance, candidates, residuals.
 #[derive(Clone, Debug, Default)]
@@ -457,17 +456,6 @@ impl Fits {
         self.usual.get_or_init(|| self.usual())
     }
 
-    /// What all columns, each alone, say of the noise.
-    fn usual(&self) -> Usual {
-        let columns: Vec<(f64, f64)> = (0..self.layout.candidates)
-            .into_par_iter()
-            .filter(|&c| self.shows(c))
-            .filter_map(|c| self.scatter(&[c]))
-            .map(|own| (own.robust[(0, 0)] / own.white[(0, 0)], own.blocks - 1.0))
-            .collect();
-        Usual::of(&columns, MOST_BLOCKS * self.grams.gram.len() as f64)
-    }
-
     fn scatter(&self, set: &[usize]) -> Option<Scatter> {
         let (value, factor) = self.all.amplitudes(set)?;
         let n = self.layout.nuisance_precision.nrows();
@@ -478,24 +466,20 @@ impl Fits {
         let left = self.all.left(set, &value);
         let mut spread = DMatrix::zeros(p, p);
         let (mut shares, mut squares) = (0.0, 0.0);
+        let columns: Vec<usize> = set.iter().map(|c| n + c).collect();
+        let mut score = DVector::zeros(p);
+        let mut within = DVector::zeros(n);
         for (gram, inner) in self.grams.gram.iter().zip(&self.inner) {
-            let within = less(inner, set, &value);
-            let score = DVector::from_fn(p, |i, _| {
-                let row = n + set[i];
-                let own = (0..p)
-                    .map(|j| gram.at(row, n + set[j]) * value[j])
-                    .sum::<f64>();
-                let cross = w.column(set[i]).dot(&within) + inner.column(set[i]).dot(&left);
-                gram.at(row, residual) - own + 0.5 * cross
-            });
+            less_into(inner, set, &value, &mut within);
+            gram.less(residual, &columns, &value, &mut score);
+            let mut share = 0.0;
+            for (i, &c) in set.iter().enumerate() {
+                let (nuisance, inner) = (w.column(c), inner.column(c));
+                score[i] += 0.5 * (nuisance.dot(&within) + inner.dot(&left));
+                let own = gram.at(n + c, n + c) + nuisance.dot(&inner);
+                share += own.max(0.0) / self.all.train[(c, c)];
+            }
             spread.ger(1.0, &score, &score, 1.0);
-            let share: f64 = set
-                .iter()
-                .map(|&c| {
-                    let own = gram.at(n + c, n + c) + w.column(c).dot(&inner.column(c));
-                    own.max(0.0) / self.all.train[(c, c)]
-                })
-                .sum();
             shares += share;
             squares += share * share;
         }

@@ -69,6 +69,27 @@ impl Gram {
         self.weight * self.shared[(i, j)] + self.rows.column(i).dot(&self.rows.column(j))
     }
 
+    /// Products of each of `columns` with column `last` less `beta` times the columns.
+    pub(crate) fn less(
+        &self,
+        last: usize,
+        columns: &[usize],
+        beta: &DVector<f64>,
+        out: &mut DVector<f64>,
+    ) {
+        let mut left = self.rows.column(last).into_owned();
+        for (&c, b) in columns.iter().zip(beta.iter()) {
+            left.axpy(-b, &self.rows.column(c), 1.0);
+        }
+        for (&row, out) in columns.iter().zip(out.iter_mut()) {
+            // the matrix is symmetric: a column lies together
+            let own = self.shared.column(row);
+            let each = columns.iter().zip(beta.iter());
+            let shared = own[last] - each.map(|(&c, b)| own[c] * b).sum::<f64>();
+            *out = self.weight * shared + self.rows.column(row).dot(&left);
+        }
+    }
+
     /// `z^T G z`.
     pub(crate) fn quadratic(&self, z: &DVector<f64>) -> f64 {
         let own = (&*self.rows * z).norm_squared();
@@ -125,6 +146,29 @@ pub fn add_products(factor: f64, rows: &DMatrix<f64>, sum: &mut DMatrix<f64>) {
             &rows.columns(start, panel),
             1.0,
         );
+    }
+}
+
+/// Rows and columns that are turned over at once.
+const TILE: usize = 32;
+
+/// Makes a square matrix symmetric by what lies below its diagonal.
+///
+/// # Panics
+///
+/// Where the matrix is not square.
+pub fn mirror_lower(matrix: &mut DMatrix<f64>) {
+    assert!(matrix.is_square(), "only a square matrix is symmetric");
+    let n = matrix.nrows();
+    let values = matrix.as_mut_slice();
+    for first in (0..n).step_by(TILE) {
+        for start in (first..n).step_by(TILE) {
+            for j in first..(first + TILE).min(n) {
+                for i in start.max(j + 1)..(start + TILE).min(n) {
+                    values[i * n + j] = values[j * n + i];
+                }
+            }
+        }
     }
 }
 
@@ -240,7 +284,7 @@ impl BlockGrams {
             self.gram[b].add_to(&mut gram, known.is_some());
             scalars += self.scalars[b];
         }
-        gram.fill_upper_triangle_with_lower_triangle();
+        mirror_lower(&mut gram);
         (gram, scalars)
     }
 }

@@ -199,12 +199,23 @@ impl Judged {
 }
 
 /// The last column less `beta` times the columns `set`.
-pub(super) fn less(columns: &DMatrix<f64>, set: &[usize], beta: &DVector<f64>) -> DVector<f64> {
-    let mut out = columns.column(columns.ncols() - 1).into_owned();
+fn less(columns: &DMatrix<f64>, set: &[usize], beta: &DVector<f64>) -> DVector<f64> {
+    let mut out = DVector::zeros(columns.nrows());
+    less_into(columns, set, beta, &mut out);
+    out
+}
+
+/// As [`less`], into `out` of as many rows.
+pub(super) fn less_into(
+    columns: &DMatrix<f64>,
+    set: &[usize],
+    beta: &DVector<f64>,
+    out: &mut DVector<f64>,
+) {
+    out.copy_from(&columns.column(columns.ncols() - 1));
     for (&c, b) in set.iter().zip(beta.iter()) {
         out.axpy(-b, &columns.column(c), 1.0);
     }
-    out
 }
 
 /// `T^T G T` for `T = [-W; I]` over the picked columns.

@@ -301,6 +301,21 @@ fn sigmas_are_honest_under_coloured_noise() {
     assert!((rms - 1.0).abs() < 5.0 / 600.0_f64.sqrt(), "rms z {rms}");
 }
 
+/// One pass over the blocks for all columns, and one for each by itself.
+#[test]
+fn columns_say_the_same_together_and_alone() {
+    for precision in [Matrix2::zeros(), Matrix2::new(40.0, 10.0, 10.0, 90.0)] {
+        let (fits, _) = fits(&table(400, 0.6, 0.3, 11), precision);
+        let together = fits.each_alone(&[0, 1, 2]);
+        for (c, (width, freedom)) in together.into_iter().enumerate() {
+            let alone = fits.scatter(&[c]).unwrap();
+            let expected = alone.robust[(0, 0)] / alone.white[(0, 0)];
+            assert!((width / expected - 1.0).abs() < 1e-9, "{width} {expected}");
+            assert!((freedom - alone.blocks + 1.0).abs() < 1e-9);
+        }
+    }
+}
+
 #[test]
 fn a_set_that_cannot_be_told_apart_is_refused() {
     let mut table = table(400, 0.0, 1.0, 1);

@@ -24,7 +24,7 @@ mod tests;
 
 use std::sync::{Arc, OnceLock};
 
-use block_regression::{BlockGrams, Folds, Gram, add_products};
+use block_regression::{BlockGrams, Folds, Gram, add_products, mirror_lower};
 use coloured_noise::{CommonNoise, Filter, Rotations};
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use rayon::prelude::*;
@@ -235,7 +235,7 @@ impl StarMoments {
             let mut sum = parts
                 .iter()
                 .fold(self.rest().clone(), |sum, part| sum + part);
-            sum.fill_upper_triangle_with_lower_triangle();
+            mirror_lower(&mut sum);
             sum
         });
         BlockGrams {
@@ -420,12 +420,7 @@ fn shared(matrix: &Arc<DMatrix<f64>>, columns: &[usize]) -> Arc<DMatrix<f64>> {
 impl Block {
     /// Takes out of R what rotations of frames with these M and N explain that have a prior of this
     /// precision.
-    fn draw(
-        mut self,
-        moments: &DMatrix<f64>,
-        normals: &[Matrix3<f64>],
-        precision: [f64; 3],
-    ) -> Self {
+    fn draw(&mut self, moments: &DMatrix<f64>, normals: &[Matrix3<f64>], precision: [f64; 3]) {
         let prior = Matrix3::from_diagonal(&precision.into());
         let mut whitened = DMatrix::zeros(moments.nrows(), moments.ncols());
         for (frame, normal) in normals.iter().enumerate() {
@@ -443,10 +438,13 @@ impl Block {
                 .map(|k| root[(k, k)].ln() - 0.5 * precision[k].ln())
                 .sum::<f64>();
         }
-        let rest = Arc::make_mut(&mut self.rest);
-        add_products(-1.0, &whitened, rest);
-        rest.fill_upper_triangle_with_lower_triangle();
-        self
+        add_products(-1.0, &whitened, Arc::make_mut(&mut self.rest));
+        self.complete();
+    }
+
+    /// Makes R symmetric by what lies below its diagonal.
+    fn complete(&mut self) {
+        mirror_lower(Arc::make_mut(&mut self.rest));
     }
 
     /// Takes the rotations of bins with these M and N out of R.
@@ -473,9 +471,8 @@ impl Block {
                 self.inverse.push(None);
             }
         }
-        let rest = Arc::make_mut(&mut self.rest);
-        add_products(-1.0, &whitened, rest);
-        rest.fill_upper_triangle_with_lower_triangle();
+        add_products(-1.0, &whitened, Arc::make_mut(&mut self.rest));
+        self.complete();
         self.theta = moments;
     }
 }

@@ -188,6 +188,21 @@ fn is_zero(values: &[f64]) -> bool {
     chunks.all(|some| bits(some) << 1 == 0) && bits(chunks.remainder()) << 1 == 0
 }
 
+/// Puts a matrix whose rows and columns stand at these places of `out` there, below the diagonal: of one whose rows
+/// are its columns what lies below its own.
+fn put(from: &DMatrix<f64>, rows: &[usize], columns: &[usize], out: &mut DMatrix<f64>) {
+    let square = rows == columns;
+    for start in (0..columns.len()).step_by(TURNED) {
+        let some = start..(start + TURNED).min(columns.len());
+        for (i, &row) in rows.iter().enumerate().skip(if square { start } else { 0 }) {
+            for j in some.clone().filter(|&j| !square || j <= i) {
+                let column = columns[j];
+                out[(row.max(column), row.min(column))] = from[(i, j)];
+            }
+        }
+    }
+}
+
 /// A matrix of what was in `space`.
 fn matrix(space: &mut Vec<f64>, rows: usize, columns: usize) -> DMatrixViewMut<'_, f64> {
     space.resize((rows * columns).max(space.len()), 0.0);
@@ -425,44 +440,22 @@ impl Sums {
         }
     }
 
-    /// The products, in the order of the Gram matrix.
+    /// The products, in the order of the Gram matrix; above the diagonal there may be anything.
     fn product(&self, places: &[usize]) -> DMatrix<f64> {
-        let (shared, own, width) = (
-            2 * self.layout.shared,
-            self.layout.own.len(),
-            self.layout.width(),
-        );
+        let (shared, own) = (self.layout.shared, self.layout.own.len());
+        let width = self.layout.width();
         let mut out = DMatrix::zeros(width, width);
-        let mut put = |i: usize, j: usize, value: f64| {
-            out[(places[i], places[j])] = value;
-            out[(places[j], places[i])] = value;
-        };
-        for axis in [0, self.layout.shared] {
-            for j in 0..self.layout.shared {
-                for i in j..self.layout.shared {
-                    put(axis + i, axis + j, self.shared[(i, j)]);
-                }
-            }
+        let (polynomials, rest) = places.split_at(2 * shared);
+        let own = &rest[..own];
+        for axis in polynomials.chunks_exact(shared.max(1)) {
+            put(&self.shared, axis, axis, &mut out);
         }
-        for j in 0..own {
-            for i in j..own {
-                put(shared + i, shared + j, self.own[(i, j)]);
-            }
-            for i in 0..shared {
-                put(i, shared + j, self.cross[(i, j)]);
-            }
-        }
-        for j in 0..self.layout.turn.len() {
-            for i in 0..width {
-                put(i, shared + own + j, self.turn[(i, j)]);
-            }
-        }
+        put(&self.own, own, own, &mut out);
+        put(&self.cross, polynomials, own, &mut out);
+        put(&self.turn, places, &rest[own.len()..], &mut out);
         if let Some((which, better)) = &self.fast {
-            for (j, &b) in which.iter().enumerate() {
-                for (i, &a) in which.iter().enumerate().skip(j) {
-                    put(shared + a, shared + b, better[(i, j)]);
-                }
-            }
+            let which: Vec<usize> = which.iter().map(|&k| own[k]).collect();
+            put(better, &which, &which, &mut out);
         }
         out
     }
@@ -470,22 +463,24 @@ impl Sums {
     /// R, with the rotations of the bins kept apart.
     pub(super) fn block(self) -> Block {
         let (mut block, bins) = self.apart();
-        if let Some((moments, normals)) = bins {
-            block.keep_apart(moments, &normals);
+        match bins {
+            Some((moments, normals)) => block.keep_apart(moments, &normals),
+            None => block.complete(),
         }
         block
     }
 
     /// What rotations of the frames that have a prior of this `precision` do not explain.
     pub(super) fn drawn(self, precision: [f64; 3]) -> Block {
-        let (block, bins) = self.apart();
+        let (mut block, bins) = self.apart();
         match bins {
             Some((moments, normals)) => block.draw(&moments, &normals, precision),
-            None => block,
+            None => block.complete(),
         }
+        block
     }
 
-    /// G, and M and N of the bins.
+    /// G, where it lies on the diagonal and below, and M and N of the bins.
     fn apart(self) -> (Block, Option<Turned>) {
         let places = self.layout.places();
         let mut order = vec![0; places.len()];

@@ -1,0 +1,89 @@
+//! What every column says by itself of the noise, in one pass over the blocks.
+//!
+//! ```text
+//! score_b = M_cr - beta M_cc     M = T^T G_b T     width = sum score_b^2 B/(B - 1) / (S_cc variance)
+//! ```
+//!
+//! B: blocks that hold the column's information. [`Fits::scatter`] says the same of any few columns together;
+//! here a block's products are gone through as they lie in memory.
+//!
+//! Source: Liang & Zeger 1986 (cluster-robust variance).
+
+use rayon::prelude::*;
+
+use super::Fits;
+use super::moderation::Usual;
+
+/// What all columns say counts for no more than this many times the blocks that there are.
+const MOST_BLOCKS: f64 = 2.0;
+/// Columns that are asked at a time.
+const TOGETHER: usize = 16;
+
+/// Sums over the blocks of one column by itself.
+struct Alone {
+    column: usize,
+    value: f64,
+    information: f64,
+    /// Squares of the blocks' scores.
+    spread: f64,
+    /// The blocks' shares of the information, and their squares.
+    shares: f64,
+    squares: f64,
+}
+
+impl Fits {
+    /// What all columns, each alone, say of the noise.
+    pub(super) fn usual(&self) -> Usual {
+        let shown: Vec<usize> = (0..self.layout.candidates)
+            .filter(|&c| self.shows(c))
+            .collect();
+        let some = shown.par_chunks(TOGETHER);
+        let columns: Vec<(f64, f64)> = some.flat_map_iter(|some| self.each_alone(some)).collect();
+        Usual::of(&columns, MOST_BLOCKS * self.grams.gram.len() as f64)
+    }
+
+    /// How much wider than white noise each of `columns` scatters by itself, and the blocks less one that say so: as
+    /// [`scatter`](Self::scatter) of each, in one pass over the blocks.
+    pub(super) fn each_alone(&self, columns: &[usize]) -> Vec<(f64, f64)> {
+        let n = self.layout.nuisance_precision.nrows();
+        let residual = self.layout.residual(None);
+        let w = &self.all.nuisance;
+        let last = w.ncols() - 1;
+        let mut alone: Vec<Alone> = columns.iter().filter_map(|&c| self.alone(c)).collect();
+        for (gram, inner) in self.grams.gram.iter().zip(&self.inner) {
+            for own in &mut alone {
+                let (nuisance, within) = (w.column(own.column), inner.column(own.column));
+                let a = nuisance.dot(&within);
+                let b = nuisance.dot(&inner.column(last)) + within.dot(&w.column(last));
+                let square = gram.at(n + own.column, n + own.column);
+                let product = gram.at(n + own.column, residual);
+                let score = product + 0.5 * b - own.value * (square + a);
+                own.spread += score * score;
+                let share = (square + a).max(0.0) / own.information;
+                own.shares += share;
+                own.squares += share * share;
+            }
+        }
+        let widths = alone.iter().filter_map(|own| {
+            let blocks = own.shares * own.shares / own.squares.max(f64::MIN_POSITIVE);
+            let variance = self.variance(&[own.column])?;
+            let nuisance = w.column(own.column);
+            let of_prior = nuisance.dot(&(&self.all.prior * nuisance)) * variance;
+            let spread = own.spread * blocks / (blocks - 1.0).max(1.0) + of_prior;
+            Some((spread / (own.information * variance), blocks - 1.0))
+        });
+        widths.collect()
+    }
+
+    fn alone(&self, column: usize) -> Option<Alone> {
+        let (value, _) = self.all.amplitudes(&[column])?;
+        Some(Alone {
+            column,
+            value: value[0],
+            information: self.information(column),
+            spread: 0.0,
+            shares: 0.0,
+            squares: 0.0,
+        })
+    }
+}
