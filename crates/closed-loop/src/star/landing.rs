@@ -6,8 +6,11 @@
 //!
 //! Not physics: projection and shift added up.
 
+use std::sync::Arc;
+
 use centroid::CentroidError;
-use focal_plane::ARCSEC_PER_RAD;
+use effects::Effect;
+use focal_plane::{ARCSEC_PER_RAD, AttitudeSource};
 use nalgebra::{UnitQuaternion, Vector3};
 use rayon::prelude::*;
 
@@ -30,27 +33,38 @@ impl StarData {
     }
 
     /// Turns each frame's own attitude by what its stars still agree on, once `shift` (arcsec,
-    /// what the fitted unknowns move each row by) is out. The first attitudes know neither the
-    /// unknowns nor the declared effects: under a lens that bends by pixels they are off by
-    /// pixels, and with them every phase.
-    pub(crate) fn turn_frames(&mut self, shift: &[Vec<f64>]) {
+    /// what the fitted unknowns move each row by) is out, and projects the stars anew, `effects` being those that
+    /// the model declares. The first attitudes know neither the unknowns nor the declared effects, and hold stars
+    /// that were mistaken for others: they are off by pixels and more.
+    ///
+    /// Returns the sum of the squares, arcsec^2, by which the rows moved otherwise than as the columns of a small
+    /// rotation say: what is wrong with a fit beside the attitudes as they were.
+    pub(crate) fn turn_frames(&mut self, shift: &[Vec<f64>], effects: &[Arc<dyn Effect>]) -> f64 {
         let left = self.left(shift);
         let scale = self.camera.arcsec_per_px();
+        let mut expected = self.projected.clone();
         for frame in 0..self.frames.frames() {
             let Some(theta) = rotation_of(self, frame, &left) else {
                 continue;
             };
             let turn = UnitQuaternion::from_scaled_axis(theta / ARCSEC_PER_RAD);
             self.attitude[frame] = turn * self.attitude[frame];
-            // pixels within the field: the square of the turn is nothing
             for row in self.frames.rows_of(frame) {
                 let jacobian = rotation_row(self, row);
                 for axis in 0..2 {
-                    self.projected[axis][row] +=
-                        Vector3::from(jacobian[axis]).dot(&theta) / scale[axis];
+                    expected[axis][row] += Vector3::from(jacobian[axis]).dot(&theta) / scale[axis];
                 }
             }
         }
+        let own = self.own_motion();
+        self.project_with(own.as_ref().map(|m| m as &dyn AttitudeSource), effects);
+        let squares = (0..self.t_s.len())
+            .filter(|&row| !self.outlier[row])
+            .map(|row| {
+                let off = |axis: usize| self.projected[axis][row] - expected[axis][row];
+                (0..2).map(|a| (off(a) * scale[a]).powi(2)).sum::<f64>()
+            });
+        squares.sum()
     }
 
     /// Moves the modelled positions to projection + what the residuals `inside` were modelled by (misalignment,
@@ -127,9 +141,10 @@ impl StarData {
         fitted_arcsec: &[Vec<f64>],
         shift_arcsec: &[Vec<f64>],
         phase: &CentroidError,
+        effects: &[Arc<dyn Effect>],
     ) {
         if self.free_attitude {
-            self.turn_frames(shift_arcsec);
+            self.turn_frames(shift_arcsec, effects);
         }
         let (modelled, carried) = (self.shifted(fitted_arcsec), self.shifted(shift_arcsec));
         self.modelled = modelled;

@@ -21,9 +21,18 @@ impl StarData {
         motion: Option<&dyn AttitudeSource>,
         effects: &[Arc<dyn Effect>],
     ) {
+        self.project_with(motion, effects);
+        self.modelled = self.projected.clone();
+    }
+
+    /// Projected positions alone.
+    pub(super) fn project_with(
+        &mut self,
+        motion: Option<&dyn AttitudeSource>,
+        effects: &[Arc<dyn Effect>],
+    ) {
         self.project();
         self.disturb(motion, effects);
-        self.modelled = self.projected.clone();
     }
 
     /// Projection of every row by its frame's attitude, before any effect, px.

@@ -122,7 +122,7 @@ fn trace(
         settled
             .phase_error
             .get_or_insert_with(|| data.phase_error.clone());
-        data.land(&fitted, &whole, phase);
+        data.land(&fitted, &whole, phase, &declared::effects(situation)?);
     }
 }
 

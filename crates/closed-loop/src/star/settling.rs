@@ -44,6 +44,7 @@ pub(crate) fn settle(
     let (mut round, mut turns) = (0, 0);
     let least = LEAST_ROUNDS[usize::from(data.free_attitude)];
     let mut last = f64::INFINITY;
+    let effects = declared::effects(situation)?;
     loop {
         let (mut before, inside, loglik, variance, misalignment) = {
             let evidence = StarEvidence::new(data, situation, vec![data.measured_residual()], None);
@@ -65,7 +66,6 @@ pub(crate) fn settle(
         if let Some((theta, reference)) = misalignment.zip(situation.reference.as_ref())
             && turns < TURNS
         {
-            let effects = declared::effects(situation)?;
             if data.project_through(theta, variance, reference, &effects) {
                 // beside the misalignment the distortion is what it was
                 data.move_modelled(&inside, &mut before, phase);
@@ -75,12 +75,14 @@ pub(crate) fn settle(
         }
         let added = data.mark_outliers(&[&before.axes, &inside.axes]);
         round += 1;
+        let mut turned = 0.0;
         if data.free_attitude {
-            data.turn_frames(&inside.modelled);
+            turned = data.turn_frames(&inside.modelled, &effects);
         }
-        let moved = data.move_modelled(&inside, &mut before, phase);
-        // steep centroid errors move where they are evaluated: each round leaves a share of what the one before
-        // did, and what is left of all rows together is less than the noise of one
+        let moved = turned + data.move_modelled(&inside, &mut before, phase);
+        // steep centroid errors move where they are evaluated, and attitudes what the columns of a rotation are: each
+        // round leaves a share of what the one before did, and what is left of all rows together is less than the
+        // noise of one
         let settled = moved * (moved / last).min(1.0) < variance;
         last = moved;
         if round >= least && added == 0 && settled || round >= MOST_ROUNDS {
