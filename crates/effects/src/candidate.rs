@@ -229,6 +229,11 @@ pub trait Candidate: Debug + Send + Sync {
     fn turns_camera(&self) -> bool {
         false
     }
+    /// Whether the light itself falls elsewhere; what acts on the centroid alone leaves it where it is, and the phase
+    /// in the pixel with it.
+    fn moves_light(&self) -> bool {
+        true
+    }
     /// Whether it tells what something follows and not why: a thousandth of its size is nothing to it.
     fn describes(&self) -> bool {
         false

@@ -40,8 +40,10 @@ const SETS: [&[usize]; 8] = [
 ];
 
 /// Shift at the edge of the field that would not surprise, as a share of the distance from the
-/// boresight: a tenth of what an uncalibrated photographic lens has.
+/// boresight: a tenth of what an uncalibrated photographic lens of a narrow field has. Wide fields are bent by more,
+/// as far as tan^2/3 where the image is in proportion to the angle (k1 = -1/3): a thirteenth of that.
 const PLAUSIBLE_SHARE: f64 = 2e-3;
+const PLAUSIBLE_OF_WIDE: f64 = 0.025;
 /// The same of a calibrated camera with a narrow field, arcsec.
 const PLAUSIBLE_ARCSEC: f64 = 10.0;
 
@@ -120,7 +122,7 @@ impl Shift for Brown {
     fn coefficients(&self) -> Vec<Coefficient> {
         let edge = self.camera.half_size_px()[0] / self.camera.focal_length_px()[0];
         let size = f64::max(
-            PLAUSIBLE_SHARE * edge,
+            PLAUSIBLE_SHARE.max(PLAUSIBLE_OF_WIDE * edge * edge) * edge,
             PLAUSIBLE_ARCSEC / focal_plane::ARCSEC_PER_RAD,
         );
         let plausible = [

@@ -169,6 +169,9 @@ impl<S: Shift> Candidate for ShiftCandidate<S> {
     fn of_parts(&self, parts: &[u32]) -> Option<Box<dyn Candidate>> {
         self.shift.of_parts(parts).map(Self::boxed)
     }
+    fn moves_light(&self) -> bool {
+        self.shift.stages().image
+    }
     fn acts_on_stars(&self) -> bool {
         true
     }

@@ -29,6 +29,7 @@ use crate::search::{Found, amplitudes_as, fit};
 use crate::situation::Situation;
 use crate::star::data::StarData;
 use crate::star::evidence::StarEvidence;
+use crate::star::landing::Shifts;
 use crate::star::own_attitude;
 use crate::star::reference_wander::{self, REFERENCE_ERROR};
 use crate::star::search::Wander;
@@ -68,9 +69,8 @@ impl Finish<'_> {
             .residuals(self.folds, &only.candidates, &amplitudes))
     }
 
-    /// What the nuisance shifts each row by beside the chosen effects, and what both do, as all data have them,
-    /// arcsec.
-    pub(crate) fn modelled(&self) -> Result<[Vec<Vec<f64>>; 2], CloseError> {
+    /// What the chosen effects and the nuisance beside them shift each row by, as all data have them.
+    pub(crate) fn modelled(&self) -> Result<Shifts, CloseError> {
         let chosen = &self.found.selection.chosen;
         let fits = &self.found.fitted.fits;
         let set = columns_of(&self.found.fitted.groups, chosen);
@@ -84,14 +84,28 @@ impl Finish<'_> {
             nuisance: vec![fits.nuisance(None, &set, &beta); count],
             candidates: vec![only.spread(&beta); count],
         };
+        let mut light = whole.clone();
+        let mut first = 0;
+        for candidate in &only.candidates {
+            let own = candidate.coefficients().len();
+            if !candidate.moves_light() {
+                let still = light.candidates.iter_mut();
+                still.for_each(|c| c.rows_mut(first, own).fill(0.0));
+            }
+            first += own;
+        }
         let mut fitted = whole.clone();
         for candidate in &mut fitted.candidates {
             candidate.fill(0.0);
         }
-        let both = self
-            .level
-            .residuals_of(self.folds, &only.candidates, [&fitted, &whole]);
-        Ok(both.map(|r| r.modelled))
+        let each = [&fitted, &light, &whole];
+        let each = self.level.residuals_of(self.folds, &only.candidates, each);
+        let [fitted, light, whole] = each.map(|r| r.modelled);
+        Ok(Shifts {
+            fitted,
+            light,
+            whole,
+        })
     }
 
     fn power(&self, residual: &Residuals) -> f64 {

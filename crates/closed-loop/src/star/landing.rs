@@ -22,6 +22,16 @@ use crate::star::light;
 /// Light that falls this far off has another pixel phase: by a fifth of a radian.
 const ELSEWHERE_PX: f64 = 0.03;
 
+/// What was fitted shifts each row by, arcsec, x and y.
+pub(crate) struct Shifts {
+    /// The declared model's unknowns alone.
+    pub(crate) fitted: Vec<Vec<f64>>,
+    /// With the effects that move the light.
+    pub(crate) light: Vec<Vec<f64>>,
+    /// With all effects: those that act on the centroid leave the light where it is.
+    pub(crate) whole: Vec<Vec<f64>>,
+}
+
 impl StarData {
     /// The measured residual less `shift`, arcsec.
     fn left(&self, shift: &[Vec<f64>]) -> [Vec<f64>; 2] {
@@ -134,22 +144,21 @@ impl StarData {
         squares > ELSEWHERE_PX * ELSEWHERE_PX * count
     }
 
-    /// Evaluates the declared centroid error where `shift_arcsec` takes the light. Columns of what moves
-    /// the image are those where that motion starts from: projection + `fitted_arcsec`, without it.
+    /// Evaluates the declared centroid error where `shifts` take the light. Columns of what moves
+    /// the image are those where that motion starts from: projection + what was fitted, without it.
     pub(crate) fn land(
         &mut self,
-        fitted_arcsec: &[Vec<f64>],
-        shift_arcsec: &[Vec<f64>],
+        shifts: &Shifts,
         phase: &CentroidError,
         effects: &[Arc<dyn Effect>],
     ) {
         if self.free_attitude {
-            self.turn_frames(shift_arcsec, effects);
+            self.turn_frames(&shifts.whole, effects);
         }
-        let (modelled, carried) = (self.shifted(fitted_arcsec), self.shifted(shift_arcsec));
+        let (modelled, carried) = (self.shifted(&shifts.fitted), self.shifted(&shifts.light));
         self.modelled = modelled;
         self.carried = Some(carried);
-        let left = self.left(shift_arcsec);
+        let left = self.left(&shifts.whole);
         self.light = light::of(self, left.each_ref().map(Vec::as_slice));
         self.update_phase(phase);
     }

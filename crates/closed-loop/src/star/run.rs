@@ -28,6 +28,7 @@ use crate::situation::Situation;
 use crate::star::data::{Inputs, Star, StarData};
 use crate::star::evidence::StarEvidence;
 use crate::star::finish::{Finish, finish};
+use crate::star::landing::Shifts;
 use crate::star::pointed::Pointed;
 use crate::star::search::Searched;
 use crate::star::settling::{Settled, settle};
@@ -108,8 +109,7 @@ fn trace(
     loop {
         let last = landings == 0;
         let path = steady.as_ref();
-        let [fitted, whole] = match explain(data, situation, folds, &settled, path, last, progress)?
-        {
+        let shifts = match explain(data, situation, folds, &settled, path, last, progress)? {
             Explained::Closed(closed) => return Ok(*closed),
             Explained::Steadier(path) => {
                 steady = Some(path);
@@ -122,16 +122,15 @@ fn trace(
         settled
             .phase_error
             .get_or_insert_with(|| data.phase_error.clone());
-        data.land(&fitted, &whole, phase, &declared::effects(situation)?);
+        data.land(&shifts, phase, &declared::effects(situation)?);
     }
 }
 
 /// What a search ends with.
 enum Explained {
     Closed(Box<Closed>),
-    /// What was found shifts the light to another pixel phase than the fits assumed: what the
-    /// nuisance shifts rows by, and with it all, arcsec.
-    Elsewhere([Vec<Vec<f64>>; 2]),
+    /// What was found shifts the light to another pixel phase than the fits assumed.
+    Elsewhere(Box<Shifts>),
     /// Something is left that follows the motion of a reference that errs slowly: its path without that error.
     Steadier(AttitudeSeries),
 }
@@ -328,9 +327,9 @@ fn explain(
     };
     let after = whole.residuals(&searched.found.selection.chosen)?;
     if !last && formed.is_none() && data.lands_elsewhere(&after.modelled) {
-        let modelled = whole.modelled()?;
-        if data.lands_elsewhere(&modelled[1]) {
-            return Ok(Explained::Elsewhere(modelled));
+        let shifts = whole.modelled()?;
+        if data.lands_elsewhere(&shifts.light) {
+            return Ok(Explained::Elsewhere(Box::new(shifts)));
         }
     }
     progress("figures");
