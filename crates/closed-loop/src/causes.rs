@@ -389,6 +389,14 @@ fn whole(described: &Described, parts: Vec<Part>) -> Vec<Arc<dyn Candidate>> {
     kept
 }
 
+impl Described {
+    /// The terms that describe best what is left beside the chosen effects; none where nothing does.
+    pub(crate) fn terms_left(&self) -> Vec<Arc<dyn Candidate>> {
+        let set = columns_of(&self.fitted.groups, &self.chosen);
+        describe(self, &set).map_or_else(Vec::new, |(_, parts)| whole(self, parts))
+    }
+}
+
 /// What the stars follow, where that beats a slow error of the reference about `axes` axes:
 /// `coloured` is beside it, `plain` under white noise. Not the time alone: a slow error is what the time
 /// alone describes, and folds that know nothing of each other's predict it worse.

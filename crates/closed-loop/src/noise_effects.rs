@@ -30,7 +30,7 @@ use block_regression::Folds;
 use focal_plane::Pixel;
 use star_tracker::StarView;
 use telemetry::report::{ConsideredEffect, Estimate, FoundEffect};
-use telemetry::{EffectEntry, EffectValue};
+use telemetry::{EffectEntry, EffectValue, Model};
 
 use crate::declared;
 use crate::error::CloseError;
@@ -70,6 +70,8 @@ pub(crate) struct NoiseEffects {
     pub(crate) entries: Vec<EffectEntry>,
     /// Noise of a rate that is claimed, arcsec/(deg/s).
     rate: f64,
+    /// Variance over the declared one beside a slope or a rate that is claimed.
+    level: Option<f64>,
     considered: Vec<ConsideredEffect>,
 }
 
@@ -115,6 +117,18 @@ impl NoiseEffects {
             .filter(|n| n.is_finite());
         }
         Ok(())
+    }
+
+    /// Writes the level of the noise into a model that gets a slope or a rate: these say how it grows from there.
+    pub(crate) fn set_level(&self, model: &mut Model) {
+        let slope_or_rate = self.effects.iter().any(|e| e.id != OUTLIERS);
+        let Some(level) = self.level.filter(|_| slope_or_rate) else {
+            return;
+        };
+        // circular, where none is declared 1 arcsec an axis
+        let declared = model.noise.temporal_arcsec.filter(|s| *s > 0.0);
+        let declared = declared.unwrap_or(std::f64::consts::SQRT_2);
+        model.noise.temporal_arcsec = Some(declared * level.sqrt());
     }
 
     /// Leaves out what was said of the noise's growth with magnitude: of centroids formed in another way
@@ -231,7 +245,7 @@ pub(crate) fn claim(
     let Some(mut verdicts) = judge(&make, folds, known) else {
         return Ok(NoiseEffects::default());
     };
-    if verdicts.magnitude.stands || verdicts.rate.stands {
+    if verdicts.magnitude.stands || verdicts.rate.stands || verdicts.outliers.stands {
         let quick = Quick::of(data, residual, [&declared, &rate]);
         let [declared, rate] = &quick.squares;
         let source = Source {
@@ -244,10 +258,13 @@ pub(crate) fn claim(
         if let Some(fast) = judge(&make, folds, known) {
             verdicts.magnitude = verdicts.magnitude.beside(&fast.magnitude);
             verdicts.rate = verdicts.rate.beside(&fast.rate);
+            verdicts.outliers = verdicts.outliers.isolated(&fast.outliers);
         }
     }
     let rate = &verdicts.rate;
+    let stands = verdicts.magnitude.stands || rate.stands;
     let mut out = NoiseEffects {
+        level: verdicts.level.filter(|_| stands),
         rate: if rate.stands { rate.values[0][0] } else { 0.0 },
         ..NoiseEffects::default()
     };

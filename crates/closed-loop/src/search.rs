@@ -215,6 +215,26 @@ impl Found {
         chosen.map(|&g| self.candidates[g].as_ref())
     }
 
+    /// What was chosen alone, fitted to `evidence`.
+    pub(crate) fn refitted(
+        &self,
+        evidence: &dyn Evidence,
+        folds: &Folds,
+    ) -> Result<Self, CloseError> {
+        let chosen = self.selection.chosen.iter();
+        let candidates: Vec<_> = chosen.map(|&g| Arc::clone(&self.candidates[g])).collect();
+        let fitted = fit(evidence, folds, &borrowed(&candidates))?;
+        let selection = Selection {
+            chosen: (0..candidates.len()).collect(),
+            judged: Vec::new(),
+        };
+        Ok(Self {
+            candidates,
+            fitted,
+            selection,
+        })
+    }
+
     /// Whether one of the candidates put forward last, `count` at the end of the list, was chosen.
     pub(crate) fn names_one_of_the_last(&self, count: usize) -> bool {
         let first = self.candidates.len() - count;

@@ -56,6 +56,9 @@ const AGREEING: f64 = 4.0;
 const LEAST_SPREAD: f64 = 0.5;
 /// Sigmas beyond what passes for nothing that the estimate from differences has to show.
 const SEEN_QUICK: f64 = 2.0;
+/// Share of the spikes that differences from row to row show at least: one row is in three of them.
+const LEAST_ISOLATED: f64 = 0.25;
+const NOT_QUICK: &str = "what changes from one row of a star to the next does not show it";
 /// Rounds of rows (whose rotation is weighed by the noise) and fit.
 const ROUNDS: usize = 2;
 
@@ -96,6 +99,19 @@ impl Judged {
             && fast > self.least + SEEN_QUICK * its
     }
 
+    /// The same of spikes beside those of the differences: what is no spike there changes with the time or the place.
+    pub(super) fn isolated(self, quick: &Self) -> Self {
+        let alike = quick.values[0][0] >= LEAST_ISOLATED * self.values[0][0];
+        if !self.stands || !quick.observable || alike {
+            return self;
+        }
+        Self {
+            stands: false,
+            against: Some(NOT_QUICK),
+            ..self
+        }
+    }
+
     /// The same beside what differences of rows tell.
     pub(super) fn beside(self, quick: &Self) -> Self {
         if !self.stands || self.agrees(quick) {
@@ -103,7 +119,7 @@ impl Judged {
         }
         Self {
             stands: false,
-            against: Some("what changes from one row of a star to the next does not show it"),
+            against: Some(NOT_QUICK),
             ..self
         }
     }
@@ -126,6 +142,8 @@ pub(super) struct Verdicts {
     pub(super) magnitude: Judged,
     pub(super) rate: Judged,
     pub(super) outliers: Judged,
+    /// Variance over the declared one beside the slope and the rate that stand, where one does.
+    pub(super) level: Option<f64>,
 }
 
 /// Rows and what they are held against.
@@ -221,10 +239,13 @@ pub(super) fn judge(make: &Make<'_>, folds: &Folds, known: Known) -> Option<Verd
             rate = other;
         }
     }
+    let level = (magnitude.stands || rate.stands)
+        .then(|| bench.level(&full.fit, [magnitude.stands, rate.stands]));
     Some(Verdicts {
         magnitude,
         rate,
         outliers,
+        level,
     })
 }
 
@@ -325,6 +346,17 @@ impl Bench<'_> {
             known,
             folds: OnceCell::new(),
         }
+    }
+
+    /// Variance over the declared one where of slope and rate only those that `stand` act.
+    fn level(&self, full: &Fit, stand: [bool; 2]) -> f64 {
+        let (mut at, mut free) = (full.at, full.free);
+        for (k, stands) in [MAGNITUDE, RATE].into_iter().zip(stand) {
+            if !stands {
+                (at[k], free[k]) = (0.0, false);
+            }
+        }
+        self.model.fit(&self.rows, &at, free, &|_| true).at[LEVEL].exp()
     }
 
     /// Slope or rate without the `other`.

@@ -108,6 +108,17 @@ impl Finish<'_> {
         })
     }
 
+    /// What the chosen effects leave in sample beside the description of it, where there is one, arcsec.
+    fn beside_description(&self) -> Result<Option<Vec<Vec<f64>>>, CloseError> {
+        let terms = self.described.terms_left();
+        if terms.is_empty() || self.level.learned() {
+            return Ok(None);
+        }
+        let beside = self.level.keeping(&terms);
+        let found = self.found.refitted(&beside, self.folds)?;
+        Ok(noise_effects::in_sample(&beside, &found))
+    }
+
     fn power(&self, residual: &Residuals) -> f64 {
         figures::star_rms(residual, self.data)
             .iter()
@@ -217,7 +228,12 @@ pub(crate) fn finish(
     let learned = f.level.learned();
     let turned = Turned::of(f.data, [&residual[0], &residual[1]], weight);
     let (noise, ((leftover, own), pattern)) = rayon::join(
-        || noise_effects::claim(f.situation, f.level, residual, f.folds),
+        || {
+            // what is described is no noise
+            let beside = f.beside_description()?;
+            let residual = beside.as_deref().unwrap_or(residual);
+            noise_effects::claim(f.situation, f.level, residual, f.folds)
+        },
         || {
             let order = f.situation.model.noise.distortion_order;
             rayon::join(
@@ -256,6 +272,7 @@ pub(crate) fn finish(
     effects.extend(noise.effects.iter().cloned());
     entries.extend(noise.entries.iter().cloned());
     model.effects.extend(entries);
+    noise.set_level(&mut model);
 
     leftover.tell(&mut unattributed);
     if let Some(pattern) = pattern {
