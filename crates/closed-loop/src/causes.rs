@@ -24,7 +24,7 @@ use crate::figures;
 use crate::noise_effects;
 use crate::search::empirical::Empirical;
 use crate::search::refusal::{Refusal, Refused};
-use crate::search::selection::{columns_of, costs};
+use crate::search::selection::{MISPLACED, columns_of, costs, most_misplaced};
 use crate::search::{Found, borrowed, family, first_column, fit, joined};
 use crate::star::evidence::StarEvidence;
 use crate::star::search::{Searched, attempt, declared_noise};
@@ -48,10 +48,6 @@ const TIE: f64 = 2.0;
 const MOST_REFUSALS: usize = 10;
 /// Chance beyond which an effect is doubted beside slow noise of the stars.
 const DOUBT: f64 = 1e-4;
-/// The effect on a single star, and of how many at least it is believed: double stars and
-/// wrong motions are one in some hundred, so that three among a dozen share another cause.
-const MISPLACED: &str = "catalogue_position";
-const MOST_MISPLACED: usize = 2;
 /// The effect of the acceleration.
 pub(crate) const SMEAR: &str = "exposure_smear";
 /// Share of what a description gains below which an effect beside it is what it leaves.
@@ -369,7 +365,7 @@ fn chosen_that(found: &Found, holds: impl Fn(f64) -> bool) -> Vec<String> {
 fn pile(found: &Found, stars: usize) -> Vec<String> {
     let misplaced = |g: usize| found.candidates[g].id() == MISPLACED;
     let chosen = &found.selection.chosen;
-    if chosen.iter().filter(|g| misplaced(**g)).count() <= MOST_MISPLACED.max(stars / 20) {
+    if chosen.iter().filter(|g| misplaced(**g)).count() <= most_misplaced(stars) {
         return Vec::new();
     }
     let all = (0..found.candidates.len()).filter(|&g| misplaced(g));
