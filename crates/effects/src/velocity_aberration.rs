@@ -32,6 +32,9 @@
 //! v = speed Rz(node) Rx(inclination) (-sin a, cos a, 0),   a = 2 pi t / period + phase      inertial
 //! ```
 //!
+//! Nor does a velocity that hardly changes need channels, where stars have a catalogue and frames turn freely: the
+//! scale of a frame is `1 - b.v/c` for its boresight b, wherever it looks. It is told as an orbit of a year.
+//!
 //! Source: first-order stellar aberration, `focal_plane::aberrated`; derivation above.
 
 use std::collections::BTreeMap;
@@ -82,7 +85,7 @@ impl EffectKind for Kind {
         "the apparent direction is u + v/c, and nobody corrected it"
     }
     fn needs(&self) -> &'static str {
-        "velocity channels (vx_km_s, vy_km_s, vz_km_s or in m/s), and for an attitude the boresights of [frames]; or an inertial reference, for an orbit that no channel tells"
+        "velocity channels (vx_km_s, vy_km_s, vz_km_s or in m/s), and for an attitude the boresights of [frames]; or an inertial reference, for an orbit that no channel tells; or a catalogue alone and frames that look here and there, for a steady velocity"
     }
     fn acts_on(&self) -> ActsOn {
         ActsOn {
@@ -133,7 +136,11 @@ impl EffectKind for Kind {
     }
     fn candidates(&self, scene: &Scene<'_>) -> Vec<Box<dyn Candidate>> {
         let Some(velocity) = Velocity::channels(&scene.surroundings) else {
-            return Vec::new();
+            // frames that turn freely show it by their scale alone, wherever they look
+            let inertial = Level::known(&scene.surroundings, None) == Ok(Level::Inertial);
+            let free = scene.has_stars && scene.has_catalogue && !scene.has_reference;
+            let steady = (free && inertial).then(|| orbit::steady(scene.surroundings.span_s));
+            return steady.into_iter().collect();
         };
         Level::possible(&scene.surroundings)
             .into_iter()

@@ -31,6 +31,8 @@ use crate::candidate::check_columns;
 use crate::path::Held;
 use crate::{AttitudeRows, Candidate, Coefficient, Effect, EffectError, StarRows, Surroundings};
 
+/// A year, s: sidereal.
+const YEAR_S: f64 = 365.256_363 * 86_400.0;
 /// Speed that would not surprise, m/s.
 const PLAUSIBLE_M_S: f64 = 3000.0;
 /// Largest turn, and share of the frequency, by which columns are taken elsewhere at once.
@@ -161,6 +163,21 @@ impl Velocities for Free {
     }
 }
 
+/// The same velocity all the time.
+#[derive(Clone, Copy, Debug)]
+struct Steady {
+    middle_s: f64,
+}
+
+impl Velocities for Steady {
+    const COUNT: usize = 3;
+    fn at(&self, _: f64, out: &mut [Vector3<f64>]) {
+        for (k, v) in out.iter_mut().enumerate() {
+            *v = Vector3::ith(k, 1.0);
+        }
+    }
+}
+
 /// Most coefficients of any.
 const MOST: usize = 6;
 
@@ -251,6 +268,27 @@ impl Told for OrbitCandidate<Free> {
     }
 }
 
+impl Told for OrbitCandidate<Steady> {
+    fn refined(&self, _: &[f64]) -> Option<Box<dyn Candidate>> {
+        None
+    }
+    /// As an orbit about the Sun has it in the middle of the data, where it passes its northernmost or southernmost
+    /// direction.
+    fn orbit(&self, values: &[f64]) -> Orbit {
+        let v = Vector3::new(values[0], values[1], values[2]);
+        let speed_m_s = v.norm();
+        let north = (v.z / speed_m_s.max(f64::MIN_POSITIVE)).clamp(-1.0, 1.0);
+        let phase = -TAU * self.velocities.middle_s / YEAR_S;
+        Orbit {
+            speed_m_s,
+            period_s: YEAR_S,
+            phase_rad: phase - TAU * (phase / TAU).round(),
+            node_deg: (-v.x).atan2(v.y).to_degrees().rem_euclid(360.0),
+            inclination_deg: north.asin().to_degrees(),
+        }
+    }
+}
+
 impl<V: Velocities> Candidate for OrbitCandidate<V>
 where
     Self: Told,
@@ -308,6 +346,13 @@ where
             scale: 1.0,
         }))
     }
+}
+
+/// Aberration by a velocity that hardly changes in `span_s`, as that of the Earth in a day.
+pub(super) fn steady(span_s: [f64; 2]) -> Box<dyn Candidate> {
+    const NAMES: [&str; 3] = ["vx_m_s", "vy_m_s", "vz_m_s"];
+    let middle_s = 0.5 * (span_s[0] + span_s[1]);
+    Box::new(OrbitCandidate::of(Steady { middle_s }, &NAMES, 1))
 }
 
 /// Whether an orbit could show: against an inertial reference that is no camera on the same spacecraft, and
