@@ -22,6 +22,7 @@ use selection::{Group, Selection, Trials, columns_of, costs};
 pub(crate) mod catalogue;
 pub(crate) mod empirical;
 pub(crate) mod instants;
+pub(crate) mod misplaced;
 pub(crate) mod orbits;
 pub(crate) mod refusal;
 pub(crate) mod selection;

@@ -24,6 +24,7 @@ use crate::situation::channels_of_interest;
 use crate::star::columns::star_columns_of;
 use crate::star::data::StarData;
 use crate::star::evidence::StarEvidence;
+use nalgebra::Vector3;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use telemetry::report::{Dependence, Unattributed};
 
@@ -33,6 +34,9 @@ const MOST_STARS: usize = 64;
 const MOST_OF_OWN_SIZE: usize = 24;
 /// Chance beyond which stars differ by more than a line through them.
 const BESIDE_A_LINE: f64 = 1e-4;
+/// Share of a rate by which a steady one may change, and steps beyond which frames lie across a hole.
+const UNSTEADY: f64 = 0.1;
+const HOLE_STEPS: f64 = 1.5;
 /// Spread of a motion's size over its mean below which it is steady: such a size is nothing beside what it multiplies.
 const STEADY: f64 = 0.25;
 /// What may yield to an acceleration, s^2: a swing of 0.16 Hz.
@@ -381,10 +385,15 @@ pub(crate) fn terms(
         terms.extend(one(&phase[axis]));
     }
     terms.extend(one(&(Variable::Quarter, [-1.0, 1.0])));
-    for single in [&time, &rate, &mag, &colour] {
+    for single in [&time, &mag, &colour] {
         terms.extend(one(single));
     }
-    if acceleration {
+    // of a camera that turns steadily every place has its rate: that says what the place says
+    let moves = !turns_steadily(data);
+    if moves {
+        terms.extend(one(&rate));
+    }
+    if acceleration && moves {
         let acceleration = (Variable::Acceleration, motion(&data.acceleration));
         terms.extend(one(&acceleration));
         terms.extend(
@@ -424,7 +433,7 @@ pub(crate) fn terms(
     // charge is held back in proportion to it, the more the farther it is moved
     terms.extend(position.iter().filter_map(|of| two(of, &flux)));
     for by in position.iter().chain([&time, &mag, &colour]) {
-        terms.extend(two(&rate, by));
+        terms.extend(two(&rate, by).filter(|_| moves));
     }
     for of in [&mag, &colour] {
         terms.extend(
@@ -435,6 +444,21 @@ pub(crate) fn terms(
         );
     }
     terms
+}
+
+/// Whether the rotation from one frame to the next is the same all the time, but for [`UNSTEADY`] of it.
+fn turns_steadily(data: &StarData) -> bool {
+    let step_s = median_step(&data.frames.t_s).unwrap_or(f64::INFINITY);
+    let t_s = data.frames.t_s.windows(2).map(|t| t[1] - t[0]);
+    let steps = data.attitude.windows(2).zip(t_s);
+    let rates: Vec<Vector3<f64>> = steps
+        .filter(|(_, dt)| *dt > 0.0 && *dt < HOLE_STEPS * step_s)
+        .map(|(q, dt)| focal_plane::rotation_vector(&q[1], &q[0]) / dt)
+        .collect();
+    let count = rates.len().max(1) as f64;
+    let mean = rates.iter().sum::<Vector3<f64>>() / count;
+    let scatter = rates.iter().map(|r| (r - mean).norm_squared()).sum::<f64>() / count;
+    rates.len() > 2 && scatter.sqrt() < UNSTEADY * mean.norm()
 }
 
 /// Whether what yields to the acceleration could show beside a residual of `rms` arcsec: a structure that swings

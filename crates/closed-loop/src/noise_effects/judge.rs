@@ -56,8 +56,6 @@ const AGREEING: f64 = 4.0;
 const LEAST_SPREAD: f64 = 0.5;
 /// Sigmas beyond what passes for nothing that the estimate from differences has to show.
 const SEEN_QUICK: f64 = 2.0;
-/// Share of the spikes that differences from row to row show at least: one row is in three of them.
-const LEAST_ISOLATED: f64 = 0.25;
 const NOT_QUICK: &str = "what changes from one row of a star to the next does not show it";
 /// Rounds of rows (whose rotation is weighed by the noise) and fit.
 const ROUNDS: usize = 2;
@@ -99,10 +97,10 @@ impl Judged {
             && fast > self.least + SEEN_QUICK * its
     }
 
-    /// The same of spikes beside those of the differences: what is no spike there changes with the time or the place.
+    /// The same of spikes beside those of the differences: where these gain nothing, what stands out does so from
+    /// row to row, and changes with the time or the place.
     pub(super) fn isolated(self, quick: &Self) -> Self {
-        let alike = quick.values[0][0] >= LEAST_ISOLATED * self.values[0][0];
-        if !self.stands || !quick.observable || alike {
+        if !self.stands || !quick.observable || quick.gain > 0.0 {
             return self;
         }
         Self {
@@ -588,6 +586,17 @@ mod tests {
         }
         .beside(&judged(0.2, 0.08));
         assert!(!refused.stands && refused.against.is_some());
+        let spikes = |gain: f64| Judged {
+            stands: true,
+            gain,
+            ..all
+        };
+        assert!(spikes(90.0).isolated(&spikes(30.0)).stands);
+        assert!(!spikes(90.0).isolated(&spikes(0.0)).stands);
+        assert!(
+            spikes(90.0).isolated(&UNSEEN).stands,
+            "nothing to hold it against"
+        );
         // they agree, and there is nothing in either
         assert!(!judged(0.2, 0.05).agrees(&judged(0.2, 0.08)));
         assert!(all.agrees(&UNSEEN), "nothing to hold it against");

@@ -126,17 +126,6 @@ pub(crate) struct Selection {
     pub(crate) judged: Vec<Judgement>,
 }
 
-/// The effect on a single star, and of how many at least it is believed: double stars and
-/// wrong motions are one in some hundred, so that three among a dozen share another cause.
-pub(crate) const MISPLACED: &str = "catalogue_position";
-const MOST_MISPLACED: usize = 2;
-const STARS_A_MISPLACED: f64 = 20.0;
-
-/// How many of so many stars a catalogue may misplace.
-pub(crate) fn most_misplaced(stars: usize) -> usize {
-    MOST_MISPLACED.max(stars / 20)
-}
-
 /// All candidate columns of `chosen`, in order.
 pub(crate) fn columns_of(groups: &[Group], chosen: &[usize]) -> Vec<usize> {
     chosen
@@ -206,7 +195,7 @@ impl Trials<'_> {
             if !added.is_empty() {
                 chosen.extend(added);
                 self.prune(&mut chosen, &mut may);
-                if self.piled(&chosen) {
+                if super::misplaced::piled(self.groups, &chosen) {
                     break;
                 }
                 continue;
@@ -220,16 +209,6 @@ impl Trials<'_> {
         }
         let judged = self.judged(&chosen);
         Selection { chosen, judged }
-    }
-
-    /// Whether more stars are misplaced than a catalogue has. That is refused whatever else is found, and to go on
-    /// takes as long as there are stars.
-    fn piled(&self, chosen: &[usize]) -> bool {
-        let misplaced = |g: &Group| g.kind == MISPLACED;
-        let all = self.groups.iter().filter(|g| misplaced(g));
-        let stars: f64 = all.map(|g| g.stands_for).sum();
-        let count = chosen.iter().filter(|&&g| misplaced(&self.groups[g]));
-        count.count() as f64 > (stars / STARS_A_MISPLACED).max(MOST_MISPLACED as f64)
     }
 
     /// All groups that may be tried beside `chosen` and gain out of fold, the largest gain after the price of

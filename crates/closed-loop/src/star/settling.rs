@@ -65,13 +65,12 @@ pub(crate) fn settle(
         };
         if let Some((theta, reference)) = misalignment.zip(situation.reference.as_ref())
             && turns < TURNS
+            && data.project_through(theta, variance, reference, &effects)
         {
-            if data.project_through(theta, variance, reference, &effects) {
-                // beside the misalignment the distortion is what it was
-                data.move_modelled(&inside, &mut before, phase);
-                turns += 1;
-                continue;
-            }
+            // beside the misalignment the distortion is what it was
+            data.move_modelled(&inside, &mut before, phase);
+            turns += 1;
+            continue;
         }
         let added = data.mark_outliers(&[&before.axes, &inside.axes]);
         round += 1;

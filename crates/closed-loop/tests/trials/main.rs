@@ -1,6 +1,7 @@
 //! The loop on bundles of known truth.
 
 mod declared;
+mod free_frames;
 mod gaps;
 mod in_time;
 mod inputs;

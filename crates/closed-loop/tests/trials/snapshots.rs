@@ -1,11 +1,12 @@
 //! Unrelated pictures of the sky: stars and a catalogue, nothing else.
 
-use focal_plane::{Catalogue, CatalogueStar, Pixel, StarFrames, Tangent};
+use focal_plane::{Camera, Catalogue, CatalogueStar, Pixel, StarFrames, Tangent, aberrated};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use rand_core::{Rng, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use telemetry::report::{Report, Verdict};
+use telemetry::{Bundle, Model};
 
 use crate::kit::{Case, Path, closed};
 
@@ -13,23 +14,53 @@ use crate::kit::{Case, Path, closed};
 const NOISE_PX: f64 = 0.074;
 
 /// A camera that is not quite what was declared.
-#[derive(Clone, Copy, Debug, Default)]
-struct Lens {
-    k0: f64,
-    k1: f64,
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Lens {
+    pub(crate) k0: f64,
+    pub(crate) k1: f64,
     /// Centroids are off by so much times the sine of the pixel phase, px.
-    phase_px: f64,
-    /// One star in this many is another one, some pixels off.
-    mistaken: Option<u64>,
+    pub(crate) phase_px: f64,
+    /// One star in this many is another one, some pixels off, and how many.
+    pub(crate) mistaken: Option<u64>,
+    pub(crate) off_px: f64,
+    /// Field, deg, and stars in the sky: some thirty in a picture.
+    pub(crate) fov_deg: f64,
+    pub(crate) stars: i64,
+    /// Velocity of the camera, m/s.
+    pub(crate) velocity_m_s: Vector3<f64>,
+    /// Noise grows by 10^(0.2 slope (m - 5)).
+    pub(crate) slope: f64,
+}
+
+impl Default for Lens {
+    fn default() -> Self {
+        Self {
+            k0: 0.0,
+            k1: 0.0,
+            phase_px: 0.0,
+            mistaken: None,
+            off_px: 60.0,
+            fov_deg: 20.0,
+            stars: 3000,
+            velocity_m_s: Vector3::zeros(),
+            slope: 0.0,
+        }
+    }
 }
 
 /// Closes the loop on `frames` pictures of about thirty stars each.
 fn pictures(seed: u64, frames: usize, lens: Lens) -> Report {
+    let (model, bundle) = taken(seed, frames, lens);
+    closed(&model, &bundle).expect("the loop closes").report
+}
+
+/// `frames` pictures of about thirty stars each, and a model that declares their noise alone.
+pub(crate) fn taken(seed: u64, frames: usize, lens: Lens) -> (Model, Bundle) {
     let (mut model, mut bundle) = Case::new(Path::Drift, 1).make();
-    let camera = bundle.camera.clone().expect("a camera");
+    let camera = Camera::from_fov_deg([1024, 1024], [lens.fov_deg; 2]).expect("a camera");
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
     let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
-    let sky: Vec<CatalogueStar> = (0..3000)
+    let sky: Vec<CatalogueStar> = (0..lens.stars)
         .map(|id| {
             let v = Vector3::new(normal(), normal(), normal()).normalize();
             CatalogueStar {
@@ -53,20 +84,22 @@ fn pictures(seed: u64, frames: usize, lens: Lens) -> Report {
         ));
         for star in &sky {
             let (ra, dec) = (star.ra_deg.to_radians(), star.dec_deg.to_radians());
-            let v = q * Vector3::new(dec.cos() * ra.cos(), dec.cos() * ra.sin(), dec.sin());
+            let u = Vector3::new(dec.cos() * ra.cos(), dec.cos() * ra.sin(), dec.sin());
+            let v = q * aberrated(&u, &lens.velocity_m_s);
             let Some(ideal) = camera.project(&v).filter(|p| camera.contains(*p)) else {
                 continue;
             };
             let Tangent { x, y } = camera.tangent(ideal);
             let growth = 1.0 + lens.k0 + lens.k1 * (x * x + y * y);
             let on_curve = |p: f64| p + lens.phase_px * camera.phase_rad(p).sin();
+            let noise_px = NOISE_PX * 10_f64.powf(0.2 * lens.slope * (star.mag - 5.0));
             let mut at = Pixel {
-                x: on_curve(ideal.x * growth) + NOISE_PX * normal(),
-                y: on_curve(ideal.y * growth) + NOISE_PX * normal(),
+                x: on_curve(ideal.x * growth) + noise_px * normal(),
+                y: on_curve(ideal.y * growth) + noise_px * normal(),
             };
             if lens.mistaken.is_some_and(|n| other.next_u64() % n == 0) {
-                at.x += 60.0 * normal();
-                at.y += 60.0 * normal();
+                at.x += lens.off_px * normal();
+                at.y += lens.off_px * normal();
             }
             if camera.contains(at) {
                 stars.slot.push(0);
@@ -93,7 +126,10 @@ fn pictures(seed: u64, frames: usize, lens: Lens) -> Report {
     model.noise.temporal_arcsec = Some(NOISE_PX * std::f64::consts::SQRT_2 * scale);
     model.noise.centroid_arcsec = Some(0.0);
     model.noise.distortion_arcsec = Some(0.5);
-    closed(&model, &bundle).expect("the loop closes").report
+    bundle.camera = Some(camera);
+    model.tracker.focal_length_px = None;
+    model.tracker.fov_deg = Some([lens.fov_deg; 2]);
+    (model, bundle)
 }
 
 /// At a design rate of 1 %, 3 of 30 or more come once in 300 such tests.

@@ -1,0 +1,149 @@
+//! Pictures of the sky whose attitudes are their own, by cameras that a first solution gets wrong.
+
+use nalgebra::Vector3;
+use telemetry::report::{Report, Verdict};
+use telemetry::{EffectEntry, EffectValue};
+
+use crate::kit::closed;
+use crate::snapshots::{Lens, taken};
+
+fn report(seed: u64, frames: usize, lens: Lens) -> Report {
+    let (model, bundle) = taken(seed, frames, lens);
+    closed(&model, &bundle).expect("the loop closes").report
+}
+
+/// A wide field: some forty stars of 150 in 80 deg.
+fn wide(k1: f64) -> Lens {
+    Lens {
+        k1,
+        fov_deg: 80.0,
+        stars: 300,
+        ..Lens::default()
+    }
+}
+
+/// Names of the effects.
+fn named(report: &Report) -> Vec<&str> {
+    report.effects.iter().map(|e| e.id.as_str()).collect()
+}
+
+/// Chi-squared per degree of freedom scatters by `sqrt(2/n)` of n numbers, two a row less three a frame.
+fn is_noise(chi2: Option<f64>, report: &Report, frames: usize) {
+    let numbers = 2.0 * report.rows.used as f64 - 3.0 * frames as f64;
+    let chi2 = chi2.expect("chi-squared");
+    assert!(
+        (chi2 - 1.0).abs() < 5.0 * (2.0 / numbers).sqrt(),
+        "{chi2} of {numbers}"
+    );
+}
+
+/// One star in 25 is another, hundreds of pixels off: it takes the first attitude of its picture along by ten
+/// and more, whose square is pixels at the edge of the field. Set aside, it is forgotten.
+#[test]
+fn stars_taken_for_others_leave_no_trace() {
+    let lens = Lens {
+        mistaken: Some(25),
+        off_px: 500.0,
+        ..Lens::default()
+    };
+    let report = report(5, 30, lens);
+    assert_eq!(named(&report), Vec::<&str>::new());
+    assert!(report.rows.outliers > 10, "{:?}", report.rows);
+    is_noise(report.before.chi2_per_dof, &report, 30);
+}
+
+/// What the model declares of a lens that bends by thirty pixels is all of it.
+#[test]
+fn a_declared_lens_is_taken_off() {
+    let (mut model, bundle) = taken(6, 20, wide(-0.08));
+    let parameters = [("k1".to_owned(), EffectValue::Number(-0.08))];
+    let entry = EffectEntry::new("optical_distortion", parameters.into());
+    model.effects.push(entry);
+    let report = closed(&model, &bundle).expect("the loop closes").report;
+    assert_eq!(report.verdict, Verdict::Consistent, "{:?}", report.effects);
+    is_noise(report.before.chi2_per_dof, &report, 20);
+}
+
+/// A lens of a wide field may bend as such lenses do, and the model that is written closes the loop.
+#[test]
+fn a_wide_lens_is_found_and_taken_off() {
+    let truth = -0.08;
+    let (model, bundle) = taken(7, 20, wide(truth));
+    let found = closed(&model, &bundle).expect("the loop closes");
+    assert_eq!(named(&found.report), ["optical_distortion"]);
+    let k1 = &found.report.effects[0].parameters["k1"];
+    let z = (k1.value - truth) / k1.sigma.expect("a sigma");
+    assert!(z.abs() < 4.0, "{z} sigma");
+    is_noise(found.report.after.chi2_per_dof, &found.report, 20);
+    let again = closed(&found.model, &bundle)
+        .expect("the loop closes")
+        .report;
+    assert_eq!(again.verdict, Verdict::Consistent, "{:?}", again.effects);
+}
+
+/// A wave of 0.12 px is that of where the light falls, which it does not move: evaluated where it takes the
+/// centroid itself, half of its square would stand in the second order, 0.12 pi 0.12/2 = 0.02 px or ten of its sigmas.
+#[test]
+fn a_wave_in_pixel_phase_does_not_move_the_light() {
+    let lens = Lens {
+        phase_px: 0.12,
+        ..Lens::default()
+    };
+    let report = report(8, 60, lens);
+    assert_eq!(named(&report), ["pixel_phase_harmonics"]);
+    let found = &report.effects[0].parameters;
+    let names: Vec<&str> = found.keys().map(String::as_str).collect();
+    let first = [
+        "x1_amplitude_arcsec",
+        "x1_phase_rad",
+        "y1_amplitude_arcsec",
+        "y1_phase_rad",
+    ];
+    assert_eq!(names, first);
+    let truth = 0.12 * 10.0_f64.to_radians().tan() / 512.0 * 206_264.8;
+    for name in ["x1_amplitude_arcsec", "y1_amplitude_arcsec"] {
+        let z = (found[name].value - truth) / found[name].sigma.expect("a sigma");
+        assert!(z.abs() < 4.0, "{name}: {z} sigma");
+    }
+}
+
+/// 30 km/s make the scale of a picture differ by 1e-4 from where the camera flies to to where it comes from: of
+/// thirty stars 290 px off the middle each tells it to 0.074/(290 sqrt(60)) = 3.3e-5, sixty of them the
+/// velocity along any axis to 3.3e-5 sqrt(3/60) = 7e-6 of c, 14 sigma.
+#[test]
+fn a_steady_velocity_is_told_by_the_scales() {
+    let truth = Vector3::new(12_000.0, -24_000.0, 13_000.0);
+    let lens = Lens {
+        velocity_m_s: truth,
+        ..Lens::default()
+    };
+    let report = report(9, 60, lens);
+    assert_eq!(named(&report), ["velocity_aberration"]);
+    let speed = &report.effects[0].parameters["speed_m_s"];
+    let z = (speed.value - truth.norm()) / speed.sigma.expect("a sigma");
+    assert!(z.abs() < 4.0, "{} m/s, {z} sigma", speed.value);
+    is_noise(report.after.chi2_per_dof, &report, 60);
+}
+
+/// Where noise grows with the magnitude, the model says from which level: read again, it is consistent with the
+/// data, whose squares are what it says to within what the weights of a solution by equal weights leave.
+#[test]
+fn a_slope_of_the_noise_has_its_level() {
+    let lens = Lens {
+        slope: 1.0,
+        ..Lens::default()
+    };
+    let (mut model, bundle) = taken(10, 40, lens);
+    // some level: it is estimated
+    model.noise.temporal_arcsec = model.noise.temporal_arcsec.map(|s| 0.6 * s);
+    let found = closed(&model, &bundle).expect("the loop closes");
+    assert_eq!(named(&found.report), ["magnitude_noise"]);
+    let again = closed(&found.model, &bundle)
+        .expect("the loop closes")
+        .report;
+    assert_eq!(again.verdict, Verdict::Consistent, "{:?}", again.effects);
+    for chi2 in [found.report.after.chi2_per_dof, again.before.chi2_per_dof] {
+        let chi2 = chi2.expect("chi-squared");
+        assert!((0.85..1.25).contains(&chi2), "{chi2}");
+    }
+}
