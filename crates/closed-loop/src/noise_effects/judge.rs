@@ -48,6 +48,8 @@ const CREDIBLE_SLOPE: f64 = 4.0;
 const CREDIBLE_RATE: f64 = 300.0;
 /// Fewest spikes that are a rate.
 const MIN_SPIKES: f64 = 3.0;
+/// Spikes that may hide in the larger noise of differences.
+const HANDFUL: f64 = 30.0;
 /// Nats by which spikes must beat noise with tails.
 const BEYOND_TAILS: f64 = 5.0;
 /// Sigmas within which two estimates agree, and the least sigma of their difference, in
@@ -97,10 +99,14 @@ impl Judged {
             && fast > self.least + SEEN_QUICK * its
     }
 
-    /// The same of spikes beside those of the differences: where these gain nothing, what stands out does so from
-    /// row to row, and changes with the time or the place.
+    /// The same of spikes beside those of the differences: where these gain nothing, and there are more than a handful,
+    /// what stands out does so from row to row, and changes with the time or the place.
     pub(super) fn isolated(self, quick: &Self) -> Self {
-        if !self.stands || !quick.observable || quick.gain > 0.0 {
+        let rows = self
+            .fewest
+            .map_or(f64::INFINITY, |fewest| MIN_SPIKES / fewest);
+        let handful = self.values[0][0] * rows < HANDFUL;
+        if !self.stands || !quick.observable || quick.gain > 0.0 || handful {
             return self;
         }
         Self {
@@ -593,6 +599,13 @@ mod tests {
         };
         assert!(spikes(90.0).isolated(&spikes(30.0)).stands);
         assert!(!spikes(90.0).isolated(&spikes(0.0)).stands);
+        // a tenth of a hundred rows
+        let few = Judged {
+            values: [[0.1, 0.01], [0.0; 2]],
+            fewest: Some(0.03),
+            ..spikes(90.0)
+        };
+        assert!(few.isolated(&spikes(0.0)).stands);
         assert!(
             spikes(90.0).isolated(&UNSEEN).stands,
             "nothing to hold it against"
