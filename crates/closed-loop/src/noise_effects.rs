@@ -245,7 +245,7 @@ pub(crate) fn claim(
     let Some(mut verdicts) = judge(&make, folds, known) else {
         return Ok(NoiseEffects::default());
     };
-    if verdicts.magnitude.stands || verdicts.rate.stands || verdicts.outliers.stands {
+    if verdicts.magnitude.stands || verdicts.rate.stands {
         let quick = Quick::of(data, residual, [&declared, &rate]);
         let [declared, rate] = &quick.squares;
         let source = Source {
@@ -258,7 +258,6 @@ pub(crate) fn claim(
         if let Some(fast) = judge(&make, folds, known) {
             verdicts.magnitude = verdicts.magnitude.beside(&fast.magnitude);
             verdicts.rate = verdicts.rate.beside(&fast.rate);
-            verdicts.outliers = verdicts.outliers.isolated(&fast.outliers);
         }
     }
     let rate = &verdicts.rate;

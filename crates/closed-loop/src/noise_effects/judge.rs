@@ -48,8 +48,8 @@ const CREDIBLE_SLOPE: f64 = 4.0;
 const CREDIBLE_RATE: f64 = 300.0;
 /// Fewest spikes that are a rate.
 const MIN_SPIKES: f64 = 3.0;
-/// Spikes that may hide in the larger noise of differences.
-const HANDFUL: f64 = 30.0;
+/// Share of the spikes that follow or are followed by another of their star: by chance 0.36 at most.
+const MOST_IN_A_ROW: f64 = 0.6;
 /// Nats by which spikes must beat noise with tails.
 const BEYOND_TAILS: f64 = 5.0;
 /// Sigmas within which two estimates agree, and the least sigma of their difference, in
@@ -97,23 +97,6 @@ impl Judged {
         let [all, fast] = [value, other].map(|v| v * value.signum());
         all - fast <= AGREEING * spread.max(LEAST_SPREAD * its)
             && fast > self.least + SEEN_QUICK * its
-    }
-
-    /// The same of spikes beside those of the differences: where these gain nothing, and there are more than a handful,
-    /// what stands out does so from row to row, and changes with the time or the place.
-    pub(super) fn isolated(self, quick: &Self) -> Self {
-        let rows = self
-            .fewest
-            .map_or(f64::INFINITY, |fewest| MIN_SPIKES / fewest);
-        let handful = self.values[0][0] * rows < HANDFUL;
-        if !self.stands || !quick.observable || quick.gain > 0.0 || handful {
-            return self;
-        }
-        Self {
-            stands: false,
-            against: Some(NOT_QUICK),
-            ..self
-        }
     }
 
     /// The same beside what differences of rows tell.
@@ -491,6 +474,8 @@ impl Bench<'_> {
             Some("so few rows are no share")
         } else if with.loglik <= tails {
             Some("noise with long tails explains as much")
+        } else if self.in_a_row(&rows, &with) > MOST_IN_A_ROW {
+            Some("they come one after the other")
         } else {
             None
         };
@@ -508,6 +493,24 @@ impl Bench<'_> {
             ],
             least: 0.0,
         }
+    }
+
+    /// Share of the spikes of `fit` whose star has one in its row before or after, too: what is smooth has all.
+    fn in_a_row(&self, rows: &[Row], fit: &Fit) -> f64 {
+        let belief = self.model.belief(&fit.at);
+        let mut of_star = vec![Vec::new(); self.stars];
+        for row in rows {
+            of_star[row.star].push(belief(row)[1] < 0.5);
+        }
+        let (mut spikes, mut beside) = (0.0, 0.0);
+        for star in &of_star {
+            for k in (0..star.len()).filter(|&k| star[k]) {
+                let before = k > 0 && star[k - 1];
+                spikes += 1.0;
+                beside += f64::from(before || star.get(k + 1) == Some(&true));
+            }
+        }
+        beside / f64::max(spikes, 1.0)
     }
 
     /// Gain of `with` over `without` on folds that took no part in the fit.
@@ -592,24 +595,6 @@ mod tests {
         }
         .beside(&judged(0.2, 0.08));
         assert!(!refused.stands && refused.against.is_some());
-        let spikes = |gain: f64| Judged {
-            stands: true,
-            gain,
-            ..all
-        };
-        assert!(spikes(90.0).isolated(&spikes(30.0)).stands);
-        assert!(!spikes(90.0).isolated(&spikes(0.0)).stands);
-        // a tenth of a hundred rows
-        let few = Judged {
-            values: [[0.1, 0.01], [0.0; 2]],
-            fewest: Some(0.03),
-            ..spikes(90.0)
-        };
-        assert!(few.isolated(&spikes(0.0)).stands);
-        assert!(
-            spikes(90.0).isolated(&UNSEEN).stands,
-            "nothing to hold it against"
-        );
         // they agree, and there is nothing in either
         assert!(!judged(0.2, 0.05).agrees(&judged(0.2, 0.08)));
         assert!(all.agrees(&UNSEEN), "nothing to hold it against");
