@@ -175,6 +175,31 @@ struct Scatter {
     blocks: f64,
 }
 
+/// The blocks' shares of an information.
+#[derive(Default)]
+struct Shares {
+    sum: f64,
+    squares: f64,
+}
+
+impl Shares {
+    fn add(&mut self, share: f64) {
+        self.sum += share;
+        self.squares += share * share;
+    }
+
+    /// As many equal blocks would hold as much.
+    fn blocks(&self) -> f64 {
+        self.sum * self.sum / self.squares.max(f64::MIN_POSITIVE)
+    }
+
+    /// By how much the squares of scores are too small, of which the amplitudes take their part in every block.
+    fn widening(&self) -> f64 {
+        let blocks = self.blocks();
+        blocks / (blocks - 1.0).max(1.0)
+    }
+}
+
 impl Fits {
     /// Eliminates the nuisance in every fold and on all data. `variance` is the
     /// noise variance of a scalar, which turns prior precisions into the unit of
@@ -465,7 +490,7 @@ impl Fits {
         let w = &self.all.nuisance;
         let left = self.all.left(set, &value);
         let mut spread = DMatrix::zeros(p, p);
-        let (mut shares, mut squares) = (0.0, 0.0);
+        let mut shares = Shares::default();
         let columns: Vec<usize> = set.iter().map(|c| n + c).collect();
         let mut score = DVector::zeros(p);
         let mut within = DVector::zeros(n);
@@ -480,13 +505,9 @@ impl Fits {
                 share += own.max(0.0) / self.all.train[(c, c)];
             }
             spread.ger(1.0, &score, &score, 1.0);
-            shares += share;
-            squares += share * share;
+            shares.add(share);
         }
-        // as many equal blocks would hold as much
-        let blocks = shares * shares / f64::max(squares, f64::MIN_POSITIVE);
-        // the amplitudes take their part of every block's score
-        spread *= blocks / (blocks - 1.0).max(1.0);
+        spread *= shares.widening();
         let variance = self.variance(set)?;
         // S less the sum of M is what the prior adds
         let of_set = w.select_columns(set);
@@ -496,7 +517,7 @@ impl Fits {
             robust: &inverse * spread * &inverse,
             white: inverse * variance,
             value,
-            blocks,
+            blocks: shares.blocks(),
         })
     }
 

@@ -23,7 +23,7 @@ use crate::error::CloseError;
 use crate::figures;
 use crate::noise_effects;
 use crate::search::empirical::Empirical;
-use crate::search::misplaced::{MISPLACED, most_misplaced};
+use crate::search::misplaced::{MISPLACED, piled};
 use crate::search::refusal::{Refusal, Refused};
 use crate::search::selection::{columns_of, costs};
 use crate::search::{Found, borrowed, family, first_column, fit, joined};
@@ -364,12 +364,11 @@ fn chosen_that(found: &Found, holds: impl Fn(f64) -> bool) -> Vec<String> {
 
 /// Families of misplaced stars, if more of `stars` are than a catalogue has.
 fn pile(found: &Found, stars: usize) -> Vec<String> {
-    let misplaced = |g: usize| found.candidates[g].id() == MISPLACED;
-    let chosen = &found.selection.chosen;
-    if chosen.iter().filter(|g| misplaced(**g)).count() <= most_misplaced(stars) {
+    let groups = &found.fitted.groups;
+    if !piled(groups, &found.selection.chosen, stars as f64) {
         return Vec::new();
     }
-    let all = (0..found.candidates.len()).filter(|&g| misplaced(g));
+    let all = (0..groups.len()).filter(|&g| groups[g].kind == MISPLACED);
     all.map(|g| family(found.candidates[g].as_ref())).collect()
 }
 

@@ -70,7 +70,7 @@ pub(crate) struct NoiseEffects {
     pub(crate) entries: Vec<EffectEntry>,
     /// Noise of a rate that is claimed, arcsec/(deg/s).
     rate: f64,
-    /// Variance over the declared one beside a slope or a rate that is claimed.
+    /// Variance over the declared one beside a slope or a rate.
     level: Option<f64>,
     considered: Vec<ConsideredEffect>,
 }
@@ -261,9 +261,8 @@ pub(crate) fn claim(
         }
     }
     let rate = &verdicts.rate;
-    let stands = verdicts.magnitude.stands || rate.stands;
     let mut out = NoiseEffects {
-        level: verdicts.level.filter(|_| stands),
+        level: verdicts.level,
         rate: if rate.stands { rate.values[0][0] } else { 0.0 },
         ..NoiseEffects::default()
     };

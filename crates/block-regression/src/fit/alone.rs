@@ -11,8 +11,8 @@
 
 use rayon::prelude::*;
 
-use super::Fits;
 use super::moderation::Usual;
+use super::{Fits, Shares};
 
 /// What all columns say counts for no more than this many times the blocks that there are.
 const MOST_BLOCKS: f64 = 2.0;
@@ -26,9 +26,7 @@ struct Alone {
     information: f64,
     /// Squares of the blocks' scores.
     spread: f64,
-    /// The blocks' shares of the information, and their squares.
-    shares: f64,
-    squares: f64,
+    shares: Shares,
 }
 
 impl Fits {
@@ -59,18 +57,18 @@ impl Fits {
                 let product = gram.at(n + own.column, residual);
                 let score = product + 0.5 * b - own.value * (square + a);
                 own.spread += score * score;
-                let share = (square + a).max(0.0) / own.information;
-                own.shares += share;
-                own.squares += share * share;
+                own.shares.add((square + a).max(0.0) / own.information);
             }
         }
         let widths = alone.iter().filter_map(|own| {
-            let blocks = own.shares * own.shares / own.squares.max(f64::MIN_POSITIVE);
             let variance = self.variance(&[own.column])?;
             let nuisance = w.column(own.column);
             let of_prior = nuisance.dot(&(&self.all.prior * nuisance)) * variance;
-            let spread = own.spread * blocks / (blocks - 1.0).max(1.0) + of_prior;
-            Some((spread / (own.information * variance), blocks - 1.0))
+            let spread = own.spread * own.shares.widening() + of_prior;
+            Some((
+                spread / (own.information * variance),
+                own.shares.blocks() - 1.0,
+            ))
         });
         widths.collect()
     }
@@ -82,8 +80,7 @@ impl Fits {
             value: value[0],
             information: self.information(column),
             spread: 0.0,
-            shares: 0.0,
-            squares: 0.0,
+            shares: Shares::default(),
         })
     }
 }

@@ -16,6 +16,7 @@ use std::sync::Arc;
 use crate::causes::changing_effect::{Changing, Inner, Way};
 use crate::error::CloseError;
 use crate::figures::{self, Followed};
+use crate::gaps::longest_step;
 use crate::search::empirical::{Empirical, Variable, flux_of, range};
 use crate::search::selection::{FAMILY_ALPHA, Judgement, columns_of, costs, each};
 use crate::search::{Fitted, Found, borrowed, fit};
@@ -34,9 +35,8 @@ const MOST_STARS: usize = 64;
 const MOST_OF_OWN_SIZE: usize = 24;
 /// Chance beyond which stars differ by more than a line through them.
 const BESIDE_A_LINE: f64 = 1e-4;
-/// Share of a rate by which a steady one may change, and steps beyond which frames lie across a hole.
+/// Share of a rate by which a steady one may change.
 const UNSTEADY: f64 = 0.1;
-const HOLE_STEPS: f64 = 1.5;
 /// Spread of a motion's size over its mean below which it is steady: such a size is nothing beside what it multiplies.
 const STEADY: f64 = 0.25;
 /// What may yield to an acceleration, s^2: a swing of 0.16 Hz.
@@ -432,8 +432,9 @@ pub(crate) fn terms(
     }
     // charge is held back in proportion to it, the more the farther it is moved
     terms.extend(position.iter().filter_map(|of| two(of, &flux)));
-    for by in position.iter().chain([&time, &mag, &colour]) {
-        terms.extend(two(&rate, by).filter(|_| moves));
+    if moves {
+        let by = position.iter().chain([&time, &mag, &colour]);
+        terms.extend(by.filter_map(|by| two(&rate, by)));
     }
     for of in [&mag, &colour] {
         terms.extend(
@@ -448,11 +449,11 @@ pub(crate) fn terms(
 
 /// Whether the rotation from one frame to the next is the same all the time, but for [`UNSTEADY`] of it.
 fn turns_steadily(data: &StarData) -> bool {
-    let step_s = median_step(&data.frames.t_s).unwrap_or(f64::INFINITY);
+    let longest_s = longest_step(&data.frames.t_s);
     let t_s = data.frames.t_s.windows(2).map(|t| t[1] - t[0]);
     let steps = data.attitude.windows(2).zip(t_s);
     let rates: Vec<Vector3<f64>> = steps
-        .filter(|(_, dt)| *dt > 0.0 && *dt < HOLE_STEPS * step_s)
+        .filter(|(_, dt)| *dt > 0.0 && *dt < longest_s)
         .map(|(q, dt)| focal_plane::rotation_vector(&q[1], &q[0]) / dt)
         .collect();
     let count = rates.len().max(1) as f64;

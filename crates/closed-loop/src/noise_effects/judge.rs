@@ -58,7 +58,6 @@ const AGREEING: f64 = 4.0;
 const LEAST_SPREAD: f64 = 0.5;
 /// Sigmas beyond what passes for nothing that the estimate from differences has to show.
 const SEEN_QUICK: f64 = 2.0;
-const NOT_QUICK: &str = "what changes from one row of a star to the next does not show it";
 /// Rounds of rows (whose rotation is weighed by the noise) and fit.
 const ROUNDS: usize = 2;
 
@@ -106,7 +105,7 @@ impl Judged {
         }
         Self {
             stands: false,
-            against: Some(NOT_QUICK),
+            against: Some("what changes from one row of a star to the next does not show it"),
             ..self
         }
     }

@@ -354,6 +354,22 @@ fn what_hides_behind_another_is_told_alone() {
     }
 }
 
+/// Noise of ten times the usual in 25 of 500 frames: spikes where they lie apart, and none in a stretch.
+#[test]
+fn what_stands_out_row_after_row_is_no_spike() {
+    let loud = |yes: bool| if yes { 25.0 } else { 0.0 };
+    let apart = moving(7, |_| 0.0, |k| loud(k % 20 == 9)).outliers;
+    assert!(apart.stands, "{apart:?}");
+    let together = moving(7, |_| 0.0, |k| loud((200..225).contains(&k))).outliers;
+    assert!(!together.stands, "{together:?}");
+    assert!(
+        together
+            .against
+            .is_some_and(|why| why.contains("after the other")),
+        "{together:?}"
+    );
+}
+
 /// 14 stars in 500 frames at this rate, deg/s, with noise of 2.5 arcsec and of `more` beside it.
 fn moving(seed: u64, rate: impl Fn(usize) -> f64, more: impl Fn(usize) -> f64) -> Verdicts {
     let folds = Folds::cut(500);

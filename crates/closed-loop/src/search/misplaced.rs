@@ -11,20 +11,17 @@ use crate::search::selection::Group;
 /// The effect on a single star.
 pub(crate) const MISPLACED: &str = "catalogue_position";
 /// So many are believed in any case, and one of so many stars.
-const MOST: usize = 2;
-const ONE_OF: usize = 20;
+const MOST: f64 = 2.0;
+const ONE_OF: f64 = 20.0;
 
-/// How many of so many stars a catalogue may misplace.
-pub(crate) fn most_misplaced(stars: usize) -> usize {
-    MOST.max(stars / ONE_OF)
+/// Whether more of so many `stars` are misplaced among `chosen` than a catalogue misplaces.
+pub(crate) fn piled(groups: &[Group], chosen: &[usize], stars: f64) -> bool {
+    let count = chosen.iter().filter(|&&g| groups[g].kind == MISPLACED);
+    count.count() as f64 > (stars / ONE_OF).max(MOST)
 }
 
-/// Whether more are misplaced among `chosen`; a group may stand for several stars that were not tried.
-pub(super) fn piled(groups: &[Group], chosen: &[usize]) -> bool {
-    let misplaced = |g: &Group| g.kind == MISPLACED;
-    let stars: f64 = (groups.iter().filter(|g| misplaced(g)))
-        .map(|g| g.stands_for)
-        .sum();
-    let count = chosen.iter().filter(|&&g| misplaced(&groups[g])).count();
-    count as f64 > (stars / ONE_OF as f64).max(MOST as f64)
+/// Stars that the groups stand for: one may for several that were not tried.
+pub(super) fn stars_of(groups: &[Group]) -> f64 {
+    let misplaced = groups.iter().filter(|g| g.kind == MISPLACED);
+    misplaced.map(|g| g.stands_for).sum()
 }

@@ -42,6 +42,8 @@ use std::ops::Range;
 use block_regression::{Fits, OutOfFold};
 use rayon::prelude::*;
 
+use super::misplaced::{piled, stars_of};
+
 /// Chance that a bundle which follows its model gets any effect at all.
 pub(crate) const FAMILY_ALPHA: f64 = 0.01;
 /// The ratio statistic of a noise model that is only nearly right runs this much
@@ -186,6 +188,7 @@ impl Trials<'_> {
         // not return, so the search ends.
         let mut may = may.to_vec();
         let mut exchanges = EXCHANGES;
+        let stars = stars_of(self.groups);
         loop {
             let tried = self.tried(&may, &chosen);
             let added = match tried.iter().find(|t| t.judgement.stands()) {
@@ -195,7 +198,7 @@ impl Trials<'_> {
             if !added.is_empty() {
                 chosen.extend(added);
                 self.prune(&mut chosen, &mut may);
-                if super::misplaced::piled(self.groups, &chosen) {
+                if piled(self.groups, &chosen, stars) {
                     break;
                 }
                 continue;

@@ -4,6 +4,7 @@
 //! Not physics: the order of the report.
 
 use block_regression::Folds;
+use effects::Candidate;
 use nalgebra::DVector;
 use spectra::robust::median_step;
 use star_images::Formed;
@@ -80,26 +81,26 @@ impl Finish<'_> {
             false => fits.estimate(&set).ok_or(CloseError::Singular)?.value,
         };
         let count = self.folds.count;
-        let whole = Amplitudes {
-            nuisance: vec![fits.nuisance(None, &set, &beta); count],
-            candidates: vec![only.spread(&beta); count],
-        };
-        let mut light = whole.clone();
-        let mut first = 0;
-        for candidate in &only.candidates {
-            let own = candidate.coefficients().len();
-            if !candidate.moves_light() {
-                let still = light.candidates.iter_mut();
-                still.for_each(|c| c.rows_mut(first, own).fill(0.0));
+        let nuisance = fits.nuisance(None, &set, &beta);
+        let with = |acts: fn(&dyn Candidate) -> bool| {
+            let mut amplitudes = only.spread(&beta);
+            let mut first = 0;
+            for candidate in &only.candidates {
+                let own = candidate.coefficients().len();
+                if !acts(*candidate) {
+                    amplitudes.rows_mut(first, own).fill(0.0);
+                }
+                first += own;
             }
-            first += own;
-        }
-        let mut fitted = whole.clone();
-        for candidate in &mut fitted.candidates {
-            candidate.fill(0.0);
-        }
-        let each = [&fitted, &light, &whole];
-        let each = self.level.residuals_of(self.folds, &only.candidates, each);
+            Amplitudes {
+                nuisance: vec![nuisance.clone(); count],
+                candidates: vec![amplitudes; count],
+            }
+        };
+        let each = [with(|_| false), with(|c| c.moves_light()), with(|_| true)];
+        let each = self
+            .level
+            .residuals_of(self.folds, &only.candidates, each.each_ref());
         let [fitted, light, whole] = each.map(|r| r.modelled);
         Ok(Shifts {
             fitted,

@@ -4,13 +4,8 @@ use nalgebra::Vector3;
 use telemetry::report::{Report, Verdict};
 use telemetry::{EffectEntry, EffectValue};
 
-use crate::kit::closed;
-use crate::snapshots::{Lens, taken};
-
-fn report(seed: u64, frames: usize, lens: Lens) -> Report {
-    let (model, bundle) = taken(seed, frames, lens);
-    closed(&model, &bundle).expect("the loop closes").report
-}
+use crate::kit::{closed, named};
+use crate::snapshots::{Lens, arcsec, pictures, taken};
 
 /// A wide field: some forty stars of 150 in 80 deg.
 fn wide(k1: f64) -> Lens {
@@ -20,11 +15,6 @@ fn wide(k1: f64) -> Lens {
         stars: 300,
         ..Lens::default()
     }
-}
-
-/// Names of the effects.
-fn named(report: &Report) -> Vec<&str> {
-    report.effects.iter().map(|e| e.id.as_str()).collect()
 }
 
 /// Chi-squared per degree of freedom scatters by `sqrt(2/n)` of n numbers, two a row less three a frame.
@@ -46,7 +36,7 @@ fn stars_taken_for_others_leave_no_trace() {
         off_px: 500.0,
         ..Lens::default()
     };
-    let report = report(5, 30, lens);
+    let report = pictures(5, 30, lens);
     assert_eq!(named(&report), Vec::<&str>::new());
     assert!(report.rows.outliers > 10, "{:?}", report.rows);
     is_noise(report.before.chi2_per_dof, &report, 30);
@@ -89,7 +79,7 @@ fn a_wave_in_pixel_phase_does_not_move_the_light() {
         phase_px: 0.12,
         ..Lens::default()
     };
-    let report = report(8, 60, lens);
+    let report = pictures(8, 60, lens);
     assert_eq!(named(&report), ["pixel_phase_harmonics"]);
     let found = &report.effects[0].parameters;
     let names: Vec<&str> = found.keys().map(String::as_str).collect();
@@ -100,7 +90,7 @@ fn a_wave_in_pixel_phase_does_not_move_the_light() {
         "y1_phase_rad",
     ];
     assert_eq!(names, first);
-    let truth = 0.12 * 10.0_f64.to_radians().tan() / 512.0 * 206_264.8;
+    let truth = arcsec(0.12);
     for name in ["x1_amplitude_arcsec", "y1_amplitude_arcsec"] {
         let z = (found[name].value - truth) / found[name].sigma.expect("a sigma");
         assert!(z.abs() < 4.0, "{name}: {z} sigma");
@@ -117,7 +107,7 @@ fn a_steady_velocity_is_told_by_the_scales() {
         velocity_m_s: truth,
         ..Lens::default()
     };
-    let report = report(9, 60, lens);
+    let report = pictures(9, 60, lens);
     assert_eq!(named(&report), ["velocity_aberration"]);
     let speed = &report.effects[0].parameters["speed_m_s"];
     let z = (speed.value - truth.norm()) / speed.sigma.expect("a sigma");

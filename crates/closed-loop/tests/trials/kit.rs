@@ -229,6 +229,11 @@ pub(crate) fn closed(model: &Model, bundle: &Bundle) -> Result<Closed, CloseErro
     close(model, bundle, &|_| {})
 }
 
+/// Names of the effects, in the order added.
+pub(crate) fn named(report: &Report) -> Vec<&str> {
+    report.effects.iter().map(|e| e.id.as_str()).collect()
+}
+
 /// Sum of the mean squares over both axes, arcsec^2.
 pub(crate) fn power(rms: Option<[f64; 2]>) -> f64 {
     rms.map_or(f64::NAN, |[x, y]| x * x + y * y)

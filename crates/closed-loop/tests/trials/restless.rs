@@ -3,17 +3,13 @@
 
 use telemetry::report::Report;
 
-use crate::kit::{Case, Path, reported};
+use crate::kit::{Case, Path, named, reported};
 
 /// Stars of 0.1 arcsec per axis, without any error of the lens, beside 0.5 arcsec over `tau_s`.
 fn report(case: Case, tau_s: f64) -> Report {
     let tau = format!("wander_tau_s = [{tau_s:?}, {tau_s:?}, {tau_s:?}]");
     let case = case.reference(&format!("wander_arcsec = [0.5, 0.5, 0.5]\n{tau}"));
     reported(&case.quiet(0.14))
-}
-
-fn named(report: &Report) -> Vec<&str> {
-    report.effects.iter().map(|e| e.id.as_str()).collect()
 }
 
 /// In 2600 frames a growth by 0.8 degrees of the optics is known to 0.035 ppm/degC. In bins of three frames the

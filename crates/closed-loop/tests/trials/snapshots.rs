@@ -8,7 +8,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use telemetry::report::{Report, Verdict};
 use telemetry::{Bundle, Model};
 
-use crate::kit::{Case, Path, closed};
+use crate::kit::{Case, Path, closed, named};
 
 /// Noise of a centroid on each axis, px; the model declares it.
 const NOISE_PX: f64 = 0.074;
@@ -48,8 +48,13 @@ impl Default for Lens {
     }
 }
 
+/// So many pixels of the camera of 20 deg, arcsec.
+pub(crate) fn arcsec(px: f64) -> f64 {
+    px * 10.0_f64.to_radians().tan() / 512.0 * 206_264.8
+}
+
 /// Closes the loop on `frames` pictures of about thirty stars each.
-fn pictures(seed: u64, frames: usize, lens: Lens) -> Report {
+pub(crate) fn pictures(seed: u64, frames: usize, lens: Lens) -> Report {
     let (model, bundle) = taken(seed, frames, lens);
     closed(&model, &bundle).expect("the loop closes").report
 }
@@ -179,11 +184,11 @@ fn pixel_phase_is_that_of_where_a_lens_takes_the_light() {
     };
     let report = pictures(3, 60, lens);
     assert_eq!(report.verdict, Verdict::Explained);
-    let ids: Vec<&str> = report.effects.iter().map(|e| e.id.as_str()).collect();
+    let ids = named(&report);
     assert_eq!(ids, ["optical_distortion", "pixel_phase_harmonics"]);
     let lens_terms: Vec<&String> = report.effects[0].parameters.keys().collect();
     assert_eq!(lens_terms, ["k1"]);
-    let arcsec = 0.05 * 10.0_f64.to_radians().tan() / 512.0 * 206_264.8;
+    let arcsec = arcsec(0.05);
     for (effect, name, truth) in [
         (0, "k1", lens.k1),
         (1, "x1_amplitude_arcsec", arcsec),
@@ -208,7 +213,7 @@ fn mistaken_stars_neither_hide_nor_pull_their_frames_along() {
         ..Lens::default()
     };
     let report = pictures(11, 20, lens);
-    let ids: Vec<&str> = report.effects.iter().map(|e| e.id.as_str()).collect();
+    let ids = named(&report);
     assert_eq!(ids, ["optical_distortion"]);
     let good = Lens {
         mistaken: lens.mistaken,

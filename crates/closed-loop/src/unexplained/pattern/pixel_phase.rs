@@ -16,7 +16,7 @@
 
 use std::ops::Range;
 
-use block_regression::add_products;
+use block_regression::{add_products, mirror_lower};
 use nalgebra::{DMatrix, MatrixXx2, RowDVector};
 use pulp::Arch;
 use rayon::prelude::*;
@@ -130,7 +130,7 @@ impl Field {
         let stars = sums.into_iter().zip(&self.stars).zip(&self.weight);
         stars
             .map(|((mut sum, rows), weight)| {
-                sum.fill_upper_triangle_with_lower_triangle();
+                mirror_lower(&mut sum);
                 let mean = sum.row(n + 2).columns(0, n) / rows.len() as f64;
                 let normal = sum.view((0, 0), (n, n)) - mean.tr_mul(&mean) * rows.len() as f64;
                 let of_axes = sum.row(n + 2).columns(n, 2).into_owned();
