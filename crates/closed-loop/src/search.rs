@@ -79,18 +79,44 @@ impl Fitted {
         candidates: &[&dyn Candidate],
         chosen: &[usize],
     ) -> Result<Self, CloseError> {
+        let quieter = self.quieter(folds, candidates, chosen)?;
+        Ok(quieter.unwrap_or(self))
+    }
+
+    /// As [`beside`](Self::beside); `None` where the noise is not much less.
+    fn quieter(
+        &self,
+        folds: &Folds,
+        candidates: &[&dyn Candidate],
+        chosen: &[usize],
+    ) -> Result<Option<Self>, CloseError> {
         let left = self.variance_beside(chosen);
         let Some(variance) = left.filter(|v| *v > 0.0 && LOUDER * v < self.variance) else {
-            return Ok(self);
+            return Ok(None);
         };
         let fits = self.fits.reweighed(folds, variance);
         let fits = fits.ok_or(CloseError::Singular)?;
-        Ok(Self {
+        Ok(Some(Self {
             groups: grouped(&fits, candidates),
             fits,
             variance,
-            ..self
-        })
+            ..*self
+        }))
+    }
+
+    /// Selects, and again where what was chosen leaves much less noise than the priors were weighed against: on other
+    /// fits then.
+    pub(crate) fn selected(
+        &self,
+        folds: &Folds,
+        candidates: &[Arc<dyn Candidate>],
+        may: &[bool],
+    ) -> Result<(Selection, Option<Self>), CloseError> {
+        let select = |f: &Self| f.trials(&costs(&f.groups, may)).select(may);
+        let selection = select(self);
+        let quieter = self.quieter(folds, &borrowed(candidates), &selection.chosen)?;
+        let selection = quieter.as_ref().map_or(selection, select);
+        Ok((selection, quieter))
     }
 }
 
@@ -299,7 +325,8 @@ pub(crate) fn search(
             Some(fitted) => fitted,
             None => fit(evidence, folds, &borrowed(&candidates))?,
         };
-        let (fitted, selection) = chosen_from(fitted, folds, &candidates, may)?;
+        let (selection, quieter) = fitted.selected(folds, &candidates, may)?;
+        let fitted = quieter.unwrap_or(fitted);
         let settled = selection.chosen == before || round == ROUNDS;
         if selection.chosen.is_empty() || settled {
             return Ok(Found {
@@ -319,22 +346,6 @@ pub(crate) fn search(
         before.clone_from(&selection.chosen);
     }
     Err(CloseError::Singular)
-}
-
-/// Selects, and again where what was chosen leaves much less noise than the priors were weighed against.
-fn chosen_from(
-    fitted: Fitted,
-    folds: &Folds,
-    candidates: &[Arc<dyn Candidate>],
-    may: &[bool],
-) -> Result<(Fitted, Selection), CloseError> {
-    let select = |f: &Fitted| f.trials(&costs(&f.groups, may)).select(may);
-    let selection = select(&fitted);
-    let loud = fitted.variance;
-    let fitted = fitted.beside(folds, &borrowed(candidates), &selection.chosen)?;
-    let again = fitted.variance < loud;
-    let selection = if again { select(&fitted) } else { selection };
-    Ok((fitted, selection))
 }
 
 /// The same with the parts of one effect that were chosen as one, in the place of the first of them.

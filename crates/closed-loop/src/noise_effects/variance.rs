@@ -52,6 +52,10 @@ const FARTHEST: f64 = 3.0;
 /// Nats that a round gains at the summit, and that one more would, as the curvature has it.
 const CONVERGED: f64 = 1e-4;
 const NEXT_TO_NOTHING: f64 = 1e-5;
+/// The same of a fit without one of the folds, whose start lies a fraction of a sigma away: what the curvature has it
+/// that a round gains is true but for a tenth or so of itself, and of a gain over all folds a hundredth of a nat says
+/// nothing.
+const FOLDS_NOTHING: f64 = 3e-3;
 /// Pairs of parameters, each with itself too.
 const PAIRS: usize = PARAMETERS * (PARAMETERS + 1) / 2;
 
@@ -231,10 +235,11 @@ impl Model {
         of: &(dyn Fn(&Row) -> bool + Sync),
     ) -> Fit {
         let sums = self.sums(start, rows, of);
-        self.climb(sums, rows, start, free, of)
+        self.climb(sums, rows, start, free, of, NEXT_TO_NOTHING)
     }
 
-    /// As [`fit`](Self::fit), where the `sums` at the start are known.
+    /// As [`fit`](Self::fit), where the `sums` at the start are known; a last round that gains `nothing` nats, as the
+    /// curvature has it, is believed and not looked at.
     fn climb(
         &self,
         sums: Sums,
@@ -242,6 +247,7 @@ impl Model {
         start: &Vector,
         free: [bool; PARAMETERS],
         of: &(dyn Fn(&Row) -> bool + Sync),
+        nothing: f64,
     ) -> Fit {
         let mut at = *start;
         let Sums {
@@ -268,10 +274,12 @@ impl Model {
                 break;
             };
             let step = factor.solve(&slope);
-            if 0.5 * slope.dot(&step) < NEXT_TO_NOTHING && damping < 1e-2 {
+            let next = self.bounded(&(at + shortened(step)));
+            let gains = 0.5 * slope.dot(&step);
+            if gains < nothing && damping < 1e-2 {
+                (at, value) = (next, value + gains);
                 break;
             }
-            let next = self.bounded(&(at + shortened(step)));
             let there = self.sums(&next, rows, of);
             if there.value >= value {
                 let gained = there.value - value;
@@ -315,7 +323,8 @@ impl Model {
         (0..folds.count).map(move |f| {
             let others = own.iter().enumerate().filter(|(k, _)| *k != f);
             let others = others.fold(Sums::default(), |all, (_, own)| all.add(own));
-            let others = self.climb(others, rows, &start.at, start.free, &|r| fold(r) != f);
+            let of: &(dyn Fn(&Row) -> bool + Sync) = &|r| fold(r) != f;
+            let others = self.climb(others, rows, &start.at, start.free, of, FOLDS_NOTHING);
             Without {
                 others,
                 outer: own[f].outer,
@@ -496,6 +505,9 @@ struct Density {
     exponent: f64,
     factor: f64,
     posterior: [f64; 3],
+    /// One over the variance of each, and what a spike adds to it as the row's square shows it.
+    inverse: [f64; 3],
+    more: f64,
 }
 
 impl There {
@@ -508,38 +520,45 @@ impl There {
         (self.at[LEVEL] + PER_MAG * self.at[MAGNITUDE] * mag).exp()
     }
 
-    /// What spikes add to the variance of a row as its square shows it.
-    fn more(&self, row: &Row) -> [f64; 3] {
-        self.more.map(|more| more * row.shows)
-    }
-
     /// The density where `v` is the variance without a spike.
     fn density(&self, row: &Row, v: f64) -> Density {
         let half = 0.5 * row.square;
-        let more = self.more(row);
-        let most = (1..3)
-            .filter(|&k| self.share[k] > 0.0)
-            .fold(0.0_f64, |most, k| most.max(more[k]));
+        let mut most = 0.0_f64;
+        let mut more = [0.0; 3];
+        for k in self.spikes() {
+            more[k] = self.more[k] * row.shows;
+            most = most.max(more[k]);
+        }
         // relative to the widest component, which no square makes impossible
-        let exponent = -half / (v + most);
-        let parts: [f64; 3] = std::array::from_fn(|k| {
-            if self.share[k] <= 0.0 {
-                return 0.0;
-            }
-            let inverse = 1.0 / (v + more[k]);
-            let relative = if more[k] < most {
-                (-half * inverse - exponent).exp()
+        let widest = 1.0 / (v + most);
+        let exponent = -half * widest;
+        let mut inverse = [0.0; 3];
+        let mut parts = [0.0; 3];
+        for k in core::iter::once(0).chain(self.spikes()) {
+            let (own, relative) = if more[k] < most {
+                let own = 1.0 / (v + more[k]);
+                (own, (-half * own - exponent).exp())
             } else {
-                1.0
+                (widest, 1.0)
             };
-            self.share[k] * inverse * relative
-        });
-        let factor: f64 = parts.iter().sum();
+            inverse[k] = own;
+            parts[k] = self.share[k] * own * relative;
+        }
+        let factor = parts[0] + parts[1] + parts[2];
+        let per_factor = 1.0 / factor;
         Density {
             exponent,
             factor,
-            posterior: parts.map(|p| p / factor),
+            posterior: parts.map(|p| p * per_factor),
+            inverse,
+            more: more[1],
         }
+    }
+
+    /// Components of spikes that there are.
+    fn spikes(&self) -> impl Iterator<Item = usize> + use<> {
+        let share = self.share;
+        (1..3).filter(move |&k| share[k] > 0.0)
     }
 
     /// The density of a row, and the slope of its logarithm; `own` is what grows with the level of its
@@ -547,23 +566,19 @@ impl There {
     fn row(&self, row: &Row, own: f64) -> (Density, Vector) {
         let v = own + self.at[RATE] * row.rate;
         let density = self.density(row, v);
-        let more = self.more(row);
-        let posterior = &density.posterior;
-        let slope = |k: usize| {
-            let v = v + more[k];
-            posterior[k] * (0.5 * row.square / v - 1.0) / v
-        };
+        let half = 0.5 * row.square;
+        let (posterior, inverse) = (&density.posterior, &density.inverse);
+        let slope = |k: usize| posterior[k] * (half * inverse[k] - 1.0) * inverse[k];
         let spike = slope(1);
         let all = slope(0) + spike + slope(2);
-        let rho = self.share[1];
-        let rest = self.share[0].max(NO_SHARE);
-        let share = posterior[1] * (1.0 - rho) - posterior[0] * rho * (1.0 - rho) / rest;
+        let [rest, rho, _] = self.share;
+        let share = (posterior[1] - posterior[0] * rho / rest.max(NO_SHARE)) * (1.0 - rho);
         let gradient = Vector::from([
             all * own,
             all * own * PER_MAG * row.mag,
             all * row.rate,
             share,
-            spike * more[1],
+            spike * density.more,
         ]);
         (density, gradient)
     }

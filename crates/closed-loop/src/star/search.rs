@@ -31,28 +31,28 @@
 
 use std::sync::Arc;
 
-use block_regression::{Estimate, Fits, Folds, Layout};
-use coloured_noise::{CommonNoise, Rotations, SlowGains};
+use block_regression::Folds;
+use coloured_noise::{CommonNoise, Rotations};
 use effects::Candidate;
-use nalgebra::DMatrix;
 use rayon::prelude::*;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use crate::error::CloseError;
 use crate::evidence::Evidence;
-use crate::search::selection::{
-    FAMILY_ALPHA, Group, Judgement, SLOW_PRICE, Selection, WIDENING, columns_of, costs, price,
-};
+use crate::search::selection::{FAMILY_ALPHA, SLOW_PRICE, Selection, WIDENING, costs, price};
 use crate::search::{Fitted, Found, borrowed, fit_grams, polish, search};
 use crate::star::evidence::StarEvidence;
 use crate::star::moments::StarMoments;
+use trial::{Trial, paid_by_slow};
+
+mod trial;
 
 /// Candidates of each list that are scored.
 const SHORTLIST: usize = 3;
-/// Rounds of generalised least squares and noise fit.
-const ALTERNATIONS: usize = 2;
-/// What slow errors pay beside that if they are not the same about X and Y, nats: every other one is so.
-const APART: f64 = std::f64::consts::LN_2;
+/// Nats by which effects have to be worth more than a slow error in their place, for it not to be gone into; and the
+/// chance of what is slow beside them.
+const BY_FAR: f64 = 10.0;
+const TRACE: f64 = 0.05;
 /// Most effects that are added.
 const MOST: usize = 8;
 /// Parts of a long run of which one is searched before the whole is.
@@ -99,7 +99,10 @@ pub(crate) fn attempt<'a>(
         white: begun,
         moments,
         worth,
-    } = coloured(white, folds, candidates, may, start)?;
+    } = match explored(white, folds, candidates, may, start)? {
+        Explored::White(found) => return Ok((Searched::plain(found), Vec::new())),
+        Explored::Coloured(coloured) => *coloured,
+    };
     // from the forms that were polished beside the slow error: nearly those that suit white noise
     let candidates = searched.found.candidates.clone();
     let found = search(white, folds, candidates, may, begun)?;
@@ -148,7 +151,10 @@ fn prepared(
     let part = coarse.thinned(PARTS);
     let found = match start {
         Some(start) => {
-            coloured(white, &part, candidates.clone(), may, start).map(|c| c.searched.found)
+            explored(white, &part, candidates.clone(), may, start).map(|explored| match explored {
+                Explored::White(found) => found,
+                Explored::Coloured(coloured) => coloured.searched.found,
+            })
         }
         None => search(white, &part, candidates.clone(), may, None),
     };
@@ -251,195 +257,6 @@ pub(crate) fn declared_noise(
     Ok(noise.filter(|n| n.reference.iter().any(|r| r.slow > 0.0)))
 }
 
-/// A hypothesis at its best noise.
-#[derive(Clone, Debug)]
-struct Scored {
-    noise: CommonNoise,
-    rotations: Rotations,
-    loglik: f64,
-    out_of_fold: f64,
-    estimate: Estimate,
-    parts: Vec<Part>,
-}
-
-/// A candidate within an estimate.
-#[derive(Clone, Debug)]
-struct Part {
-    columns: std::ops::Range<usize>,
-    /// Parameters that its columns follow non-linearly.
-    shapes: usize,
-    /// What its p-value is multiplied by.
-    cost: f64,
-    /// Its sizes are such as nature makes.
-    credible: bool,
-}
-
-/// What scores hypotheses: everything comes from one pass over the data.
-struct Trial<'a> {
-    moments: &'a StarMoments,
-    folds: &'a Folds,
-    /// Of the nuisance.
-    precision: DMatrix<f64>,
-    /// Of a scalar of white evidence.
-    variance: f64,
-    groups: &'a [Group],
-    /// What the p-value of each group is multiplied by.
-    cost: Vec<f64>,
-    /// Fits of all groups: what their scatter says of the noise.
-    all: Option<&'a Fits>,
-}
-
-impl Trial<'_> {
-    /// Nuisance, the columns of `chosen`, and the residual.
-    fn columns(&self, chosen: &[usize]) -> Vec<usize> {
-        let n = self.precision.nrows();
-        (0..n)
-            .chain(columns_of(self.groups, chosen).into_iter().map(|c| n + c))
-            .chain([self.moments.width() - 1])
-            .collect()
-    }
-
-    fn layout(&self, columns: &[usize]) -> Layout {
-        Layout {
-            nuisance_precision: self.precision.clone(),
-            candidates: columns.len() - self.precision.nrows() - 1,
-            residuals: 1,
-        }
-    }
-
-    /// Noise of what is left once white evidence has fitted all of `columns`.
-    fn taken_out(&self, columns: &[usize]) -> Option<CommonNoise> {
-        let grams = self.moments.white_in_all(columns);
-        let layout = self.layout(columns);
-        let fits = Fits::whole(&grams, &layout, self.variance)?;
-        let all: Vec<usize> = (0..layout.candidates).collect();
-        let solution = fits.solution(&all)?;
-        let rotations = self.moments.rotations(columns, &solution, solution.len())?;
-        Some(rotations.noise(None))
-    }
-
-    /// `chosen` at the better of two starts: all that fits taken out, or `noise`.
-    fn score(&self, chosen: &[usize], noise: &CommonNoise) -> Option<Scored> {
-        let columns = self.columns(chosen);
-        self.moments.sum_up();
-        let (out, given) = rayon::join(
-            || self.climb(&columns, &self.taken_out(&columns)?),
-            || self.climb(&columns, noise),
-        );
-        let (noise, rotations, loglik) = [out, given]
-            .into_iter()
-            .flatten()
-            .max_by(|a, b| a.2.total_cmp(&b.2))?;
-        let layout = self.layout(&columns);
-        let grams = self.moments.under(&columns, &noise);
-        let mut fits = Fits::new(&grams, self.folds, &layout, 1.0)?;
-        if let Some(all) = self.all {
-            fits.scatter_as(all);
-        }
-        let all: Vec<usize> = (0..layout.candidates).collect();
-        let estimate = fits.estimate(&all)?;
-        let mut first = 0;
-        let parts = chosen
-            .iter()
-            .map(|&g| {
-                let group = &self.groups[g];
-                let own = first..first + group.columns.len();
-                first = own.end;
-                let credible = own
-                    .clone()
-                    .zip(&group.bounds)
-                    .all(|(i, [low, high])| (*low..=*high).contains(&estimate.value[i]));
-                Part {
-                    columns: own,
-                    shapes: group.shapes,
-                    cost: self.cost[g],
-                    credible,
-                }
-            })
-            .collect();
-        Some(Scored {
-            noise,
-            rotations,
-            loglik,
-            out_of_fold: fits.out_of_fold(&all)?.total_loglik() + grams.log_scale,
-            estimate,
-            parts,
-        })
-    }
-
-    /// Noise, rotations and log-likelihood of the fit of `columns`, from `start` uphill.
-    fn climb(
-        &self,
-        columns: &[usize],
-        start: &CommonNoise,
-    ) -> Option<(CommonNoise, Rotations, f64)> {
-        let layout = self.layout(columns);
-        let all: Vec<usize> = (0..layout.candidates).collect();
-        let mut noise = *start;
-        for round in 0..=ALTERNATIONS {
-            let grams = self.moments.under_in_all(columns, &noise);
-            let fits = Fits::whole(&grams, &layout, 1.0)?;
-            let solution = fits.solution(&all)?;
-            let rotations = self.moments.rotations(columns, &solution, solution.len())?;
-            let better = rotations.noise(Some(&noise));
-            if round < ALTERNATIONS && !better.is_like(&noise) {
-                noise = better;
-                continue;
-            }
-            return Some((noise, rotations, fits.log_marginal(&all)? + grams.log_scale));
-        }
-        None
-    }
-
-    /// Log-likelihood less what the freedom of a hypothesis buys where nothing acts:
-    /// for amplitudes the evidence under the spread that suits them best, for a slow
-    /// error of an axis `slow_price`, or its absence where that costs less.
-    fn worth(&self, scored: &Scored, slow_price: f64) -> f64 {
-        let slow = scored.rotations.slow_gains(&scored.noise);
-        let without = paid_by_slow(&slow, slow_price);
-        let effects: f64 = scored
-            .parts
-            .iter()
-            .map(|part| {
-                let which: Vec<usize> = part.columns.clone().collect();
-                let shapes = part.shapes;
-                let square = scored.estimate.square(&which).unwrap_or(0.0);
-                // what is scanned is fitted too
-                let k = (which.len() + shapes) as f64;
-                part.cost.ln() + 0.5 * k * (1.0 + (square / k.max(1.0)).max(1.0).ln())
-            })
-            .sum();
-        scored.loglik - without - effects
-    }
-
-    /// What the last of the candidates of `with` adds to `without`.
-    fn judge(&self, with: &Scored, at: usize, without: &Scored, choices: usize) -> Judgement {
-        let Part {
-            columns, credible, ..
-        } = &with.parts[at];
-        let freedom = columns.len() + choices;
-        let ratio = 2.0 * (with.loglik - without.loglik) / WIDENING;
-        let likely = ChiSquared::new(freedom as f64).map_or(1.0, |law| law.sf(ratio.max(0.0)));
-        let which: Vec<usize> = columns.clone().collect();
-        let p = likely.max(with.estimate.p_value(&which));
-        Judgement {
-            delta_loglik: with.out_of_fold - without.out_of_fold,
-            p_value: (p * with.parts[at].cost).min(1.0),
-            credible: *credible,
-            observable: !columns.is_empty(),
-        }
-    }
-}
-
-/// What slow errors pay of what they gain, `price` each, or all of it where that costs less: none across the
-/// boresight, one that is the same about X and Y, or one about each that has one; and that about Z.
-fn paid_by_slow(slow: &SlowGains, price: f64) -> f64 {
-    let paid = slow.axes.map(|gain| gain.min(price));
-    let alike = slow.across - slow.alike + price;
-    let apart = paid[0] + paid[1] + APART;
-    slow.across.min(alike.max(0.0)).min(apart) + paid[2]
-}
-
 /// What the search beside a slow error ends with.
 struct Coloured<'a> {
     searched: Searched<'a>,
@@ -451,19 +268,112 @@ struct Coloured<'a> {
     worth: f64,
 }
 
+/// What a search beside a slow error comes to.
+enum Explored<'a> {
+    /// There is none beside what white evidence finds.
+    White(Found),
+    Coloured(Box<Coloured<'a>>),
+}
+
+/// The search beside a slow error, unless white evidence makes it needless ([`without_slow`]).
+fn explored<'a>(
+    white: &StarEvidence<'a>,
+    folds: &Folds,
+    candidates: Vec<Arc<dyn Candidate>>,
+    may: &[bool],
+    start: CommonNoise,
+) -> Result<Explored<'a>, CloseError> {
+    let moments = white.moments(folds, &borrowed(&candidates));
+    let plain = plainly(white, folds, &candidates, &moments)?;
+    let all = without_slow(white, folds, &candidates, may, start, &moments, &plain)?;
+    if let Some((selection, quieter)) = all {
+        return Ok(Explored::White(Found {
+            candidates,
+            fitted: quieter.unwrap_or(plain),
+            selection,
+        }));
+    }
+    let coloured = coloured(white, folds, candidates, may, start, (moments, plain))?;
+    Ok(Explored::Coloured(Box::new(coloured)))
+}
+
+/// The fits under white noise.
+fn plainly(
+    white: &StarEvidence<'_>,
+    folds: &Folds,
+    candidates: &[Arc<dyn Candidate>],
+    moments: &StarMoments,
+) -> Result<Fitted, CloseError> {
+    let all: Vec<usize> = (0..moments.width()).collect();
+    let grams = moments.white_of(&all);
+    fit_grams(white, &grams, folds, &borrowed(candidates))
+}
+
+/// What white evidence finds, where that is all: nothing of it could be the work of a slow error, beside it there is no
+/// trace of one, and it is likelier by far than such an error alone. What is slow in the declared model's residual is
+/// the effect's then, and hypotheses with noise of their own need not be gone through.
+fn without_slow(
+    white: &StarEvidence<'_>,
+    folds: &Folds,
+    candidates: &[Arc<dyn Candidate>],
+    may: &[bool],
+    start: CommonNoise,
+    moments: &StarMoments,
+    plain: &Fitted,
+) -> Result<Option<(Selection, Option<Fitted>)>, CloseError> {
+    if white.drawn.is_some() {
+        // white evidence is another one then
+        return Ok(None);
+    }
+    let (selection, quieter) = plain.selected(folds, candidates, may)?;
+    let chosen = &selection.chosen;
+    let settled = |g: &usize| {
+        let candidate = &candidates[*g];
+        !candidate.acts_on_attitude() && candidate.nonlinear().is_empty()
+    };
+    if chosen.is_empty() || !chosen.iter().all(settled) {
+        return Ok(None);
+    }
+    let fitted = quieter.as_ref().unwrap_or(plain);
+    if polish(white, folds, &mut candidates.to_vec(), fitted, chosen)? {
+        return Ok(None);
+    }
+    let trial = Trial {
+        moments,
+        folds,
+        precision: white.precision(),
+        variance: fitted.variance_beside(chosen).unwrap_or(1.0),
+        groups: &fitted.groups,
+        cost: costs(&fitted.groups, may),
+        all: None,
+    };
+    moments.sum_up();
+    let (whole, bare) = rayon::join(
+        || trial.score(chosen, &start),
+        || trial.climb(&trial.columns(&[]), &start),
+    );
+    let (Some(whole), Some((noise, rotations, loglik))) = (whole, bare) else {
+        return Ok(None);
+    };
+    let slow_alone = loglik - paid_by_slow(&rotations.slow_gains(&noise), SLOW_PRICE);
+    let by_far = trial.worth(&whole, f64::INFINITY) > slow_alone + BY_FAR;
+    let none = Wander::of(whole.rotations, whole.noise).p_value() > TRACE;
+    Ok((by_far && none).then_some((selection, quieter)))
+}
+
 fn coloured<'a>(
     white: &StarEvidence<'a>,
     folds: &Folds,
     mut candidates: Vec<Arc<dyn Candidate>>,
     may: &[bool],
     start: CommonNoise,
+    (mut moments, plain): (StarMoments, Fitted),
 ) -> Result<Coloured<'a>, CloseError> {
     let mut banned = vec![false; candidates.len()];
     let mut chosen: Vec<usize> = Vec::new();
     let mut noise = start;
-    let mut moments = white.moments(folds, &borrowed(&candidates));
     // fits of the same columns, those under the noise of the last choice
-    let mut known: Option<[Fitted; 2]> = None;
+    let (mut plain_fit, mut filtered_fit) = (Some(plain), None);
     loop {
         let all: Vec<usize> = (0..moments.width()).collect();
         let under = |noise: &CommonNoise| {
@@ -475,13 +385,14 @@ fn coloured<'a>(
             )
         };
         let beside = |fitted: Fitted| fitted.beside(folds, &borrowed(&candidates), &chosen);
-        let [plain, filtered] = match known.take() {
-            Some([plain, filtered]) => [beside(plain)?, filtered],
-            None => {
-                let grams = moments.white_of(&all);
-                let plain = fit_grams(white, &grams, folds, &borrowed(&candidates))?;
-                [beside(plain)?, beside(under(&noise)?)?]
-            }
+        let plain = match plain_fit.take() {
+            Some(plain) => plain,
+            None => plainly(white, folds, &candidates, &moments)?,
+        };
+        let plain = beside(plain)?;
+        let filtered = match filtered_fit.take() {
+            Some(filtered) => filtered,
+            None => beside(under(&noise)?)?,
         };
         let trial = Trial {
             moments: &moments,
@@ -543,7 +454,6 @@ fn coloured<'a>(
             for (&g, judgement) in chosen.iter().zip(stands) {
                 judged[g] = judgement;
             }
-            let ratio = base.rotations.slow_ratio(&noise);
             let worth = trial.worth(&base, SLOW_PRICE);
             return Ok(Coloured {
                 searched: Searched {
@@ -555,13 +465,7 @@ fn coloured<'a>(
                     evidence: Some(white.with_noise(&noise)),
                     wander: None,
                 },
-                wander: Wander {
-                    noise,
-                    alike: base.rotations.alike_ratio(&noise),
-                    rotations: base.rotations,
-                    ratio,
-                    behind: None,
-                },
+                wander: Wander::of(base.rotations, noise),
                 white: white.drawn.is_none().then_some(plain),
                 moments,
                 worth,
@@ -577,12 +481,23 @@ fn coloured<'a>(
             drop((plain, filtered, fitted, moments));
             moments = white.moments(folds, &borrowed(&candidates));
         } else {
-            known = Some([plain, fitted]);
+            (plain_fit, filtered_fit) = (Some(plain), Some(fitted));
         }
     }
 }
 
 impl Wander {
+    /// Of what the `rotations` hold at their best `noise`.
+    fn of(rotations: Rotations, noise: CommonNoise) -> Self {
+        Self {
+            noise,
+            ratio: rotations.slow_ratio(&noise),
+            alike: rotations.alike_ratio(&noise),
+            rotations,
+            behind: None,
+        }
+    }
+
     /// Axes on which the slow error is beyond doubt: by themselves, or X and Y together.
     pub(crate) fn axes(&self) -> [bool; 3] {
         let both = chance(self.alike) < FAMILY_ALPHA;
@@ -604,27 +519,4 @@ impl Wander {
 /// together.
 fn chance(ratio: f64) -> f64 {
     4.0 * ChiSquared::new(2.0).map_or(1.0, |law| law.sf(ratio.max(0.0) / WIDENING))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// What a step about Y alone makes of a slow error (18.6 nats about Y, nothing about X), and a reference that
-    /// wanders about both alike. One about Y alone pays for that as well.
-    #[test]
-    fn a_slow_error_about_one_axis_pays_for_that() {
-        let of = |axes: [f64; 3], across: f64, alike: f64| {
-            let gains = SlowGains {
-                axes,
-                across,
-                alike,
-            };
-            paid_by_slow(&gains, SLOW_PRICE)
-        };
-        assert!((of([0.0, 18.6, 0.0], 18.6, 15.0) - 4.0 - APART).abs() < 1e-12);
-        assert!((of([20.0, 25.0, 0.0], 45.0, 45.0) - 4.0).abs() < 1e-12);
-        // no more than it gains, and the one about Z by itself
-        assert!((of([0.0, 2.0, 30.0], 2.0, 1.0) - 6.0).abs() < 1e-12);
-    }
 }
