@@ -14,6 +14,7 @@
 //! Source: effects.md of the design notes (`magnitude_noise`, `rate_noise`, `outliers`).
 
 mod bursts;
+mod density;
 mod follows;
 mod judge;
 mod levels;

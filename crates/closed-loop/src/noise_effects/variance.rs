@@ -22,8 +22,10 @@
 use block_regression::Folds;
 use coloured_noise::LogProduct;
 use nalgebra::{Cholesky, DMatrix, DVector, SMatrix, SVector};
+use pulp::{Arch, NullaryFnOnce};
 use rayon::prelude::*;
 
+use super::density::{Lanes, Levels, There};
 use super::rows::Row;
 
 /// Parameters: level a, magnitude b, rate w, share rho (logit), size S^2 (log).
@@ -38,9 +40,9 @@ pub(super) type Vector = SVector<f64, PARAMETERS>;
 pub(super) type Matrix = SMatrix<f64, PARAMETERS, PARAMETERS>;
 
 /// 0.4 ln 10: the variance's exponent of a slope and a magnitude.
-const PER_MAG: f64 = 0.921_034_037_197_618_3;
+pub(super) const PER_MAG: f64 = 0.921_034_037_197_618_3;
 /// Share of spikes where there are none.
-const NO_SHARE: f64 = 1e-9;
+pub(super) const NO_SHARE: f64 = 1e-9;
 /// A larger share of rows is not a matter of spikes.
 const MOST_SHARE: f64 = 0.2;
 /// Least size of a spike, sigma of the usual row: smaller is no spike, but noise with tails.
@@ -56,6 +58,8 @@ const NEXT_TO_NOTHING: f64 = 1e-5;
 /// that a round gains is true but for a tenth or so of itself, and of a gain over all folds a hundredth of a nat says
 /// nothing.
 const FOLDS_NOTHING: f64 = 3e-3;
+/// Rows that are looked at side by side.
+const LANES: usize = 8;
 /// Pairs of parameters, each with itself too.
 const PAIRS: usize = PARAMETERS * (PARAMETERS + 1) / 2;
 
@@ -74,6 +78,63 @@ struct Sums {
     value: f64,
     gradient: Vector,
     outer: Matrix,
+}
+
+/// Rows whose sums are formed together.
+struct Piece<'a> {
+    there: &'a There,
+    rows: &'a [Row],
+    of: &'a (dyn Fn(&Row) -> bool + Sync),
+}
+
+impl NullaryFnOnce for Piece<'_> {
+    type Output = Sums;
+
+    /// Inlined, so that it is compiled for the registers of the machine.
+    #[inline(always)]
+    fn call(self) -> Sums {
+        let mut levels = Levels::default();
+        let mut value = [0.0; LANES];
+        let mut product = LogProduct::default();
+        let mut gradient = [[0.0; LANES]; PARAMETERS];
+        let mut outer = [[0.0; LANES]; PAIRS];
+        let mut kept = self.rows.iter().filter(|r| (self.of)(r)).peekable();
+        while kept.peek().is_some() {
+            let mut lanes = Lanes::<LANES>::of_none();
+            let mut filled = 0;
+            for row in kept.by_ref().take(LANES) {
+                lanes.put(filled, row, levels.own(self.there, row));
+                filled += 1;
+            }
+            let density = self.there.densities(&lanes);
+            let slopes = self.there.slopes(&lanes, &density);
+            for factor in &density.factor[..filled] {
+                product.times(*factor);
+            }
+            // lanes without a row have no exponent and no slopes
+            let mut pair = 0;
+            for l in 0..LANES {
+                value[l] += density.exponent[l];
+            }
+            for i in 0..PARAMETERS {
+                for l in 0..LANES {
+                    gradient[i][l] += slopes[i][l];
+                }
+                for j in 0..=i {
+                    for l in 0..LANES {
+                        outer[pair][l] += slopes[i][l] * slopes[j][l];
+                    }
+                    pair += 1;
+                }
+            }
+        }
+        let outer = outer.map(|lanes| lanes.iter().sum::<f64>());
+        Sums {
+            value: value.iter().sum::<f64>() + product.ln(),
+            gradient: gradient.map(|lanes| lanes.iter().sum::<f64>()).into(),
+            outer: Matrix::from_fn(|i, j| outer[i.max(j) * (i.max(j) + 1) / 2 + i.min(j)]),
+        }
+    }
 }
 
 /// `step` without more of share and size than a round moves.
@@ -166,7 +227,9 @@ impl Model {
         let share = sigmoid(at[SHARE]);
         let [declared, s0] = self.declared.unwrap_or([0.0, 0.0]);
         There {
-            at: *at,
+            level: at[LEVEL],
+            slope: PER_MAG * at[MAGNITUDE],
+            rate: at[RATE],
             share: [1.0 - share - declared, share, declared],
             more: [0.0, at[SIZE].exp(), s0],
         }
@@ -176,8 +239,9 @@ impl Model {
     pub(super) fn belief(&self, at: &Vector) -> impl Fn(&Row) -> [f64; 2] + use<> {
         let there = self.there(at);
         move |row| {
-            let v = there.own(row) + there.at[RATE] * row.rate;
-            [v, there.density(row, v).posterior[0]]
+            let own = row.declared * there.growth(row.mag);
+            let sound = there.densities(&Lanes::of(row, own)).posterior[0][0];
+            [own + there.rate * row.rate, sound]
         }
     }
 
@@ -187,10 +251,9 @@ impl Model {
         let mut levels = Levels::default();
         let (mut sum, mut product) = (0.0, LogProduct::default());
         for row in rows.iter().filter(|r| of(r)) {
-            let v = levels.own(&there, row) + at[RATE] * row.rate;
-            let density = there.density(row, v);
-            sum += density.exponent;
-            product.times(density.factor);
+            let density = there.densities(&Lanes::of(row, levels.own(&there, row)));
+            sum += density.exponent[0];
+            product.times(density.factor[0]);
         }
         sum + product.ln()
     }
@@ -338,28 +401,12 @@ impl Model {
         // pieces of fixed length, added in order: the same for any number of threads
         let pieces: Vec<Sums> = rows
             .par_chunks(4096)
-            .map(|chunk| {
-                let mut levels = Levels::default();
-                let (mut value, mut product) = (0.0, LogProduct::default());
-                let (mut gradient, mut outer) = ([0.0; PARAMETERS], [0.0; PAIRS]);
-                for row in chunk.iter().filter(|r| of(r)) {
-                    let (density, g) = there.row(row, levels.own(&there, row));
-                    value += density.exponent;
-                    product.times(density.factor);
-                    let mut pair = 0;
-                    for i in 0..PARAMETERS {
-                        gradient[i] += g[i];
-                        for j in 0..=i {
-                            outer[pair] += g[i] * g[j];
-                            pair += 1;
-                        }
-                    }
-                }
-                Sums {
-                    value: value + product.ln(),
-                    gradient: gradient.into(),
-                    outer: Matrix::from_fn(|i, j| outer[i.max(j) * (i.max(j) + 1) / 2 + i.min(j)]),
-                }
+            .map(|rows| {
+                Arch::new().dispatch(Piece {
+                    there: &there,
+                    rows,
+                    of,
+                })
             })
             .collect();
         pieces.iter().fold(Sums::default(), Sums::add)
@@ -420,7 +467,11 @@ impl Model {
         let mut levels = Levels::default();
         let scores: Vec<Vector> = rows
             .iter()
-            .map(|row| there.row(row, levels.own(&there, row)).1)
+            .map(|row| {
+                let lanes = Lanes::of(row, levels.own(&there, row));
+                let slopes = there.slopes(&lanes, &there.densities(&lanes));
+                Vector::from(slopes.map(|[slope]| slope))
+            })
             .collect();
         let clustered = clusters.map(|cluster| {
             let p = inside.len();
@@ -489,116 +540,6 @@ pub(super) struct Covariance<const N: usize> {
     pub(super) model: Matrix,
     /// As the sums over clusters scatter, and how many there are, for each way of numbering them.
     pub(super) clustered: [(Matrix, usize); N],
-}
-
-/// The model at a point: what all rows share.
-struct There {
-    at: Vector,
-    /// Shares of rows without a spike, with one, and with a declared one.
-    share: [f64; 3],
-    /// What a spike adds to the variance.
-    more: [f64; 3],
-}
-
-/// The density of a row, `e^exponent factor`, and the probability of each component.
-struct Density {
-    exponent: f64,
-    factor: f64,
-    posterior: [f64; 3],
-    /// One over the variance of each, and what a spike adds to it as the row's square shows it.
-    inverse: [f64; 3],
-    more: f64,
-}
-
-impl There {
-    /// What grows with the level of a row's variance.
-    fn own(&self, row: &Row) -> f64 {
-        row.declared * self.growth(row.mag)
-    }
-
-    fn growth(&self, mag: f64) -> f64 {
-        (self.at[LEVEL] + PER_MAG * self.at[MAGNITUDE] * mag).exp()
-    }
-
-    /// The density where `v` is the variance without a spike.
-    fn density(&self, row: &Row, v: f64) -> Density {
-        let half = 0.5 * row.square;
-        let mut most = 0.0_f64;
-        let mut more = [0.0; 3];
-        for k in self.spikes() {
-            more[k] = self.more[k] * row.shows;
-            most = most.max(more[k]);
-        }
-        // relative to the widest component, which no square makes impossible
-        let widest = 1.0 / (v + most);
-        let exponent = -half * widest;
-        let mut inverse = [0.0; 3];
-        let mut parts = [0.0; 3];
-        for k in core::iter::once(0).chain(self.spikes()) {
-            let (own, relative) = if more[k] < most {
-                let own = 1.0 / (v + more[k]);
-                (own, (-half * own - exponent).exp())
-            } else {
-                (widest, 1.0)
-            };
-            inverse[k] = own;
-            parts[k] = self.share[k] * own * relative;
-        }
-        let factor = parts[0] + parts[1] + parts[2];
-        let per_factor = 1.0 / factor;
-        Density {
-            exponent,
-            factor,
-            posterior: parts.map(|p| p * per_factor),
-            inverse,
-            more: more[1],
-        }
-    }
-
-    /// Components of spikes that there are.
-    fn spikes(&self) -> impl Iterator<Item = usize> + use<> {
-        let share = self.share;
-        (1..3).filter(move |&k| share[k] > 0.0)
-    }
-
-    /// The density of a row, and the slope of its logarithm; `own` is what grows with the level of its
-    /// variance.
-    fn row(&self, row: &Row, own: f64) -> (Density, Vector) {
-        let v = own + self.at[RATE] * row.rate;
-        let density = self.density(row, v);
-        let half = 0.5 * row.square;
-        let (posterior, inverse) = (&density.posterior, &density.inverse);
-        let slope = |k: usize| posterior[k] * (half * inverse[k] - 1.0) * inverse[k];
-        let spike = slope(1);
-        let all = slope(0) + spike + slope(2);
-        let [rest, rho, _] = self.share;
-        let share = (posterior[1] - posterior[0] * rho / rest.max(NO_SHARE)) * (1.0 - rho);
-        let gradient = Vector::from([
-            all * own,
-            all * own * PER_MAG * row.mag,
-            all * row.rate,
-            share,
-            spike * density.more,
-        ]);
-        (density, gradient)
-    }
-}
-
-/// Levels of the stars: each has one magnitude, and one exponential serves its rows.
-#[derive(Default)]
-struct Levels(Vec<[f64; 2]>);
-
-impl Levels {
-    fn own(&mut self, there: &There, row: &Row) -> f64 {
-        if self.0.len() <= row.star {
-            self.0.resize(row.star + 1, [f64::NAN; 2]);
-        }
-        let known = &mut self.0[row.star];
-        if known[0].to_bits() != row.mag.to_bits() {
-            *known = [row.mag, there.growth(row.mag)];
-        }
-        row.declared * known[1]
-    }
 }
 
 pub(super) fn logit(p: f64) -> f64 {
