@@ -14,6 +14,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use block_regression::Fits;
 use effects::Surroundings;
 use nalgebra::DMatrix;
+use rayon::prelude::*;
 use telemetry::report::{
     Confusable, ConsideredEffect, Dependence, Estimate, FoundEffect, RefusedSize, Selector,
     Unattributed, Verdict,
@@ -356,8 +357,9 @@ pub(crate) fn follows(
         })
     };
     // whether it is one of many, too
+    fits.ask_all();
     let mut judged: Vec<(Dependence, f64, bool)> = terms
-        .iter()
+        .par_iter()
         .filter_map(|term| {
             let all = term.parts.iter();
             let all: Vec<Part> = all

@@ -333,7 +333,10 @@ fn explain(
         }
     }
     progress("figures");
-    Ok(Explained::Closed(Box::new(finish(&whole, after, inside)?)))
+    let closed = finish(&whole, after, inside)?;
+    // some hundred megabytes, which whoever writes the report need not wait for
+    rayon::spawn(move || drop((described, searched.found)));
+    Ok(Explained::Closed(Box::new(closed)))
 }
 
 /// The orbit that turns the camera in place of what was found to, or beside what is left of that.

@@ -205,6 +205,7 @@ impl Instead {
             groups: &found.fitted.groups,
             cost: costs(&found.fitted.groups, may),
             all: None,
+            single: false,
         };
         let score = |set: &[usize]| trial.score(set, noise).ok_or(CloseError::Singular);
         let whole = score(chosen)?;
@@ -252,6 +253,7 @@ pub(crate) fn declared_noise(
         groups: &[],
         cost: Vec::new(),
         all: None,
+        single: true,
     };
     let noise = trial.taken_out(&trial.columns(&[]));
     Ok(noise.filter(|n| n.reference.iter().any(|r| r.slow > 0.0)))
@@ -346,6 +348,7 @@ fn without_slow(
         groups: &fitted.groups,
         cost: costs(&fitted.groups, may),
         all: None,
+        single: true,
     };
     moments.sum_up();
     let (whole, bare) = rayon::join(
@@ -402,6 +405,7 @@ fn coloured<'a>(
             groups: &plain.groups,
             cost: costs(&plain.groups, may),
             all: Some(&filtered.fits),
+            single: false,
         };
         let base = trial.score(&chosen, &noise).ok_or(CloseError::Singular)?;
         noise = base.noise;

@@ -58,6 +58,8 @@ pub(super) struct Trial<'a> {
     pub(super) cost: Vec<f64>,
     /// Fits of all groups: what their scatter says of the noise.
     pub(super) all: Option<&'a Fits>,
+    /// Whether it scores one hypothesis: sums of all columns are then not worth their while.
+    pub(super) single: bool,
 }
 
 impl Trial<'_> {
@@ -80,7 +82,11 @@ impl Trial<'_> {
 
     /// Noise of what is left once white evidence has fitted all of `columns`.
     pub(super) fn taken_out(&self, columns: &[usize]) -> Option<CommonNoise> {
-        let grams = self.moments.white_in_all(columns);
+        let grams = if self.single {
+            self.moments.white_of(columns)
+        } else {
+            self.moments.white_in_all(columns)
+        };
         let layout = self.layout(columns);
         let fits = Fits::whole(&grams, &layout, self.variance)?;
         let all: Vec<usize> = (0..layout.candidates).collect();
