@@ -1,18 +1,22 @@
-//! Optical distortion outside the declared prior: scale, radial, decentring, off-centre.
+//! Optical distortion outside the declared prior: scale, aspect, radial, decentring, tilt, off-centre.
 //!
 //! ```text
 //! x, y    tangent-plane position minus the centre (cx_px, cy_px),   r^2 = x^2 + y^2
-//! dx = x (k0 + k1 r^2 + k2 r^4) + 2 p1 x y + p2 (r^2 + 2 x^2)
-//! dy = y (k0 + k1 r^2 + k2 r^4) + p1 (r^2 + 2 y^2) + 2 p2 x y       times f: px
+//! dx = x (k0 + k1 r^2 + k2 r^4) + 2 p1 x y + p2 (r^2 + 2 x^2) + b1 x + b2 y + x (t1 x + t2 y)
+//! dy = y (k0 + k1 r^2 + k2 r^4) + p1 (r^2 + 2 y^2) + 2 p2 x y               + y (t1 x + t2 y)     times f: px
 //! ```
 //!
 //! The coefficients have no unit (focal length 1). k0 is what the declared focal length is short by, as
-//! a share of itself: a lens whose focal length is a little off is never fitted well by k1 and k2. As
-//! regressors, all enter about the boresight; to first order a displaced centre of a radial term is
+//! a share of itself: a lens whose focal length is a little off is never fitted well by k1 and k2. b1 and b2
+//! are pixels that are not square, and axes that are not at right angles; air that lifts stars the more the lower
+//! they stand does the same to a camera that stands still. t1 and t2 are a detector that is tilted: all but a
+//! rotation of the camera, it is also a boresight that is -f t1 and -f t2 px off the middle. As regressors, all enter about the boresight; to first order a displaced centre of a radial term is
 //! itself a decentring one, so cx, cy are not fitted. Short star tracks do not tell r^2 from r^4: the
 //! candidates are nested sets of terms, and the data decides how many it supports.
 //!
-//! Source: Brown, "Decentering distortion of lenses", Photogrammetric Engineering 32 (1966) 444.
+//! Source: Brown, "Decentering distortion of lenses", Photogrammetric Engineering 32 (1966) 444; Fraser, "Digital
+//! camera self-calibration", ISPRS Journal of Photogrammetry 52 (1997) 149 (b1, b2); a plane seen through a pinhole
+//! at an angle, to first order (t1, t2).
 
 use focal_plane::{Camera, Pixel};
 use star_tracker::StarView;
@@ -25,10 +29,10 @@ use crate::{
 };
 
 const ID: &str = "optical_distortion";
-const TERMS: [&str; 5] = ["k0", "k1", "k2", "p1", "p2"];
+const TERMS: [&str; 9] = ["k0", "k1", "k2", "p1", "p2", "b1", "b2", "t1", "t2"];
 
 /// Sets of terms that are tried, as indices into [`TERMS`].
-const SETS: [&[usize]; 8] = [
+const SETS: [&[usize]; 10] = [
     &[0],
     &[1],
     &[0, 1],
@@ -37,7 +41,11 @@ const SETS: [&[usize]; 8] = [
     &[1, 2],
     &[0, 1, 2],
     &[0, 1, 2, 3, 4],
+    &[5, 6],
+    &[7, 8],
 ];
+/// The same of a camera whose attitude comes of its own stars: it need not have been calibrated, and may stand under air.
+const SETS_OF_ITS_OWN: [&[usize]; 3] = [&[0, 5, 6], &[0, 1, 7, 8], &[0, 1, 2, 3, 4, 5, 6, 7, 8]];
 
 /// Shift at the edge of the field that would not surprise, as a share of the distance from the
 /// boresight: a tenth of what an uncalibrated photographic lens of a narrow field has. Wide fields are bent by more,
@@ -56,7 +64,7 @@ impl EffectKind for Kind {
         ID
     }
     fn summary(&self) -> &'static str {
-        "scale, radial and decentring distortion outside the declared prior"
+        "scale, aspect, radial, decentring and tilt distortion outside the declared prior"
     }
     fn needs(&self) -> &'static str {
         "stars"
@@ -72,7 +80,7 @@ impl EffectKind for Kind {
         parameters: &Parameters,
         surroundings: &Surroundings<'_>,
     ) -> Result<Box<dyn Effect>, EffectError> {
-        let known = ["k0", "k1", "k2", "p1", "p2", "cx_px", "cy_px"];
+        let known = [&TERMS[..], &["cx_px", "cy_px"]].concat();
         let reader = Reader::new(ID, parameters, &known)?;
         // Terms not given are not there, and are not reported as zeros.
         let terms: Vec<usize> = (0..TERMS.len()).filter(|&k| reader.has(TERMS[k])).collect();
@@ -95,7 +103,13 @@ impl EffectKind for Kind {
         if !scene.has_stars {
             return Vec::new();
         }
-        SETS.into_iter()
+        let own: &[&[usize]] = if scene.has_reference {
+            &[]
+        } else {
+            &SETS_OF_ITS_OWN
+        };
+        SETS.iter()
+            .chain(own)
             .map(|terms| {
                 ShiftCandidate::boxed(Brown {
                     camera: scene.surroundings.camera.clone(),
@@ -131,6 +145,10 @@ impl Shift for Brown {
             size / edge.powi(5),
             size / edge.powi(2),
             size / edge.powi(2),
+            size / edge,
+            size / edge,
+            size / edge.powi(2),
+            size / edge.powi(2),
         ];
         self.terms
             .iter()
@@ -152,6 +170,10 @@ impl Shift for Brown {
             [fx * x * r2 * r2, fy * y * r2 * r2],
             [fx * 2.0 * x * y, fy * (r2 + 2.0 * y * y)],
             [fx * (r2 + 2.0 * x * x), fy * 2.0 * x * y],
+            [fx * x, 0.0],
+            [fx * y, 0.0],
+            [fx * x * x, fy * x * y],
+            [fx * x * y, fy * y * y],
         ];
         for (out, &k) in out.iter_mut().zip(&self.terms) {
             *out = all[k];

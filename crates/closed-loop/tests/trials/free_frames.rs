@@ -71,6 +71,38 @@ fn a_wide_lens_is_found_and_taken_off() {
     assert_eq!(again.verdict, Verdict::Consistent, "{:?}", again.effects);
 }
 
+/// Pixels that are not square, and a boresight that is 0.0028 and -0.0017 of the focal length off the middle. The second
+/// is a tilt of as much but for the square of it, a scale of 8e-6: of 1800 stars 290 px off the middle each tells that to
+/// 0.074/(290 sqrt(1800)) = 6e-6.
+#[test]
+fn what_is_wrong_with_a_detector_is_told_from_a_lens() {
+    let focal_px = 512.0 / 10.0_f64.to_radians().tan();
+    let middle_px = [0.0028 * focal_px, -0.0017 * focal_px];
+    let narrow = Lens {
+        aspect: 0.001,
+        ..Lens::default()
+    };
+    let off = Lens {
+        middle_px,
+        ..Lens::default()
+    };
+    for (lens, terms) in [
+        (narrow, [("b1", 0.001), ("b2", 0.0)]),
+        (off, [("t1", -0.0028), ("t2", 0.0017)]),
+    ] {
+        let report = pictures(10, 60, lens);
+        assert_eq!(named(&report), ["optical_distortion"]);
+        let found = &report.effects[0].parameters;
+        let names: Vec<&str> = found.keys().map(String::as_str).collect();
+        assert_eq!(names, terms.map(|(name, _)| name));
+        for (name, truth) in terms {
+            let z = (found[name].value - truth) / found[name].sigma.expect("a sigma");
+            assert!(z.abs() < 4.0, "{name}: {z} sigma");
+        }
+        is_noise(report.after.chi2_per_dof, &report, 60);
+    }
+}
+
 /// A wave of 0.12 px is that of where the light falls, which it does not move: evaluated where it takes the
 /// centroid itself, half of its square would stand in the second order, 0.12 pi 0.12/2 = 0.02 px or ten of its sigmas.
 #[test]

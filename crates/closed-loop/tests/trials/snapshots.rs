@@ -18,6 +18,10 @@ const NOISE_PX: f64 = 0.074;
 pub(crate) struct Lens {
     pub(crate) k0: f64,
     pub(crate) k1: f64,
+    /// Pixels are narrower than they are high by this share.
+    pub(crate) aspect: f64,
+    /// Where the boresight falls beside the middle of the detector, px.
+    pub(crate) middle_px: [f64; 2],
     /// Centroids are off by so much times the sine of the pixel phase, px.
     pub(crate) phase_px: f64,
     /// One star in this many is another one, some pixels off, and how many.
@@ -37,6 +41,8 @@ impl Default for Lens {
         Self {
             k0: 0.0,
             k1: 0.0,
+            aspect: 0.0,
+            middle_px: [0.0; 2],
             phase_px: 0.0,
             mistaken: None,
             off_px: 60.0,
@@ -99,8 +105,9 @@ pub(crate) fn taken(seed: u64, frames: usize, lens: Lens) -> (Model, Bundle) {
             let on_curve = |p: f64| p + lens.phase_px * camera.phase_rad(p).sin();
             let noise_px = NOISE_PX * 10_f64.powf(0.2 * lens.slope * (star.mag - 5.0));
             let mut at = Pixel {
-                x: on_curve(ideal.x * growth) + noise_px * normal(),
-                y: on_curve(ideal.y * growth) + noise_px * normal(),
+                x: on_curve(ideal.x * (growth + lens.aspect) + lens.middle_px[0])
+                    + noise_px * normal(),
+                y: on_curve(ideal.y * growth + lens.middle_px[1]) + noise_px * normal(),
             };
             if lens.mistaken.is_some_and(|n| other.next_u64() % n == 0) {
                 at.x += lens.off_px * normal();
