@@ -1,23 +1,16 @@
-//! Quaternions in another convention than that of the format.
+//! Tables in another convention than that of the format.
 //!
-//! A reference that turns the wrong way round, or whose scalar stands first, puts every star somewhere else: no
-//! normal equations have a solution then, or residuals of degrees follow the stars. Where one of these readings
-//! brings what was measured to a twentieth of the way or nearer, the table is in that convention, and it is said.
-//!
-//! ```text
-//! stars      median angle between q u and the measured direction
-//! attitude   median angle of q_measured q^-1
-//! ```
+//! A wrong reading of a column puts every star or attitude somewhere else: no normal equations have a solution then,
+//! or residuals of degrees follow the stars. Where another usual reading brings what was measured to a twentieth
+//! of the way or nearer, the table is in that convention, and it is said.
 //!
 //! Not physics: a check of input.
 
-use focal_plane::{Pixel, StarFrames};
-use nalgebra::{Quaternion, UnitQuaternion, Vector3};
-use spectra::robust::{median, median_step};
-use telemetry::{AttitudeTable, Bundle};
-
 use crate::error::CloseError;
 use crate::situation::Situation;
+
+mod references;
+mod stars;
 
 /// Samples that are looked at.
 const SAMPLES: usize = 200;
@@ -26,136 +19,21 @@ const NEAR: f64 = 0.1;
 /// How many times nearer another convention has to be.
 const NEARER: f64 = 20.0;
 
-type Reading = fn(&UnitQuaternion<f64>) -> UnitQuaternion<f64>;
-
-/// What the columns `qx, qy, qz, qw` may hold instead.
-const OTHERS: [(Reading, &str); 3] = [
-    (inverse, "the inverse rotations"),
-    (scalar_first, "rotations whose scalar stands first"),
-    (
-        scalar_first_inverse,
-        "inverse rotations whose scalar stands first",
-    ),
-];
-
-fn as_given(q: &UnitQuaternion<f64>) -> UnitQuaternion<f64> {
-    *q
-}
-
-fn inverse(q: &UnitQuaternion<f64>) -> UnitQuaternion<f64> {
-    q.inverse()
-}
-
-fn scalar_first(q: &UnitQuaternion<f64>) -> UnitQuaternion<f64> {
-    UnitQuaternion::new_normalize(Quaternion::new(q.i, q.j, q.k, q.w))
-}
-
-fn scalar_first_inverse(q: &UnitQuaternion<f64>) -> UnitQuaternion<f64> {
-    scalar_first(q).inverse()
-}
-
-/// The table that is held against the reference.
-#[derive(Clone, Copy)]
-enum Measured<'a> {
-    Stars(&'a StarFrames),
-    Attitude(&'a AttitudeTable),
-}
-
-impl<'a> Measured<'a> {
-    fn of(bundle: &'a Bundle) -> Option<Self> {
-        let stars = bundle.stars.as_ref().map(Self::Stars);
-        stars.or_else(|| bundle.attitude.as_ref().map(Self::Attitude))
-    }
-
-    /// Its name, and the times of its frames.
-    fn times(self) -> (&'static str, &'a [f64]) {
-        match self {
-            Self::Stars(stars) => ("stars", &stars.t_s),
-            Self::Attitude(attitude) => ("attitude", &attitude.t_s),
-        }
-    }
-}
-
-/// Refuses a reference that does not overlap what was measured, or is in another convention.
+/// Refuses a reference that does not overlap what was measured, and what is in another convention.
 pub(crate) fn check(situation: &Situation<'_>) -> Result<(), CloseError> {
-    let bundle = situation.bundle;
-    let Some(reference) = &bundle.reference else {
-        return Ok(());
-    };
-    let Some(measured) = Measured::of(bundle) else {
-        return Ok(());
-    };
-    let (what, t_s) = measured.times();
-    let ends = |t_s: &[f64]| Some([*t_s.first()?, *t_s.last()?]);
-    let (Some(taken), Some(known)) = (ends(t_s), ends(&reference.t_s)) else {
-        return Ok(());
-    };
-    if taken[1] < known[0] || known[1] < taken[0] {
-        return Err(CloseError::NoOverlap {
-            what,
-            measured_s: taken,
-            reference_s: known,
-        });
-    }
-    let pairs = pairs(t_s, &reference.t_s);
-    let apart = |read: Reading| {
-        let mut angles = Vec::new();
-        for &(k, at) in &pairs {
-            let q = read(&reference.q[at]);
-            match measured {
-                Measured::Stars(stars) => angles.extend(of_stars(situation, stars, k, &q)),
-                Measured::Attitude(attitude) => angles.push(attitude.q[k].angle_to(&q)),
-            }
-        }
-        median(&mut angles)
-    };
+    stars::check(situation)?;
+    references::check(situation)
+}
+
+/// Half the field, rad.
+fn field(situation: &Situation<'_>) -> f64 {
     let half = situation.camera.half_size_px();
-    let field = half[0].max(half[1]) / situation.camera.focal_length_px()[0];
-    let Some(given) = apart(as_given).filter(|angle| *angle > NEAR * field) else {
-        return Ok(());
-    };
-    let others = OTHERS.iter();
-    let nearest = others
-        .filter_map(|(reading, are)| Some((apart(*reading)?, *are)))
-        .min_by(|a, b| a.0.total_cmp(&b.0));
-    match nearest {
-        Some((angle, are)) if NEARER * angle < given => Err(CloseError::Convention {
-            what,
-            given_deg: given.to_degrees(),
-            are,
-            angle_deg: angle.to_degrees(),
-        }),
-        _ => Ok(()),
-    }
+    half[0].max(half[1]) / situation.camera.focal_length_px()[0]
 }
 
-/// Frames and the samples of the reference next to them, evenly over all.
-fn pairs(t_s: &[f64], reference_t_s: &[f64]) -> Vec<(usize, usize)> {
-    let step = median_step(reference_t_s).unwrap_or(f64::INFINITY);
-    let stride = t_s.len().div_ceil(SAMPLES).max(1);
-    let next = |&k: &usize| {
-        let after = reference_t_s.partition_point(|t| *t < t_s[k]);
-        let near = after.saturating_sub(1)..(after + 1).min(reference_t_s.len());
-        let distance = |at: &usize| (reference_t_s[*at] - t_s[k]).abs();
-        let at = near.min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
-        (distance(&at) <= step).then_some((k, at))
-    };
-    let frames: Vec<usize> = (0..t_s.len()).step_by(stride).collect();
-    frames.iter().filter_map(next).collect()
-}
-
-/// Angles between where the stars of a frame are and where `q` turns those of the catalogue, rad.
-fn of_stars(
-    situation: &Situation<'_>,
-    stars: &StarFrames,
-    frame: usize,
-    q: &UnitQuaternion<f64>,
-) -> Vec<f64> {
-    let angle = |row: usize| {
-        let star = situation.star(stars.star_id[row])?;
-        let (x, y) = (stars.x_px[row], stars.y_px[row]);
-        let seen: Vector3<f64> = situation.camera.direction(Pixel { x, y });
-        Some((q * star.direction).angle(&seen))
-    };
-    stars.rows_of(frame).filter_map(angle).collect()
+/// The nearest of other readings, where it is so much nearer than `given` that it is the right one.
+fn nearest<T>(given: f64, others: impl Iterator<Item = (f64, T)>) -> Option<(f64, T)> {
+    others
+        .min_by(|a, b| a.0.total_cmp(&b.0))
+        .filter(|(angle, _)| NEARER * angle < given)
 }

@@ -68,6 +68,22 @@ pub enum CloseError {
         /// Median angle if they are, deg.
         angle_deg: f64,
     },
+    /// The stars, or the catalogue, are in another convention.
+    #[error(
+        "{columns}: the stars of a frame are {given_deg:.3} deg from those of the catalogue, at the attitude that suits them best; read as {are} they are {angle_deg:.3} deg from them; expected {expected}"
+    )]
+    StarConvention {
+        /// Table and columns.
+        columns: &'static str,
+        /// What they seem to hold.
+        are: &'static str,
+        /// What the format has there.
+        expected: &'static str,
+        /// Median angle from the catalogue, deg.
+        given_deg: f64,
+        /// Median angle if they are that, deg.
+        angle_deg: f64,
+    },
     /// A declared effect on raw images that are there.
     #[error(
         "the model declares `{id}`, and the bundle has raw images: centroids with a declared map or spot taken off cannot be formed yet; leave the entry out of the model, and it is estimated anew, or the table `images` out of the bundle, whose centroids then stand as they are"

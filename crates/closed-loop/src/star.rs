@@ -29,7 +29,7 @@
 mod changes;
 pub(crate) mod columns;
 pub(crate) mod data;
-mod directions;
+pub(crate) mod directions;
 pub(crate) mod evidence;
 mod finish;
 pub(crate) mod frame_rotation;

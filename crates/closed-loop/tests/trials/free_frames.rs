@@ -1,8 +1,9 @@
 //! Pictures of the sky whose attitudes are their own, by cameras that a first solution gets wrong.
 
+use focal_plane::Catalogue;
 use nalgebra::Vector3;
 use telemetry::report::{Report, Verdict};
-use telemetry::{EffectEntry, EffectValue};
+use telemetry::{Bundle, EffectEntry, EffectValue};
 
 use crate::kit::{closed, named};
 use crate::snapshots::{Lens, arcsec, pictures, taken};
@@ -101,6 +102,52 @@ fn what_is_wrong_with_a_detector_is_told_from_a_lens() {
         }
         is_noise(report.after.chi2_per_dof, &report, 60);
     }
+}
+
+/// Pictures that are mirrored, and catalogues in hours and in radians, fit no attitude, and it is said why. A lens is no
+/// convention.
+#[test]
+fn stars_in_another_convention_are_refused() {
+    let refused = |spoil: &dyn Fn(&mut Bundle), lens: Lens| {
+        let (model, mut bundle) = taken(4, 8, lens);
+        spoil(&mut bundle);
+        closed(&model, &bundle)
+            .map(|_| ())
+            .map_err(|e| e.to_string())
+    };
+    let read = |angles: fn([f64; 2]) -> [f64; 2]| {
+        move |bundle: &mut Bundle| {
+            let catalogue = bundle.catalog.as_ref().expect("it has one");
+            let mut stars = catalogue.stars().to_vec();
+            for star in &mut stars {
+                [star.ra_deg, star.dec_deg] = angles([star.ra_deg, star.dec_deg]);
+            }
+            bundle.catalog = Some(Catalogue::new(2000.0, stars).expect("a catalogue"));
+        }
+    };
+    let mirrored = |bundle: &mut Bundle| {
+        let stars = bundle.stars.as_mut().expect("it has some");
+        core::mem::swap(&mut stars.x_px, &mut stars.y_px);
+    };
+    let hours = read(|[ra, dec]| [ra / 15.0, dec]);
+    let radians = read(|angles| angles.map(f64::to_radians));
+    let spoils: [(&dyn Fn(&mut Bundle), [&str; 2]); 3] = [
+        (
+            &mirrored,
+            ["table stars, columns x_px, y_px", "a mirrored picture"],
+        ),
+        (&hours, ["table catalog, column ra_deg", "read as hours"]),
+        (&radians, ["columns ra_deg, dec_deg", "read as radians"]),
+    ];
+    for (spoil, said) in spoils {
+        let words = refused(spoil, Lens::default()).expect_err("it is refused");
+        assert!(said.iter().all(|said| words.contains(said)), "{words}");
+    }
+    let bent = Lens {
+        k0: 0.05,
+        ..wide(-0.2)
+    };
+    assert!(refused(&|_| {}, bent).is_ok());
 }
 
 /// A wave of 0.12 px is that of where the light falls, which it does not move: evaluated where it takes the
