@@ -28,7 +28,7 @@ impl EffectKind for Kind {
         "noise grows with magnitude as 10^(0.2 slope (m - 5))"
     }
     fn needs(&self) -> &'static str {
-        "at least four stars of different magnitudes, three or more in a frame"
+        "at least four stars of different magnitudes, three or more in a frame, and 500 rows"
     }
     fn acts_on(&self) -> ActsOn {
         ActsOn {

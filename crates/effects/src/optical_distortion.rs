@@ -96,6 +96,7 @@ impl EffectKind for Kind {
             camera: surroundings.camera.clone(),
             centre,
             terms,
+            stands_for: 1.0,
         };
         Ok(Box::new(Shifted::new(brown, values)))
     }
@@ -108,6 +109,8 @@ impl EffectKind for Kind {
         } else {
             &SETS_OF_ITS_OWN
         };
+        // sets share their terms: there is as much to be found by chance as there are of these
+        let stands_for = TERMS.len() as f64 / (SETS.len() + own.len()) as f64;
         SETS.iter()
             .chain(own)
             .map(|terms| {
@@ -115,6 +118,7 @@ impl EffectKind for Kind {
                     camera: scene.surroundings.camera.clone(),
                     centre: Pixel::default(),
                     terms: terms.to_vec(),
+                    stands_for,
                 })
             })
             .collect()
@@ -127,6 +131,8 @@ struct Brown {
     centre: Pixel,
     /// Which of [`TERMS`] it has.
     terms: Vec<usize>,
+    /// Of how many that are looked at it is one.
+    stands_for: f64,
 }
 
 impl Shift for Brown {
@@ -154,6 +160,9 @@ impl Shift for Brown {
             .iter()
             .map(|&k| Coefficient::new(TERMS[k], "", plausible[k]))
             .collect()
+    }
+    fn stands_for(&self) -> f64 {
+        self.stands_for
     }
     fn terms(&self, star: &StarView, out: &mut [[f64; 2]]) {
         let off = Pixel {

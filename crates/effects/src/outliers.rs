@@ -31,7 +31,7 @@ impl EffectKind for Kind {
         "spikes of single rows: particle hits, star mix-ups"
     }
     fn needs(&self) -> &'static str {
-        "three or more stars in a frame"
+        "three or more stars in a frame, and 500 rows"
     }
     fn acts_on(&self) -> ActsOn {
         ActsOn {

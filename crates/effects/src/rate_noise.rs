@@ -27,7 +27,7 @@ impl EffectKind for Kind {
         "noise grows with the star's rate across the detector"
     }
     fn needs(&self) -> &'static str {
-        "three or more stars in a frame, and a rate that changes"
+        "three or more stars in a frame, a rate that changes, and 500 rows"
     }
     fn acts_on(&self) -> ActsOn {
         ActsOn {

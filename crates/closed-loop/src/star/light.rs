@@ -17,14 +17,16 @@
 //! rotation leaves is independent of that rotation.
 //!
 //! ```text
-//! p       quadratic in time through the frames around, each as its stars and reference have it: of 2 to 16
-//!         on each side the most that agree with all that are fewer within 2 sigma
+//! p       quadratic in time through the attitudes around, each as its stars and reference have it: of 2 to 16
+//!         on each side the most that agree with all that are fewer within 2 sigma. Where the reference's error is
+//!         slow (its white part W < S/4) it is no prior of each of them anew, and would be believed as often: the
+//!         quadratic goes through what the stars around say of that error, and W is added to Q
 //! Q       variance of that fit, and what the frames around were themselves predicted worse than this says
 //! E c(P)  of a centroid error at a position known to a variance v: the mean over it, see [`centroid`]
 //! ```
 //!
 //! Under slow motion the frames around tell most (6 stars at rest: 0.25 px by a frame's stars, 0.07 px with
-//! them); under fast motion they know nothing, and Q says so.
+//! them); under fast motion they know nothing, and Q says so, but of an error that is slow.
 //!
 //! Source: Henderson 1975 (best linear unbiased prediction); Katkovnik 1999 (intersection of confidence
 //! intervals, for the stretch of time).
@@ -47,6 +49,8 @@ const MOST: usize = 16;
 const AGREE: f64 = 2.0;
 /// Frames on each side by whose own prediction it is judged.
 const JUDGES: usize = 32;
+/// Share of its variance that is white below which a reference's error is slow.
+const SLOW: f64 = 0.25;
 /// A reference that errs by less than this leaves the light where it is modelled, px.
 const KNOWN_PX: f64 = 1e-3;
 
@@ -58,7 +62,8 @@ const NOTHING: Known = [(0.0, f64::INFINITY); 3];
 pub(crate) fn of(data: &StarData, residual: [&[f64]; 2]) -> Light {
     let rows = data.t_s.len();
     let mut light = Light::as_modelled(rows);
-    let weight = weights::of(data, &changes::of(data));
+    let changes = changes::of(data);
+    let weight = weights::of(data, &changes);
     let turns = Turns::of(data, residual, &weight);
     let known = KNOWN_PX * data.camera.arcsec_per_px()[0];
     if !data.free_attitude && turns.reference[..2].iter().all(|s| *s < known * known) {
@@ -72,7 +77,13 @@ pub(crate) fn of(data: &StarData, residual: [&[f64]; 2]) -> Light {
             s.max(1e-3 * known * known).recip()
         }
     });
-    let around = around(data, &turns, reference);
+    let changed = changes.each_ref().map(Vec::as_slice);
+    let slow = if data.free_attitude {
+        [None; 3]
+    } else {
+        slow(&turns, &Turns::of(data, changed, &weight))
+    };
+    let around = around(data, &turns, reference, slow);
     let scale = data.camera.arcsec_per_px();
     let weight = &weight;
     let of_frame = |k: usize| {
@@ -116,8 +127,21 @@ pub(crate) fn of(data: &StarData, residual: [&[f64]; 2]) -> Light {
     light
 }
 
-/// What the frames around each frame say of its rotation.
-fn around(data: &StarData, turns: &Turns, reference: [f64; 3]) -> Vec<Known> {
+/// White part of the reference's variance about each axis on which its error is slow; `changes` have twice each.
+fn slow(turns: &Turns, changes: &Turns) -> [Option<f64>; 3] {
+    std::array::from_fn(|a| {
+        let white = 0.5 * changes.reference[a];
+        (white < SLOW * turns.reference[a]).then_some(white)
+    })
+}
+
+/// What the frames around each frame say of its rotation; the white part where that of the reference is `slow`.
+fn around(
+    data: &StarData,
+    turns: &Turns,
+    reference: [f64; 3],
+    slow: [Option<f64>; 3],
+) -> Vec<Known> {
     let frames = data.frames.frames();
     // each frame by itself
     let own: Vec<Known> = turns
@@ -128,7 +152,10 @@ fn around(data: &StarData, turns: &Turns, reference: [f64; 3]) -> Vec<Known> {
             let normal = turn.normal / turns.noise + Matrix3::from_diagonal(&reference.into());
             let variance = normal.try_inverse()?;
             let theta = variance * turn.moment / turns.noise;
-            Some(std::array::from_fn(|a| (theta[a], variance[(a, a)])))
+            Some(std::array::from_fn(|a| match slow[a] {
+                Some(_) => (turn.theta[a], turn.variance[a] * turns.noise),
+                None => (theta[a], variance[(a, a)]),
+            }))
         })
         .map(|known| known.unwrap_or(NOTHING))
         .collect();
@@ -142,7 +169,13 @@ fn around(data: &StarData, turns: &Turns, reference: [f64; 3]) -> Vec<Known> {
     let step_s = median_step(&data.frames.t_s).unwrap_or(f64::INFINITY);
     let predicted: Vec<Known> = (0..frames)
         .into_par_iter()
-        .map(|k| predict(data, &own, &attitude, k, step_s))
+        .map(|k| {
+            let mut known = predict(data, &own, &attitude, slow, k, step_s);
+            for (known, white) in known.iter_mut().zip(slow) {
+                known.1 += white.unwrap_or(0.0);
+            }
+            known
+        })
         .collect();
     // how much worse than its own sigma each was predicted, arcsec^2
     let worse: Vec<[Option<(f64, f64)>; 3]> = own
@@ -186,6 +219,7 @@ fn predict(
     data: &StarData,
     own: &[Known],
     attitude: &[UnitQuaternion<f64>],
+    slow: [Option<f64>; 3],
     k: usize,
     step_s: f64,
 ) -> Known {
@@ -211,7 +245,9 @@ fn predict(
             };
             let phi = rotation_vector(&attitude[j], &data.attitude[k]) * ARCSEC_PER_RAD;
             for (a, fit) in fits.iter_mut().enumerate() {
-                fit.add((t_s[j] - t_s[k]) / step_s, phi[a], own[j][a].1.recip());
+                let (theta, variance) = own[j][a];
+                let value = if slow[a].is_some() { theta } else { phi[a] };
+                fit.add((t_s[j] - t_s[k]) / step_s, value, variance.recip());
             }
         }
         if m < FEWEST {
@@ -301,7 +337,18 @@ mod tests {
         residual: [Vec<f64>; 2],
     }
 
-    fn made(path: impl Fn(f64, &mut dyn FnMut() -> f64) -> [f64; 2], free: bool) -> Made {
+    type At<'a> = &'a dyn Fn(f64, &mut dyn FnMut() -> f64) -> [f64; 2];
+
+    fn made(path: At<'_>, free: bool) -> Made {
+        made_beside(
+            path,
+            &|_, normal| [REFERENCE * normal(), REFERENCE * normal()],
+            free,
+        )
+    }
+
+    /// The same beside a reference that errs like this.
+    fn made_beside(path: At<'_>, error: At<'_>, free: bool) -> Made {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(11);
         let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
         let camera = Camera::from_fov_deg([1024, 1024], [10.0, 10.0]).unwrap();
@@ -324,9 +371,8 @@ mod tests {
                 let s = i32::try_from(s).unwrap();
                 frames.push(s, i64::from(s), x, y);
             }
-            let error = [REFERENCE * normal(), REFERENCE * normal()];
             t_s.push(t);
-            q.push(turn(error) * true_q);
+            q.push(turn(error(t, &mut normal)) * true_q);
         }
         let reference = AttitudeSeries::new(t_s, q, None).unwrap();
         let data = seen(&camera, &frames, (!free).then_some(&reference), &STARS);
@@ -375,7 +421,7 @@ mod tests {
     #[test]
     fn slow_motion_is_known_from_the_frames_around() {
         for free in [false, true] {
-            let [square, claimed, _] = made(|t, _| slowly(t), free).errors();
+            let [square, claimed, _] = made(&|t, _| slowly(t), free).errors();
             assert!(square < 2e-3, "{free}: {square}");
             assert!(
                 (0.7..1.3).contains(&(square / claimed)),
@@ -391,11 +437,44 @@ mod tests {
     fn jitter_between_the_frames_is_not_smoothed() {
         for free in [false, true] {
             let jitter = |_: f64, normal: &mut dyn FnMut() -> f64| [3.0 * normal(), 3.0 * normal()];
-            let [square, claimed, _] = made(jitter, free).errors();
+            let [square, claimed, _] = made(&jitter, free).errors();
             assert!(
                 (0.85..1.15).contains(&(square / claimed)),
                 "{square} {claimed}"
             );
+        }
+    }
+
+    /// A step of 0.3 px in the reference is no noise of every frame anew: five stars know a frame's place to 0.2^2/5 =
+    /// 0.008 px^2, 32 frames around that to 9/4 over their number, 0.0006, and less near the step and where shorter
+    /// stretches agree, however the camera moves. Taken for white noise of 0.15 px it left a quarter of itself, 0.15^2/16 =
+    /// 0.0014, by slow motion, and (1/0.15^2 + 1/0.008)^-1 = 0.006 by jitter.
+    #[test]
+    fn a_slow_error_of_the_reference_is_known_from_the_frames_around() {
+        let half = 0.1 * FRAMES as f64;
+        let step = |t: f64, _: &mut dyn FnMut() -> f64| [if t < half { 0.15 } else { -0.15 }; 2];
+        let jitter = |_: f64, normal: &mut dyn FnMut() -> f64| [3.0 * normal(), 3.0 * normal()];
+        let slow = |t: f64, _: &mut dyn FnMut() -> f64| slowly(t);
+        let paths: [At<'_>; 2] = [&jitter, &slow];
+        for path in paths {
+            let made = made_beside(path, &step, false);
+            let [square, claimed, _] = made.errors();
+            assert!(square < 1.1e-3, "{square}");
+            assert!(
+                (0.7..1.3).contains(&(square / claimed)),
+                "{square} {claimed}"
+            );
+            // no half is off as a whole: 600 frames, of which some 30 share what they know
+            let mean = |early: bool| {
+                let rows = (0..made.data.t_s.len()).filter(|&r| (made.data.t_s[r] < half) == early);
+                let off = rows.map(|r| made.light.beside_px[0][r] - made.truth[0][r]);
+                let off: Vec<f64> = off.collect();
+                off.iter().sum::<f64>() / off.len() as f64
+            };
+            let known = (0.008_f64 / 600.0).sqrt();
+            for early in [true, false] {
+                assert!(mean(early).abs() < 5.0 * known, "{}", mean(early));
+            }
         }
     }
 
@@ -407,9 +486,9 @@ mod tests {
     #[test]
     fn a_position_does_not_hold_its_own_noise() {
         let jitter = |_: f64, normal: &mut dyn FnMut() -> f64| [3.0 * normal(), 3.0 * normal()];
-        let [_, claimed, product] = made(jitter, false).errors();
+        let [_, claimed, product] = made(&jitter, false).errors();
         assert!((product + claimed).abs() < 1.5e-3, "{product} {claimed}");
-        let [_, _, product] = made(jitter, true).errors();
+        let [_, _, product] = made(&jitter, true).errors();
         assert!(product.abs() < 1.5e-3, "{product}");
     }
 }
