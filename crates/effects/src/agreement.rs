@@ -32,6 +32,21 @@ fn a_third(candidate: &dyn Candidate) -> Vec<f64> {
         .collect()
 }
 
+/// Users look up there what their models may declare.
+#[test]
+fn every_effect_has_its_line_on_the_page() {
+    let page = include_str!("../../../docs/effects.md");
+    let listed = page.lines().filter(|line| line.starts_with("| `")).count();
+    assert_eq!(listed, catalogue().len());
+    for kind in catalogue() {
+        assert!(
+            page.contains(&format!("\n| `{}` |", kind.id())),
+            "{}",
+            kind.id()
+        );
+    }
+}
+
 /// Shifts of the image, the attitude and the direction.
 #[test]
 fn columns_are_the_derivative_of_the_forward_action() {

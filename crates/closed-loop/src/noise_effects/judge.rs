@@ -31,8 +31,8 @@ use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
 use super::rows::Row;
 use super::squares::{MIN_ROWS, levels_shown};
 use super::variance::{
-    Covariance, Fit, LEVEL, MAGNITUDE, Model, PARAMETERS, RATE, SHARE, SIZE, Vector, Without,
-    information, logit, sigmoid,
+    Covariance, Fit, LEVEL, MAGNITUDE, MOST_SHARE, Model, PARAMETERS, RATE, SHARE, SIZE, Vector,
+    Without, information, logit, sigmoid,
 };
 use crate::search::selection::FAMILY_ALPHA;
 
@@ -48,6 +48,8 @@ const CREDIBLE_SLOPE: f64 = 4.0;
 const CREDIBLE_RATE: f64 = 300.0;
 /// Fewest spikes that are a rate.
 const MIN_SPIKES: f64 = 3.0;
+/// Share of the largest share beyond which it would be larger still.
+const AT_MOST: f64 = 0.99;
 /// Share of the spikes that follow or are followed by another of their star: by chance 0.36 at most.
 const MOST_IN_A_ROW: f64 = 0.6;
 /// Nats by which spikes must beat noise with tails.
@@ -471,6 +473,8 @@ impl Bench<'_> {
         let tails = self.model.loglik_of_tails(&with.at, &rows) + BEYOND_TAILS;
         let against = if share * (rows.len() as f64) < MIN_SPIKES {
             Some("so few rows are no share")
+        } else if share > AT_MOST * MOST_SHARE {
+            Some("so many rows are no spikes")
         } else if with.loglik <= tails {
             Some("noise with long tails explains as much")
         } else if self.in_a_row(&rows, &with) > MOST_IN_A_ROW {

@@ -370,6 +370,19 @@ fn what_stands_out_row_after_row_is_no_spike() {
     );
 }
 
+/// A third of all frames, one in three, is not a matter of spikes, however large these are.
+#[test]
+fn so_many_rows_are_no_spikes() {
+    let often = moving(8, |_| 0.0, |k| if k % 3 == 0 { 25.0 } else { 0.0 }).outliers;
+    assert!(!often.stands, "{often:?}");
+    assert!(
+        often
+            .against
+            .is_some_and(|why| why.contains("so many rows")),
+        "{often:?}"
+    );
+}
+
 /// 14 stars in 500 frames at this rate, deg/s, with noise of 2.5 arcsec and of `more` beside it.
 fn moving(seed: u64, rate: impl Fn(usize) -> f64, more: impl Fn(usize) -> f64) -> Verdicts {
     let folds = Folds::cut(500);

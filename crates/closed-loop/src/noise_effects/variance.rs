@@ -44,7 +44,7 @@ pub(super) const PER_MAG: f64 = 0.921_034_037_197_618_3;
 /// Share of spikes where there are none.
 pub(super) const NO_SHARE: f64 = 1e-9;
 /// A larger share of rows is not a matter of spikes.
-const MOST_SHARE: f64 = 0.2;
+pub(super) const MOST_SHARE: f64 = 0.2;
 /// Least size of a spike, sigma of the usual row: smaller is no spike, but noise with tails.
 const LEAST_SIZE: f64 = 4.0;
 const ROUNDS: usize = 60;
