@@ -133,25 +133,7 @@ impl StarData {
     /// taken to fall by enough for its pixel phase to be another one.
     pub(crate) fn lands_elsewhere(&self, shift_arcsec: &[Vec<f64>]) -> bool {
         let known = self.carried.as_ref().unwrap_or(&self.modelled);
-        self.is_elsewhere(&self.shifted(shift_arcsec), known)
-    }
-
-    /// The same where it counts what stars and frames around say beside it: what turns the camera they know before it
-    /// is found.
-    pub(crate) fn falls_elsewhere(&self, shifts: &Shifts) -> bool {
-        if self.free_attitude {
-            return true;
-        }
-        let left = self.left(&shifts.whole);
-        let beside = light::of(self, left.each_ref().map(Vec::as_slice)).beside_px;
-        let mut at = self.shifted(&shifts.light);
-        for (at, beside) in at.iter_mut().zip(&beside) {
-            at.iter_mut().zip(beside).for_each(|(p, b)| *p += b);
-        }
-        self.is_elsewhere(&at, &self.landed().map(<[f64]>::to_vec))
-    }
-
-    fn is_elsewhere(&self, at: &[Vec<f64>; 2], known: &[Vec<f64>; 2]) -> bool {
+        let at = self.shifted(shift_arcsec);
         let (mut squares, mut count) = (0.0, 0.0);
         for row in (0..self.t_s.len()).filter(|&r| !self.outlier[r]) {
             for axis in 0..2 {

@@ -328,7 +328,7 @@ fn explain(
     let after = whole.residuals(&searched.found.selection.chosen)?;
     if !last && formed.is_none() && data.lands_elsewhere(&after.modelled) {
         let shifts = whole.modelled()?;
-        if data.lands_elsewhere(&shifts.light) && data.falls_elsewhere(&shifts) {
+        if data.lands_elsewhere(&shifts.light) {
             return Ok(Explained::Elsewhere(Box::new(shifts)));
         }
     }
