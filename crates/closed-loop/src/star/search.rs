@@ -100,7 +100,7 @@ pub(crate) fn attempt<'a>(
         moments,
         worth,
     } = match explored(white, folds, candidates, may, start)? {
-        Explored::White(found) => return Ok((Searched::plain(found), Vec::new())),
+        Explored::White(found) => return Ok((Searched::plain(*found), Vec::new())),
         Explored::Coloured(coloured) => *coloured,
     };
     // from the forms that were polished beside the slow error: nearly those that suit white noise
@@ -152,7 +152,7 @@ fn prepared(
     let found = match start {
         Some(start) => {
             explored(white, &part, candidates.clone(), may, start).map(|explored| match explored {
-                Explored::White(found) => found,
+                Explored::White(found) => *found,
                 Explored::Coloured(coloured) => coloured.searched.found,
             })
         }
@@ -273,7 +273,7 @@ struct Coloured<'a> {
 /// What a search beside a slow error comes to.
 enum Explored<'a> {
     /// There is none beside what white evidence finds.
-    White(Found),
+    White(Box<Found>),
     Coloured(Box<Coloured<'a>>),
 }
 
@@ -289,11 +289,11 @@ fn explored<'a>(
     let plain = plainly(white, folds, &candidates, &moments)?;
     let all = without_slow(white, folds, &candidates, may, start, &moments, &plain)?;
     if let Some((selection, quieter)) = all {
-        return Ok(Explored::White(Found {
+        return Ok(Explored::White(Box::new(Found {
             candidates,
             fitted: quieter.unwrap_or(plain),
             selection,
-        }));
+        })));
     }
     let coloured = coloured(white, folds, candidates, may, start, (moments, plain))?;
     Ok(Explored::Coloured(Box::new(coloured)))

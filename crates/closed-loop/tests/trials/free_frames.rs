@@ -104,11 +104,14 @@ fn what_is_wrong_with_a_detector_is_told_from_a_lens() {
     }
 }
 
+/// What is done to a bundle.
+type Spoil<'a> = &'a dyn Fn(&mut Bundle);
+
 /// Pictures that are mirrored, and catalogues in hours and in radians, fit no attitude, and it is said why. A lens is no
 /// convention.
 #[test]
 fn stars_in_another_convention_are_refused() {
-    let refused = |spoil: &dyn Fn(&mut Bundle), lens: Lens| {
+    let refused = |spoil: Spoil<'_>, lens: Lens| {
         let (model, mut bundle) = taken(4, 8, lens);
         spoil(&mut bundle);
         closed(&model, &bundle)
@@ -131,7 +134,7 @@ fn stars_in_another_convention_are_refused() {
     };
     let hours = read(|[ra, dec]| [ra / 15.0, dec]);
     let radians = read(|angles| angles.map(f64::to_radians));
-    let spoils: [(&dyn Fn(&mut Bundle), [&str; 2]); 3] = [
+    let spoils: [(Spoil<'_>, [&str; 2]); 3] = [
         (
             &mirrored,
             ["table stars, columns x_px, y_px", "a mirrored picture"],
