@@ -356,8 +356,8 @@ pub(crate) fn follows(
             columns: part.len(),
         })
     };
-    // whether it is one of many, too
     fits.ask_all();
+    // whether it is one of many, too
     let mut judged: Vec<(Dependence, f64, bool)> = terms
         .par_iter()
         .filter_map(|term| {

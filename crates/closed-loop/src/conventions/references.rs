@@ -7,14 +7,15 @@
 //!
 //! Not physics: a check of input.
 
-use focal_plane::{Pixel, StarFrames};
-use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use focal_plane::StarFrames;
+use nalgebra::{Quaternion, UnitQuaternion};
 use spectra::robust::{median, median_step};
 use telemetry::{AttitudeTable, Bundle};
 
 use super::{NEAR, SAMPLES, field, nearest};
 use crate::error::CloseError;
 use crate::situation::Situation;
+use crate::star::directions::seen_at;
 
 type Reading = fn(&UnitQuaternion<f64>) -> UnitQuaternion<f64>;
 
@@ -140,8 +141,7 @@ fn of_stars(
 ) -> Vec<f64> {
     let angle = |row: usize| {
         let star = situation.star(stars.star_id[row])?;
-        let (x, y) = (stars.x_px[row], stars.y_px[row]);
-        let seen: Vector3<f64> = situation.camera.direction(Pixel { x, y });
+        let seen = seen_at(&situation.camera, stars, row);
         Some((q * star.direction).angle(&seen))
     };
     stars.rows_of(frame).filter_map(angle).collect()

@@ -7,16 +7,14 @@
 //!
 //! Not physics: a check of input.
 
-use core::f64::consts::FRAC_PI_2;
-
-use focal_plane::{Pixel, StarFrames};
+use focal_plane::{Angle, StarFrames, ra_dec, unit_vector};
 use nalgebra::Vector3;
 use spectra::robust::median;
 
 use super::{NEAR, SAMPLES, field, nearest};
 use crate::error::CloseError;
 use crate::situation::Situation;
-use crate::star::directions::attitudes;
+use crate::star::directions::{attitudes, seen_at};
 
 /// Two stars are one angle, which a mirror does not change.
 const TELLING: usize = 3;
@@ -73,20 +71,16 @@ impl Sample {
         let telling = |k: &usize| stars.rows_of(*k).len() >= TELLING;
         let all: Vec<usize> = (0..stars.frames()).filter(telling).collect();
         for &k in all.iter().step_by(all.len().div_ceil(SAMPLES).max(1)) {
+            frames.begin(stars.t_s[k]);
             for row in stars.rows_of(k) {
-                let Some(star) = situation.star(stars.star_id[row]) else {
+                let id = stars.star_id[row];
+                let Some(star) = situation.star(id) else {
                     continue;
                 };
-                let u = star.direction;
-                let ra = u.y.atan2(u.x).to_degrees().rem_euclid(360.0);
-                angles_deg.push([ra, FRAC_PI_2.min(u.z.asin()).to_degrees()]);
-                frames.star_id.push(stars.star_id[row]);
-                frames.slot.push(stars.slot[row]);
-                frames.x_px.push(stars.x_px[row]);
-                frames.y_px.push(stars.y_px[row]);
+                let (ra, dec) = ra_dec(&star.direction);
+                angles_deg.push([ra.deg(), dec.deg()]);
+                frames.push(stars.slot[row], id, stars.x_px[row], stars.y_px[row]);
             }
-            frames.t_s.push(stars.t_s[k]);
-            frames.first_row.push(frames.x_px.len());
         }
         Self { frames, angles_deg }
     }
@@ -102,11 +96,8 @@ impl Sample {
         if mirrored {
             frames.x_px.iter_mut().for_each(|x| *x = -*x);
         }
-        let directions: Vec<Option<Vector3<f64>>> = self
-            .angles_deg
-            .iter()
-            .map(|&given| direction(read(given)))
-            .collect();
+        let directions = self.angles_deg.iter().map(|&given| direction(read(given)));
+        let directions: Vec<_> = directions.collect();
         if directions.iter().any(Option::is_none) {
             return None;
         }
@@ -116,8 +107,7 @@ impl Sample {
         for (k, q) in attitudes.iter().enumerate() {
             let Some(q) = q else { continue };
             for row in frames.rows_of(k) {
-                let (x, y) = (frames.x_px[row], frames.y_px[row]);
-                let seen = situation.camera.direction(Pixel { x, y });
+                let seen = seen_at(&situation.camera, &frames, row);
                 angles.extend(directions[row].map(|u| (q * u).angle(&seen)));
             }
         }
@@ -129,12 +119,7 @@ fn direction([ra, dec]: [f64; 2]) -> Option<Vector3<f64>> {
     if !(0.0..=360.0).contains(&ra) || dec.abs() > 90.0 {
         return None;
     }
-    let (ra, dec) = (ra.to_radians(), dec.to_radians());
-    Some(Vector3::new(
-        dec.cos() * ra.cos(),
-        dec.cos() * ra.sin(),
-        dec.sin(),
-    ))
+    Some(unit_vector(Angle::from_deg(ra), Angle::from_deg(dec)))
 }
 
 /// Refuses stars that fit the catalogue in another convention alone.

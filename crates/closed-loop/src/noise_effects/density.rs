@@ -12,7 +12,7 @@
 //! Source: a scale mixture of chi-squared laws of two degrees of freedom.
 
 use super::rows::Row;
-use super::variance::{NO_SHARE, PARAMETERS, PER_MAG};
+use super::variance::{LEVEL, MAGNITUDE, NO_SHARE, PARAMETERS, PER_MAG, RATE, SHARE, SIZE};
 
 /// The model at a point: what all rows share.
 pub(super) struct There {
@@ -148,11 +148,11 @@ impl There {
             let spike = slope(1);
             let all = slope(0) + spike + slope(2);
             let share = density.posterior[1][l] - density.posterior[0][l] * of_others;
-            out[0][l] = all * rows.own[l];
-            out[1][l] = all * rows.own[l] * PER_MAG * rows.mag[l];
-            out[2][l] = all * rows.rate[l];
-            out[3][l] = share * (1.0 - rho) * rows.there[l];
-            out[4][l] = spike * self.more[1] * rows.shows[l];
+            out[LEVEL][l] = all * rows.own[l];
+            out[MAGNITUDE][l] = all * rows.own[l] * PER_MAG * rows.mag[l];
+            out[RATE][l] = all * rows.rate[l];
+            out[SHARE][l] = share * (1.0 - rho) * rows.there[l];
+            out[SIZE][l] = spike * self.more[1] * rows.shows[l];
         }
         out
     }

@@ -3,7 +3,7 @@ use rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal, StudentT, Uniform};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-use super::judge::{Known, Verdicts, judge};
+use super::judge::{Judged, Known, Verdicts, judge};
 use super::rows::Row;
 use super::variance::{Fit, LEVEL, Model, PARAMETERS, SHARE, SIZE};
 
@@ -361,12 +361,14 @@ fn what_stands_out_row_after_row_is_no_spike() {
     let apart = moving(7, |_| 0.0, |k| loud(k % 20 == 9)).outliers;
     assert!(apart.stands, "{apart:?}");
     let together = moving(7, |_| 0.0, |k| loud((200..225).contains(&k))).outliers;
-    assert!(!together.stands, "{together:?}");
+    is_refused(&together, "after the other");
+}
+
+fn is_refused(judged: &Judged, why: &str) {
+    assert!(!judged.stands, "{judged:?}");
     assert!(
-        together
-            .against
-            .is_some_and(|why| why.contains("after the other")),
-        "{together:?}"
+        judged.against.is_some_and(|said| said.contains(why)),
+        "{judged:?}"
     );
 }
 
@@ -374,13 +376,7 @@ fn what_stands_out_row_after_row_is_no_spike() {
 #[test]
 fn so_many_rows_are_no_spikes() {
     let often = moving(8, |_| 0.0, |k| if k % 3 == 0 { 25.0 } else { 0.0 }).outliers;
-    assert!(!often.stands, "{often:?}");
-    assert!(
-        often
-            .against
-            .is_some_and(|why| why.contains("so many rows")),
-        "{often:?}"
-    );
+    is_refused(&often, "so many rows");
 }
 
 /// 14 stars in 500 frames at this rate, deg/s, with noise of 2.5 arcsec and of `more` beside it.

@@ -58,7 +58,7 @@ pub(crate) fn attitudes(
 }
 
 /// Where the camera sees the centroid of a row.
-pub(super) fn seen_at(camera: &Camera, frames: &StarFrames, row: usize) -> Vector3<f64> {
+pub(crate) fn seen_at(camera: &Camera, frames: &StarFrames, row: usize) -> Vector3<f64> {
     camera.direction(Pixel {
         x: frames.x_px[row],
         y: frames.y_px[row],

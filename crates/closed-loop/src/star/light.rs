@@ -413,6 +413,10 @@ mod tests {
         [0.02 * t + 0.3 * (0.05 * t).sin(), 0.4 * (0.04 * t).cos()]
     }
 
+    fn jitter(_: f64, normal: &mut dyn FnMut() -> f64) -> [f64; 2] {
+        [3.0 * normal(), 3.0 * normal()]
+    }
+
     /// At 5 Hz the frames around tell a slow motion to a tenth of the variance of one frame, 1/S + 1/N with
     /// S = 0.15^2 and N = 0.2^2 / 5 and more: 0.0059 px^2 and more by stars and reference, 0.0007 with up
     /// to 32 frames (9/4 over their number) and the shorter stretches where the motion bends. The error's
@@ -436,7 +440,6 @@ mod tests {
     #[test]
     fn jitter_between_the_frames_is_not_smoothed() {
         for free in [false, true] {
-            let jitter = |_: f64, normal: &mut dyn FnMut() -> f64| [3.0 * normal(), 3.0 * normal()];
             let [square, claimed, _] = made(&jitter, free).errors();
             assert!(
                 (0.85..1.15).contains(&(square / claimed)),
@@ -453,7 +456,6 @@ mod tests {
     fn a_slow_error_of_the_reference_is_known_from_the_frames_around() {
         let half = 0.1 * FRAMES as f64;
         let step = |t: f64, _: &mut dyn FnMut() -> f64| [if t < half { 0.15 } else { -0.15 }; 2];
-        let jitter = |_: f64, normal: &mut dyn FnMut() -> f64| [3.0 * normal(), 3.0 * normal()];
         let slow = |t: f64, _: &mut dyn FnMut() -> f64| slowly(t);
         let paths: [At<'_>; 2] = [&jitter, &slow];
         for path in paths {
@@ -485,7 +487,6 @@ mod tests {
     /// mean known to 0.08 x 0.25 / sqrt(12000 / 2.5) = 0.0003.
     #[test]
     fn a_position_does_not_hold_its_own_noise() {
-        let jitter = |_: f64, normal: &mut dyn FnMut() -> f64| [3.0 * normal(), 3.0 * normal()];
         let [_, claimed, product] = made(&jitter, false).errors();
         assert!((product + claimed).abs() < 1.5e-3, "{product} {claimed}");
         let [_, _, product] = made(&jitter, true).errors();

@@ -287,8 +287,8 @@ fn explored<'a>(
 ) -> Result<Explored<'a>, CloseError> {
     let moments = white.moments(folds, &borrowed(&candidates));
     let plain = plainly(white, folds, &candidates, &moments)?;
-    let all = without_slow(white, folds, &candidates, may, start, &moments, &plain)?;
-    if let Some((selection, quieter)) = all {
+    let settled = without_slow(white, folds, &candidates, may, start, &moments, &plain)?;
+    if let Some((selection, quieter)) = settled {
         return Ok(Explored::White(Box::new(Found {
             candidates,
             fitted: quieter.unwrap_or(plain),
