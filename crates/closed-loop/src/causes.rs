@@ -28,6 +28,7 @@ use crate::search::refusal::{Refusal, Refused};
 use crate::search::selection::{columns_of, costs};
 use crate::search::{Found, borrowed, family, first_column, fit, joined};
 use crate::star::evidence::StarEvidence;
+use crate::star::landing::Shifts;
 use crate::star::search::{Searched, attempt, declared_noise};
 use changing_effect::{Changing, Inner, Way};
 use commonness::Slow;
@@ -66,6 +67,22 @@ pub(crate) struct Quest<'a> {
     pub(crate) ways: &'a [Way],
     /// What sizes are told in.
     pub(crate) surroundings: Surroundings<'a>,
+    /// Whether the light is to be followed to where it falls before anything is described.
+    pub(crate) lands: bool,
+}
+
+/// What a quest ends with.
+pub(crate) enum Outcome<'a> {
+    Named(Box<Named<'a>>),
+    /// What was found takes the light elsewhere, whatever may speak against it.
+    Elsewhere(Box<Elsewhere>),
+}
+
+/// What was found takes the light elsewhere.
+pub(crate) struct Elsewhere {
+    pub(crate) shifts: Shifts,
+    /// What was chosen, in its polished form, and its place among the candidates.
+    pub(crate) forms: Vec<(usize, Arc<dyn Candidate>)>,
 }
 
 /// What may be named, and what is left beside it.
@@ -112,7 +129,7 @@ pub(crate) fn run<'a>(
     white: &StarEvidence<'a>,
     folds: &Folds,
     quest: &Quest<'_>,
-) -> Result<Named<'a>, CloseError> {
+) -> Result<Outcome<'a>, CloseError> {
     let alone = white.data.free_attitude || white.residuals.len() != 1;
     let mut start = if alone {
         None
@@ -154,6 +171,14 @@ pub(crate) fn run<'a>(
             start = None;
             reinstated(&mut refused);
             continue;
+        }
+        if quest.lands
+            && let Some(shifts) = Shifts::elsewhere(level, folds, &searched.found)?
+        {
+            return Ok(Outcome::Elsewhere(Box::new(Elsewhere {
+                shifts,
+                forms: searched.found.chosen_forms(),
+            })));
         }
         let terms = (quest.terms)(searched.wander.is_some());
         let described = Described::new(level, folds, &searched.found, terms, quest.ways)?;
@@ -219,14 +244,14 @@ pub(crate) fn run<'a>(
             }
         }
         if kept.is_empty() && !last {
-            return Ok(Named {
+            return Ok(Outcome::Named(Box::new(Named {
                 searched,
                 described,
                 inside,
                 slow,
                 oversize,
                 refused,
-            });
+            })));
         }
         // without what is only described
         let Searched {
@@ -265,14 +290,14 @@ pub(crate) fn run<'a>(
             wander,
         };
         let inside = noise_effects::in_sample(level, &searched.found);
-        return Ok(Named {
+        return Ok(Outcome::Named(Box::new(Named {
             slow: slow_left(level, inside.as_deref()),
             described,
             inside,
             searched,
             oversize,
             refused,
-        });
+        })));
     }
     Err(CloseError::Singular)
 }

@@ -242,6 +242,13 @@ impl Found {
         chosen.map(|&g| self.candidates[g].as_ref())
     }
 
+    /// The same with their places among the candidates.
+    pub(crate) fn chosen_forms(&self) -> Vec<(usize, Arc<dyn Candidate>)> {
+        let chosen = self.selection.chosen.iter();
+        let forms = chosen.map(|&g| (g, Arc::clone(&self.candidates[g])));
+        forms.collect()
+    }
+
     /// What was chosen alone, fitted to `evidence`.
     pub(crate) fn refitted(
         &self,

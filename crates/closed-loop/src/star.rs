@@ -35,7 +35,7 @@ mod finish;
 pub(crate) mod frame_rotation;
 #[cfg(test)]
 pub(crate) mod harness;
-mod landing;
+pub(crate) mod landing;
 mod layout;
 mod light;
 mod misalignment;

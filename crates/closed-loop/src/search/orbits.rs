@@ -267,13 +267,21 @@ pub(crate) fn propose(
         let columns = |groups: std::ops::Range<usize>| {
             columns_of(&fitted.groups, &groups.collect::<Vec<usize>>())
         };
-        let with = columns(0..1 + not_turn.len());
-        let without = columns(1..1 + not_turn.len());
-        let others = columns(1..all.len());
+        let first = 1 + not_turn.len();
+        let with = columns(0..first);
+        let without = columns(1..first);
         let error = |set: &[usize]| fitted.fits.error(set).unwrap_or(f64::INFINITY);
         let gain = |set: &[usize]| 0.5 * fitted.scalars * (error(&without) / error(set)).ln();
         nats = gain(&with);
-        if nats < WORTH_A_SEARCH || nats < RIVAL * gain(&others).max(slow) {
+        let others = gain(&columns(1..all.len()));
+        if nats < WORTH_A_SEARCH || nats < RIVAL * others.max(slow) {
+            return Ok(None);
+        }
+        // beside white noise it would be chosen in the place of the best of the others, or beside all of them
+        let one = |g: usize| gain(&[&without[..], &columns(g..g + 1)].concat());
+        let best = (first..all.len()).map(one).fold(0.0, f64::max);
+        let more = gain(&columns(0..all.len())) - others;
+        if slow == 0.0 && nats < best - OWN_SHAPE && more < WORTH_A_SEARCH {
             return Ok(None);
         }
         let Some(estimate) = fitted.fits.estimate(&with) else {

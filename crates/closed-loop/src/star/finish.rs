@@ -4,8 +4,6 @@
 //! Not physics: the order of the report.
 
 use block_regression::Folds;
-use effects::Candidate;
-use nalgebra::DVector;
 use spectra::robust::median_step;
 use star_images::Formed;
 use telemetry::report::{ConsideredEffect, Errors, FoundEffect, Report, Rows};
@@ -14,7 +12,7 @@ use telemetry::{DarkMap, Model, StarResiduals};
 use crate::causes::commonness::Slow;
 use crate::causes::description::{self, Described};
 use crate::error::CloseError;
-use crate::evidence::{Amplitudes, Evidence, Residuals};
+use crate::evidence::{Evidence, Residuals};
 use crate::figures;
 use crate::image_level::{self, ImageLevel};
 use crate::noise_effects;
@@ -30,7 +28,6 @@ use crate::search::{Found, amplitudes_as, fit};
 use crate::situation::Situation;
 use crate::star::data::StarData;
 use crate::star::evidence::StarEvidence;
-use crate::star::landing::Shifts;
 use crate::star::own_attitude;
 use crate::star::reference_wander::{self, REFERENCE_ERROR};
 use crate::star::search::Wander;
@@ -68,45 +65,6 @@ impl Finish<'_> {
         Ok(self
             .level
             .residuals(self.folds, &only.candidates, &amplitudes))
-    }
-
-    /// What the chosen effects and the nuisance beside them shift each row by, as all data have them.
-    pub(crate) fn modelled(&self) -> Result<Shifts, CloseError> {
-        let chosen = &self.found.selection.chosen;
-        let fits = &self.found.fitted.fits;
-        let set = columns_of(&self.found.fitted.groups, chosen);
-        let only = self.found.only(chosen);
-        let beta = match set.is_empty() {
-            true => DVector::zeros(0),
-            false => fits.estimate(&set).ok_or(CloseError::Singular)?.value,
-        };
-        let count = self.folds.count;
-        let nuisance = fits.nuisance(None, &set, &beta);
-        let with = |acts: fn(&dyn Candidate) -> bool| {
-            let mut amplitudes = only.spread(&beta);
-            let mut first = 0;
-            for candidate in &only.candidates {
-                let own = candidate.coefficients().len();
-                if !acts(*candidate) {
-                    amplitudes.rows_mut(first, own).fill(0.0);
-                }
-                first += own;
-            }
-            Amplitudes {
-                nuisance: vec![nuisance.clone(); count],
-                candidates: vec![amplitudes; count],
-            }
-        };
-        let each = [with(|_| false), with(|c| c.moves_light()), with(|_| true)];
-        let each = self
-            .level
-            .residuals_of(self.folds, &only.candidates, each.each_ref());
-        let [fitted, light, whole] = each.map(|r| r.modelled);
-        Ok(Shifts {
-            fitted,
-            light,
-            whole,
-        })
     }
 
     /// What the chosen effects leave in sample beside the description of it, where there is one, arcsec.

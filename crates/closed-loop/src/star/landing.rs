@@ -8,14 +8,19 @@
 
 use std::sync::Arc;
 
+use block_regression::Folds;
 use centroid::CentroidError;
-use effects::Effect;
+use effects::{Candidate, Effect};
 use focal_plane::{ARCSEC_PER_RAD, AttitudeSource};
-use nalgebra::{UnitQuaternion, Vector3};
+use nalgebra::{DVector, UnitQuaternion, Vector3};
 use rayon::prelude::*;
 
-use crate::evidence::Residuals;
+use crate::error::CloseError;
+use crate::evidence::{Amplitudes, Residuals};
+use crate::search::Found;
+use crate::search::selection::columns_of;
 use crate::star::data::{Light, StarData};
+use crate::star::evidence::StarEvidence;
 use crate::star::frame_rotation::{rotation_of, rotation_row};
 use crate::star::light;
 
@@ -30,6 +35,71 @@ pub(crate) struct Shifts {
     pub(crate) light: Vec<Vec<f64>>,
     /// With all effects: those that act on the centroid leave the light where it is.
     pub(crate) whole: Vec<Vec<f64>>,
+}
+
+impl Shifts {
+    /// What the chosen effects and the nuisance beside them shift each row by, as all data have them.
+    pub(crate) fn of(
+        level: &StarEvidence<'_>,
+        folds: &Folds,
+        found: &Found,
+    ) -> Result<Self, CloseError> {
+        let acts: [fn(&dyn Candidate) -> bool; 3] = [|_| false, |c| c.moves_light(), |_| true];
+        let [fitted, light, whole] = modelled(level, folds, found, acts)?;
+        Ok(Self {
+            fitted,
+            light,
+            whole,
+        })
+    }
+
+    /// As [`Self::of`], where that takes the light elsewhere.
+    pub(crate) fn elsewhere(
+        level: &StarEvidence<'_>,
+        folds: &Folds,
+        found: &Found,
+    ) -> Result<Option<Self>, CloseError> {
+        if !found.chosen().any(|c| c.moves_light()) {
+            return Ok(None);
+        }
+        let [light] = modelled(level, folds, found, [|c: &dyn Candidate| c.moves_light()])?;
+        let elsewhere = level.data.lands_elsewhere(&light);
+        elsewhere.then(|| Self::of(level, folds, found)).transpose()
+    }
+}
+
+/// What the nuisance and those of the chosen effects that are asked for shift each row by, arcsec.
+fn modelled<const N: usize>(
+    level: &StarEvidence<'_>,
+    folds: &Folds,
+    found: &Found,
+    acts: [fn(&dyn Candidate) -> bool; N],
+) -> Result<[Vec<Vec<f64>>; N], CloseError> {
+    let fits = &found.fitted.fits;
+    let set = columns_of(&found.fitted.groups, &found.selection.chosen);
+    let only = found.only(&found.selection.chosen);
+    let beta = match set.is_empty() {
+        true => DVector::zeros(0),
+        false => fits.estimate(&set).ok_or(CloseError::Singular)?.value,
+    };
+    let nuisance = fits.nuisance(None, &set, &beta);
+    let with = acts.map(|acts| {
+        let mut amplitudes = only.spread(&beta);
+        let mut first = 0;
+        for candidate in &only.candidates {
+            let own = candidate.coefficients().len();
+            if !acts(*candidate) {
+                amplitudes.rows_mut(first, own).fill(0.0);
+            }
+            first += own;
+        }
+        Amplitudes {
+            nuisance: vec![nuisance.clone(); folds.count],
+            candidates: vec![amplitudes; folds.count],
+        }
+    });
+    let each = level.residuals_of(folds, &only.candidates, with.each_ref());
+    Ok(each.map(|r| r.modelled))
 }
 
 impl StarData {

@@ -15,7 +15,7 @@ use focal_plane::{AttitudeSeries, Points};
 use spectra::robust::median_step;
 
 use crate::causes::description;
-use crate::causes::{self, Named, Quest};
+use crate::causes::{self, Elsewhere, Named, Outcome, Quest};
 use crate::declared;
 use crate::error::CloseError;
 use crate::figures;
@@ -23,6 +23,7 @@ use crate::image_level::{self, Side};
 use crate::motion::{self, Around, gyro::with_rates, source};
 use crate::outcome::Closed;
 use crate::search::catalogue;
+use crate::search::family;
 use crate::search::orbits::{self, Look};
 use crate::situation::Situation;
 use crate::star::data::{Inputs, Star, StarData};
@@ -105,19 +106,19 @@ fn trace(
     data.lands_as_modelled();
     let mut settled = settle(data, situation, phase, folds)?;
     let mut landings = LANDINGS;
-    let mut steady = None;
+    let mut known = Known::default();
     loop {
-        let last = landings == 0;
-        let path = steady.as_ref();
-        let shifts = match explain(data, situation, folds, &settled, path, last, progress)? {
-            Explained::Closed(closed) => return Ok(*closed),
-            Explained::Steadier(path) => {
-                steady = Some(path);
-                continue;
-            }
-            Explained::Elsewhere(moved) => moved,
-        };
+        let Elsewhere { shifts, forms } =
+            match explain(data, situation, folds, &settled, &known, landings, progress)? {
+                Explained::Closed(closed) => return Ok(*closed),
+                Explained::Steadier(path) => {
+                    known.path = Some(path);
+                    continue;
+                }
+                Explained::Elsewhere(elsewhere) => *elsewhere,
+            };
         landings -= 1;
+        known.forms = forms;
         // the declared model knows nothing of where the light falls
         settled
             .phase_error
@@ -126,24 +127,46 @@ fn trace(
     }
 }
 
+/// What searches before know.
+#[derive(Default)]
+struct Known {
+    /// The reference's motion without its slow error.
+    path: Option<AttitudeSeries>,
+    /// What was chosen, in its polished form, and its place among the candidates.
+    forms: Vec<(usize, Arc<dyn Candidate>)>,
+}
+
+impl Known {
+    /// Puts polished forms in the place of the same candidates of `list`: another polish has little left to do.
+    fn polished(&self, list: &mut [Arc<dyn Candidate>]) {
+        let cause = |c: &dyn Candidate| (family(c), c.part(), c.nonlinear().len());
+        for (g, form) in &self.forms {
+            let candidate = list.get_mut(*g);
+            let same = candidate.filter(|c| cause(c.as_ref()) == cause(form.as_ref()));
+            if let Some(candidate) = same {
+                candidate.clone_from(form);
+            }
+        }
+    }
+}
+
 /// What a search ends with.
 enum Explained {
     Closed(Box<Closed>),
     /// What was found shifts the light to another pixel phase than the fits assumed.
-    Elsewhere(Box<Shifts>),
+    Elsewhere(Box<Elsewhere>),
     /// Something is left that follows the motion of a reference that errs slowly: its path without that error.
     Steadier(AttitudeSeries),
 }
 
-/// From the declared model at its best to the report, or to where the light falls. `path`: the reference's
-/// motion without its slow error, where that is known.
+/// From the declared model at its best to the report, or, while `landings` are left, to where the light falls.
 fn explain(
     data: &mut StarData,
     situation: &Situation<'_>,
     folds: &Folds,
     settled: &Settled,
-    path: Option<&AttitudeSeries>,
-    last: bool,
+    before: &Known,
+    landings: usize,
     progress: &dyn Fn(&str),
 ) -> Result<Explained, CloseError> {
     let own = match &situation.reference {
@@ -152,6 +175,7 @@ fn explain(
             .own_motion()
             .map(|own| with_rates(own, situation.bundle.rates.as_ref())),
     };
+    let path = before.path.as_ref();
     let known = path.or(situation.reference.as_ref()).or(own.as_ref());
     let arm = motion::roll_arm(&data.camera);
     let around =
@@ -222,11 +246,12 @@ fn explain(
     let accelerates = || by_rates || reference.is_none_or(|r| motion::accelerates(r, arm));
     let rms = figures::star_rms(&settled.before, data);
     let yields = description::could_yield(situation, data, rms);
-    let named = |put_forward: &[Arc<dyn Candidate>]| {
+    let named = |put_forward: &[Arc<dyn Candidate>], lands: bool| {
         let candidates = || {
             let mut list = catalogue::candidates(&scene);
             // With raw windows a warm pixel is the dark map's business.
             list.retain(|c| c.acts_on_stars() && !(formed.is_some() && c.id() == "hot_pixel"));
+            before.polished(&mut list);
             list.extend(put_forward.iter().cloned());
             list
         };
@@ -237,6 +262,7 @@ fn explain(
             },
             ways: &ways,
             surroundings: situation.surroundings(),
+            lands,
         };
         causes::run(level, folds, &quest)
     };
@@ -246,7 +272,11 @@ fn explain(
         let series = Series::of(&leftover::star_tracks(data, &residual, &level.weight));
         Some((residual, series))
     };
-    let mut outcome = named(&[])?;
+    // the first time before anything is described
+    let mut outcome = match named(&[], formed.is_none() && landings == LANDINGS)? {
+        Outcome::Named(named) => *named,
+        Outcome::Elsewhere(elsewhere) => return Ok(Explained::Elsewhere(elsewhere)),
+    };
     let mut inside = left(&mut outcome);
     let line = inside
         .as_ref()
@@ -269,15 +299,15 @@ fn explain(
     }
     if !put_forward.is_empty() {
         progress("searching again with the line, jump or orbit that is left");
-        let mut again = named(&put_forward)?;
         // what was put forward in vain changes nothing
-        if again
-            .searched
-            .found
-            .names_one_of_the_last(put_forward.len())
+        if let Outcome::Named(mut again) = named(&put_forward, false)?
+            && again
+                .searched
+                .found
+                .names_one_of_the_last(put_forward.len())
         {
             inside = left(&mut again);
-            outcome = again;
+            outcome = *again;
         }
     }
     if let (None, false, Some(reference)) = (path, by_rates, reference)
@@ -326,10 +356,11 @@ fn explain(
         image: image.as_ref().zip(formed.as_ref()),
     };
     let after = whole.residuals(&searched.found.selection.chosen)?;
-    if !last && formed.is_none() && data.lands_elsewhere(&after.modelled) {
-        let shifts = whole.modelled()?;
+    if landings > 0 && formed.is_none() && data.lands_elsewhere(&after.modelled) {
+        let shifts = Shifts::of(whole.level, folds, whole.found)?;
         if data.lands_elsewhere(&shifts.light) {
-            return Ok(Explained::Elsewhere(Box::new(shifts)));
+            let forms = searched.found.chosen_forms();
+            return Ok(Explained::Elsewhere(Box::new(Elsewhere { shifts, forms })));
         }
     }
     progress("figures");

@@ -43,16 +43,14 @@ use crate::search::selection::{FAMILY_ALPHA, SLOW_PRICE, Selection, WIDENING, co
 use crate::search::{Fitted, Found, borrowed, fit_grams, polish, search};
 use crate::star::evidence::StarEvidence;
 use crate::star::moments::StarMoments;
-use trial::{Trial, paid_by_slow};
+use alone::{Begun, Outcome};
+use trial::Trial;
 
+mod alone;
 mod trial;
 
 /// Candidates of each list that are scored.
 const SHORTLIST: usize = 3;
-/// Nats by which effects have to be worth more than a slow error in their place, for it not to be gone into; and the
-/// chance of what is slow beside them.
-const BY_FAR: f64 = 10.0;
-const TRACE: f64 = 0.05;
 /// Most effects that are added.
 const MOST: usize = 8;
 /// Parts of a long run of which one is searched before the whole is.
@@ -277,7 +275,7 @@ enum Explored<'a> {
     Coloured(Box<Coloured<'a>>),
 }
 
-/// The search beside a slow error, unless white evidence makes it needless ([`without_slow`]).
+/// The search beside a slow error, unless white evidence makes it needless ([`alone::without_slow`]).
 fn explored<'a>(
     white: &StarEvidence<'a>,
     folds: &Folds,
@@ -285,93 +283,29 @@ fn explored<'a>(
     may: &[bool],
     start: CommonNoise,
 ) -> Result<Explored<'a>, CloseError> {
-    let moments = white.moments(folds, &borrowed(&candidates));
-    let plain = plainly(white, folds, &candidates, &moments)?;
-    let settled = without_slow(white, folds, &candidates, may, start, &moments, &plain)?;
-    if let Some((selection, quieter)) = settled {
-        return Ok(Explored::White(Box::new(Found {
-            candidates,
-            fitted: quieter.unwrap_or(plain),
-            selection,
-        })));
-    }
-    let coloured = coloured(white, folds, candidates, may, start, (moments, plain))?;
-    Ok(Explored::Coloured(Box::new(coloured)))
-}
-
-/// The fits under white noise.
-fn plainly(
-    white: &StarEvidence<'_>,
-    folds: &Folds,
-    candidates: &[Arc<dyn Candidate>],
-    moments: &StarMoments,
-) -> Result<Fitted, CloseError> {
-    let all: Vec<usize> = (0..moments.width()).collect();
-    let grams = moments.white_of(&all);
-    fit_grams(white, &grams, folds, &borrowed(candidates))
-}
-
-/// What white evidence finds, where that is all: nothing of it could be the work of a slow error, beside it there is no
-/// trace of one, and it is likelier by far than such an error alone. What is slow in the declared model's residual is
-/// the effect's then, and hypotheses with noise of their own need not be gone through.
-fn without_slow(
-    white: &StarEvidence<'_>,
-    folds: &Folds,
-    candidates: &[Arc<dyn Candidate>],
-    may: &[bool],
-    start: CommonNoise,
-    moments: &StarMoments,
-    plain: &Fitted,
-) -> Result<Option<(Selection, Option<Fitted>)>, CloseError> {
-    if white.drawn.is_some() {
-        // white evidence is another one then
-        return Ok(None);
-    }
-    let (selection, quieter) = plain.selected(folds, candidates, may)?;
-    let chosen = &selection.chosen;
-    let settled = |g: &usize| {
-        let candidate = &candidates[*g];
-        !candidate.acts_on_attitude() && candidate.nonlinear().is_empty()
-    };
-    if chosen.is_empty() || !chosen.iter().all(settled) {
-        return Ok(None);
-    }
-    let fitted = quieter.as_ref().unwrap_or(plain);
-    if polish(white, folds, &mut candidates.to_vec(), fitted, chosen)? {
-        return Ok(None);
-    }
-    let trial = Trial {
-        moments,
-        folds,
-        precision: white.precision(),
-        variance: fitted.variance_beside(chosen).unwrap_or(1.0),
-        groups: &fitted.groups,
-        cost: costs(&fitted.groups, may),
-        all: None,
-        single: true,
-    };
-    moments.sum_up();
-    let (whole, bare) = rayon::join(
-        || trial.score(chosen, &start),
-        || trial.climb(&trial.columns(&[]), &start),
-    );
-    let (Some(whole), Some((noise, rotations, loglik))) = (whole, bare) else {
-        return Ok(None);
-    };
-    let slow_alone = loglik - paid_by_slow(&rotations.slow_gains(&noise), SLOW_PRICE);
-    let by_far = trial.worth(&whole, f64::INFINITY) > slow_alone + BY_FAR;
-    let none = Wander::of(whole.rotations, whole.noise).p_value() > TRACE;
-    Ok((by_far && none).then_some((selection, quieter)))
+    let begun = Begun::on(white, folds, candidates)?;
+    Ok(
+        match alone::without_slow(white, folds, begun, may, start)? {
+            Outcome::Settled(found) => Explored::White(found),
+            Outcome::Open(begun) => {
+                Explored::Coloured(Box::new(coloured(white, folds, *begun, may, start)?))
+            }
+        },
+    )
 }
 
 fn coloured<'a>(
     white: &StarEvidence<'a>,
     folds: &Folds,
-    mut candidates: Vec<Arc<dyn Candidate>>,
+    begun: Begun,
     may: &[bool],
     start: CommonNoise,
-    (mut moments, plain): (StarMoments, Fitted),
 ) -> Result<Coloured<'a>, CloseError> {
+    let Begun {
+        mut candidates,
+        mut moments,
+        plain,
+    } = begun;
     let mut banned = vec![false; candidates.len()];
     let mut chosen: Vec<usize> = Vec::new();
     let mut noise = start;
@@ -390,7 +324,7 @@ fn coloured<'a>(
         let beside = |fitted: Fitted| fitted.beside(folds, &borrowed(&candidates), &chosen);
         let plain = match plain_fit.take() {
             Some(plain) => plain,
-            None => plainly(white, folds, &candidates, &moments)?,
+            None => alone::plainly(white, folds, &candidates, &moments)?,
         };
         let plain = beside(plain)?;
         let filtered = match filtered_fit.take() {

@@ -1,0 +1,224 @@
+//! Where white evidence is all there is, though what is left of the declared model is slow.
+//!
+//! Hypotheses with a noise of their own need not be gone through where beside what white evidence finds no trace of a
+//! slow error is left, and none of it, by itself or with others, could be the work of one:
+//!
+//! ```text
+//! worth(all, white) > worth(all but S, slow) + 10 nats     for every set S of what turns frames, and for all
+//! ```
+//!
+//! What is slow in the declared model's residual is the effects' then.
+//!
+//! Not physics: a comparison of hypotheses ([`super`]).
+
+use std::sync::Arc;
+
+use block_regression::Folds;
+use coloured_noise::CommonNoise;
+use effects::Candidate;
+
+use super::Wander;
+use super::trial::{Scored, Trial, paid_by_slow};
+use crate::error::CloseError;
+use crate::evidence::Evidence;
+use crate::search::selection::{SLOW_PRICE, costs};
+use crate::search::{Fitted, Found, borrowed, fit_grams, polish};
+use crate::star::evidence::StarEvidence;
+use crate::star::moments::StarMoments;
+
+/// Nats by which effects have to be worth more than a slow error in their place, for it not to be gone into; and the
+/// chance of what is slow beside them.
+const BY_FAR: f64 = 10.0;
+const TRACE: f64 = 0.05;
+/// Effects that turn frames of which every set is held against a slow error: of more there are too many.
+const MOST_SETS_OF: usize = 3;
+/// Rounds of selection and polish; the choice settles in two.
+const ROUNDS: usize = 3;
+
+/// Candidates, their products, and their fits under white noise.
+pub(super) struct Begun {
+    pub(super) candidates: Vec<Arc<dyn Candidate>>,
+    pub(super) moments: StarMoments,
+    pub(super) plain: Fitted,
+}
+
+/// What white evidence comes to.
+pub(super) enum Outcome {
+    Settled(Box<Found>),
+    /// A slow error may be in it.
+    Open(Box<Begun>),
+}
+
+impl Begun {
+    pub(super) fn on(
+        white: &StarEvidence<'_>,
+        folds: &Folds,
+        candidates: Vec<Arc<dyn Candidate>>,
+    ) -> Result<Self, CloseError> {
+        let moments = white.moments(folds, &borrowed(&candidates));
+        let plain = plainly(white, folds, &candidates, &moments)?;
+        Ok(Self {
+            candidates,
+            moments,
+            plain,
+        })
+    }
+}
+
+/// The fits under white noise.
+pub(super) fn plainly(
+    white: &StarEvidence<'_>,
+    folds: &Folds,
+    candidates: &[Arc<dyn Candidate>],
+    moments: &StarMoments,
+) -> Result<Fitted, CloseError> {
+    let all: Vec<usize> = (0..moments.width()).collect();
+    let grams = moments.white_of(&all);
+    fit_grams(white, &grams, folds, &borrowed(candidates))
+}
+
+/// Rounds of selection and polish on white evidence, while that looks as if it were all: see the module.
+pub(super) fn without_slow(
+    white: &StarEvidence<'_>,
+    folds: &Folds,
+    mut begun: Begun,
+    may: &[bool],
+    start: CommonNoise,
+) -> Result<Outcome, CloseError> {
+    if white.drawn.is_some() {
+        // white evidence is another one then
+        return Ok(Outcome::Open(Box::new(begun)));
+    }
+    let mut before: Vec<usize> = Vec::new();
+    for _ in 0..ROUNDS {
+        let (selection, quieter) = begun.plain.selected(folds, &begun.candidates, may)?;
+        let fitted = quieter.as_ref().unwrap_or(&begun.plain);
+        let chosen = &selection.chosen;
+        let turns = |g: &&usize| begun.candidates[**g].acts_on_attitude();
+        if chosen.is_empty() || chosen.iter().filter(turns).count() > MOST_SETS_OF {
+            break;
+        }
+        let cost = costs(&fitted.groups, may);
+        let mut polished = begun.candidates.clone();
+        if *chosen == before || !polish(white, folds, &mut polished, fitted, chosen)? {
+            let alone = Alone::new(white, folds, &begun, fitted, chosen, cost);
+            let whole = alone.likely(&start);
+            if !whole.is_some_and(|whole| alone.stands(&whole, &start)) {
+                break;
+            }
+            return Ok(Outcome::Settled(Box::new(Found {
+                candidates: begun.candidates,
+                fitted: quieter.unwrap_or(begun.plain),
+                selection,
+            })));
+        }
+        // by themselves first, which costs little
+        let own = chosen.iter().map(|&g| Arc::clone(&polished[g])).collect();
+        let own = Begun::on(white, folds, own)?;
+        let all: Vec<usize> = (0..chosen.len()).collect();
+        let cost = chosen.iter().map(|&g| cost[g]).collect();
+        let alone = Alone::new(white, folds, &own, &own.plain, &all, cost);
+        if alone.likely(&start).is_none() {
+            break;
+        }
+        before.clone_from(chosen);
+        // there is no room for the old products beside the new
+        drop(begun);
+        begun = Begun::on(white, folds, polished)?;
+    }
+    Ok(Outcome::Open(Box::new(begun)))
+}
+
+/// What white evidence chose, held against slow errors in its place.
+struct Alone<'a> {
+    trial: Trial<'a>,
+    chosen: &'a [usize],
+    /// Those of them that turn frames.
+    turns: Vec<usize>,
+}
+
+impl<'a> Alone<'a> {
+    /// `fitted`: the fits that chose.
+    fn new(
+        white: &StarEvidence<'_>,
+        folds: &'a Folds,
+        begun: &'a Begun,
+        fitted: &'a Fitted,
+        chosen: &'a [usize],
+        cost: Vec<f64>,
+    ) -> Self {
+        let turns = chosen.iter().copied();
+        let turns = turns.filter(|&g| begun.candidates[g].acts_on_attitude());
+        // what threads would wait for each other with
+        begun.moments.sum_up();
+        Self {
+            turns: turns.collect(),
+            trial: Trial {
+                moments: &begun.moments,
+                folds,
+                precision: white.precision(),
+                variance: fitted.variance_beside(chosen).unwrap_or(1.0),
+                groups: &fitted.groups,
+                cost,
+                all: None,
+                single: true,
+            },
+            chosen,
+        }
+    }
+
+    /// What was chosen at its best noise, if it is worth more by far than a slow error in the place of all of it
+    /// that such an error could be.
+    fn likely(&self, start: &CommonNoise) -> Option<Scored> {
+        let (whole, rest) = rayon::join(
+            || self.trial.score(self.chosen, start),
+            || self.instead_of(self.most(), start),
+        );
+        whole.filter(|whole| self.is_by_far(whole, rest))
+    }
+
+    /// All that a slow error could be in the place of.
+    fn most(&self) -> &[usize] {
+        match self.turns.is_empty() {
+            true => self.chosen,
+            false => &self.turns,
+        }
+    }
+
+    /// Whether `whole`, which is likely, is all there is.
+    fn stands(&self, whole: &Scored, start: &CommonNoise) -> bool {
+        if Wander::of(whole.rotations.clone(), whole.noise).p_value() <= TRACE {
+            return false;
+        }
+        // all of them together have been held against one
+        let mut sets: Vec<Vec<usize>> = (1..(1_usize << self.turns.len()).saturating_sub(1))
+            .map(|bits| {
+                let places = (0..self.turns.len()).filter(|k| bits >> k & 1 == 1);
+                places.map(|k| self.turns[k]).collect()
+            })
+            .collect();
+        if self.most().len() < self.chosen.len() {
+            sets.push(self.chosen.to_vec());
+        }
+        sets.iter()
+            .all(|set| self.is_by_far(whole, self.instead_of(set, start)))
+    }
+
+    /// What the rest is worth with a slow error in the place of `out`, nats.
+    fn instead_of(&self, out: &[usize], start: &CommonNoise) -> Option<f64> {
+        let rest = self.chosen.iter().copied();
+        let rest: Vec<usize> = rest.filter(|g| !out.contains(g)).collect();
+        if !rest.is_empty() {
+            let rest = self.trial.score(&rest, start)?;
+            return Some(self.trial.worth(&rest, SLOW_PRICE));
+        }
+        let columns = self.trial.columns(&[]);
+        let (noise, rotations, loglik) = self.trial.climb(&columns, start)?;
+        Some(loglik - paid_by_slow(&rotations.slow_gains(&noise), SLOW_PRICE))
+    }
+
+    fn is_by_far(&self, whole: &Scored, instead: Option<f64>) -> bool {
+        let white = self.trial.worth(whole, f64::INFINITY);
+        instead.is_some_and(|worth| white > worth + BY_FAR)
+    }
+}
