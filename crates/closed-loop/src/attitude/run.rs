@@ -136,7 +136,7 @@ pub(crate) fn run(
     });
     let white = evidence(&data, situation, white, motion);
     let (bins, surroundings) = (&data.bins.folds, &scene.surroundings);
-    put_forward.extend(orbits::propose(&white, bins, surroundings, &found, 0.0)?);
+    put_forward.extend(orbits::propose(&white, bins, surroundings, &found, None)?);
     if !put_forward.is_empty() {
         progress("searching again with the line, jump or orbit that is left");
         if line.is_some_and(|line| !data.bins.resolve(line.frequency_hz)) {

@@ -202,13 +202,13 @@ impl Normal {
 }
 
 /// The orbit, if it is worth a search: beside those effects that were `found` which do not turn the camera, and
-/// held against those that do, or against what slow noise explains, `slow` nats.
+/// held against those that do, or against what slow noise explains, `slow` nats (`None`: that is not known).
 pub(crate) fn propose(
     evidence: &dyn Evidence,
     folds: &Folds,
     surroundings: &Surroundings<'_>,
     found: &Found,
-    slow: f64,
+    slow: Option<f64>,
 ) -> Result<Option<Arc<dyn Candidate>>, CloseError> {
     if !orbit_could_show(surroundings) {
         return Ok(None);
@@ -274,14 +274,14 @@ pub(crate) fn propose(
         let gain = |set: &[usize]| 0.5 * fitted.scalars * (error(&without) / error(set)).ln();
         nats = gain(&with);
         let others = gain(&columns(1..all.len()));
-        if nats < WORTH_A_SEARCH || nats < RIVAL * others.max(slow) {
+        if nats < WORTH_A_SEARCH || nats < RIVAL * others.max(slow.unwrap_or(0.0)) {
             return Ok(None);
         }
         // beside white noise it would be chosen in the place of the best of the others, or beside all of them
         let one = |g: usize| gain(&[&without[..], &columns(g..g + 1)].concat());
         let best = (first..all.len()).map(one).fold(0.0, f64::max);
         let more = gain(&columns(0..all.len())) - others;
-        if slow == 0.0 && nats < best - OWN_SHAPE && more < WORTH_A_SEARCH {
+        if slow == Some(0.0) && nats < best - OWN_SHAPE && more < WORTH_A_SEARCH {
             return Ok(None);
         }
         let Some(estimate) = fitted.fits.estimate(&with) else {

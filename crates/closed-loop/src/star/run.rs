@@ -384,7 +384,13 @@ fn orbit(
     if wander.is_none() && !turns && !look.is_some_and(Look::follows) {
         return Ok(None);
     }
-    orbits::propose(level, folds, &scene.surroundings, &searched.found, slow)
+    orbits::propose(
+        level,
+        folds,
+        &scene.surroundings,
+        &searched.found,
+        Some(slow),
+    )
 }
 
 fn scene<'a>(
