@@ -28,7 +28,7 @@ use crate::search::refusal::{Refusal, Refused};
 use crate::search::selection::{columns_of, costs};
 use crate::search::{Found, borrowed, family, first_column, fit, joined};
 use crate::star::evidence::StarEvidence;
-use crate::star::landing::Shifts;
+use crate::star::landing::Elsewhere;
 use crate::star::search::{Searched, attempt, declared_noise};
 use changing_effect::{Changing, Inner, Way};
 use commonness::Slow;
@@ -76,13 +76,6 @@ pub(crate) enum Outcome<'a> {
     Named(Box<Named<'a>>),
     /// What was found takes the light elsewhere, whatever may speak against it.
     Elsewhere(Box<Elsewhere>),
-}
-
-/// What was found takes the light elsewhere.
-pub(crate) struct Elsewhere {
-    pub(crate) shifts: Shifts,
-    /// What was chosen, in its polished form, and its place among the candidates.
-    pub(crate) forms: Vec<(usize, Arc<dyn Candidate>)>,
 }
 
 /// What may be named, and what is left beside it.
@@ -173,12 +166,10 @@ pub(crate) fn run<'a>(
             continue;
         }
         if quest.lands
-            && let Some(shifts) = Shifts::elsewhere(level, folds, &searched.found)?
+            && searched.found.chosen().any(|c| c.moves_light())
+            && let Some(elsewhere) = Elsewhere::of(level, folds, &searched.found)?
         {
-            return Ok(Outcome::Elsewhere(Box::new(Elsewhere {
-                shifts,
-                forms: searched.found.chosen_forms(),
-            })));
+            return Ok(Outcome::Elsewhere(elsewhere));
         }
         let terms = (quest.terms)(searched.wander.is_some());
         let described = Described::new(level, folds, &searched.found, terms, quest.ways)?;

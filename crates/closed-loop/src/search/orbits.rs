@@ -278,11 +278,13 @@ pub(crate) fn propose(
             return Ok(None);
         }
         // beside white noise it would be chosen in the place of the best of the others, or beside all of them
-        let one = |g: usize| gain(&[&without[..], &columns(g..g + 1)].concat());
-        let best = (first..all.len()).map(one).fold(0.0, f64::max);
-        let more = gain(&columns(0..all.len())) - others;
-        if slow == Some(0.0) && nats < best - OWN_SHAPE && more < WORTH_A_SEARCH {
-            return Ok(None);
+        if slow == Some(0.0) {
+            let one = |g: usize| gain(&[&without[..], &columns(g..g + 1)].concat());
+            let best = (first..all.len()).map(one).fold(0.0, f64::max);
+            let more = gain(&columns(0..all.len())) - others;
+            if nats < best - OWN_SHAPE && more < WORTH_A_SEARCH {
+                return Ok(None);
+            }
         }
         let Some(estimate) = fitted.fits.estimate(&with) else {
             break;

@@ -39,11 +39,7 @@ pub(crate) struct Shifts {
 
 impl Shifts {
     /// What the chosen effects and the nuisance beside them shift each row by, as all data have them.
-    pub(crate) fn of(
-        level: &StarEvidence<'_>,
-        folds: &Folds,
-        found: &Found,
-    ) -> Result<Self, CloseError> {
+    fn of(level: &StarEvidence<'_>, folds: &Folds, found: &Found) -> Result<Self, CloseError> {
         let acts: [fn(&dyn Candidate) -> bool; 3] = [|_| false, |c| c.moves_light(), |_| true];
         let [fitted, light, whole] = modelled(level, folds, found, acts)?;
         Ok(Self {
@@ -52,19 +48,30 @@ impl Shifts {
             whole,
         })
     }
+}
 
-    /// As [`Self::of`], where that takes the light elsewhere.
-    pub(crate) fn elsewhere(
+/// What was found takes the light elsewhere.
+pub(crate) struct Elsewhere {
+    pub(crate) shifts: Shifts,
+    /// What was chosen, in its polished form, and its place among the candidates.
+    pub(crate) forms: Vec<(usize, Arc<dyn Candidate>)>,
+}
+
+impl Elsewhere {
+    /// `None`: the light falls where it was taken to.
+    pub(crate) fn of(
         level: &StarEvidence<'_>,
         folds: &Folds,
         found: &Found,
-    ) -> Result<Option<Self>, CloseError> {
-        if !found.chosen().any(|c| c.moves_light()) {
+    ) -> Result<Option<Box<Self>>, CloseError> {
+        let [light] = modelled(level, folds, found, [|c: &dyn Candidate| c.moves_light()])?;
+        if !level.data.lands_elsewhere(&light) {
             return Ok(None);
         }
-        let [light] = modelled(level, folds, found, [|c: &dyn Candidate| c.moves_light()])?;
-        let elsewhere = level.data.lands_elsewhere(&light);
-        elsewhere.then(|| Self::of(level, folds, found)).transpose()
+        Ok(Some(Box::new(Self {
+            shifts: Shifts::of(level, folds, found)?,
+            forms: found.chosen_forms(),
+        })))
     }
 }
 

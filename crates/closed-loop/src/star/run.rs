@@ -15,7 +15,7 @@ use focal_plane::{AttitudeSeries, Points};
 use spectra::robust::median_step;
 
 use crate::causes::description;
-use crate::causes::{self, Elsewhere, Named, Outcome, Quest};
+use crate::causes::{self, Named, Outcome, Quest};
 use crate::declared;
 use crate::error::CloseError;
 use crate::figures;
@@ -29,7 +29,7 @@ use crate::situation::Situation;
 use crate::star::data::{Inputs, Star, StarData};
 use crate::star::evidence::StarEvidence;
 use crate::star::finish::{Finish, finish};
-use crate::star::landing::Shifts;
+use crate::star::landing::Elsewhere;
 use crate::star::pointed::Pointed;
 use crate::star::search::Searched;
 use crate::star::settling::{Settled, settle};
@@ -356,12 +356,12 @@ fn explain(
         image: image.as_ref().zip(formed.as_ref()),
     };
     let after = whole.residuals(&searched.found.selection.chosen)?;
-    if landings > 0 && formed.is_none() && data.lands_elsewhere(&after.modelled) {
-        let shifts = Shifts::of(whole.level, folds, whole.found)?;
-        if data.lands_elsewhere(&shifts.light) {
-            let forms = searched.found.chosen_forms();
-            return Ok(Explained::Elsewhere(Box::new(Elsewhere { shifts, forms })));
-        }
+    if landings > 0
+        && formed.is_none()
+        && data.lands_elsewhere(&after.modelled)
+        && let Some(elsewhere) = Elsewhere::of(whole.level, folds, whole.found)?
+    {
+        return Ok(Explained::Elsewhere(elsewhere));
     }
     progress("figures");
     let closed = finish(&whole, after, inside)?;
