@@ -43,7 +43,7 @@ impl Filled {
     pub(super) fn reset(&mut self, rows: usize, frames: usize, layout: &Layout, nuisance: usize) {
         let shape = |m: &mut DMatrix<f64>, rows: usize, columns: usize| {
             if m.shape() != (rows, columns) {
-                *m = DMatrix::zeros(rows, columns);
+                *m = zeros_in(m, rows, columns);
             }
         };
         shape(&mut self.shared, layout.shared, rows);
@@ -54,6 +54,15 @@ impl Filled {
         shape(&mut self.turn, 3 * frames, layout.turn.len());
         self.turn.fill(0.0);
     }
+}
+
+/// A matrix of zeros in the memory of another one, which is empty then.
+pub(super) fn zeros_in(matrix: &mut DMatrix<f64>, rows: usize, columns: usize) -> DMatrix<f64> {
+    let matrix = std::mem::replace(matrix, DMatrix::zeros(0, 0));
+    let mut values: Vec<f64> = matrix.data.into();
+    values.clear();
+    values.resize(rows * columns, 0.0);
+    DMatrix::from_vec(rows, columns, values)
 }
 
 /// Where the columns of [`Filled`] stand in a Gram matrix.

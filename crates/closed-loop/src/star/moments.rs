@@ -30,7 +30,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use rayon::prelude::*;
 
 use self::paced::Paced;
-use self::sums::{SOLVING, SolvedBins, Sums};
+use self::sums::{SOLVING, Scratch, SolvedBins, Sums};
 use crate::bins::Bins;
 use crate::star::columns::StarColumns;
 
@@ -42,6 +42,9 @@ pub(crate) const MOST_RESTLESS_BINS: usize = 6000;
 
 /// Rows from which on slow columns are not taken at every frame: with a fortieth of them it saves nothing.
 const PACED_ROWS: usize = 300_000;
+
+/// Blocks at least that one scratch is for.
+const TOGETHER: usize = 4;
 
 /// Blocks whose sums are added by one thread.
 const ADDED: usize = 16;
@@ -145,38 +148,46 @@ impl StarMoments {
             Keep::Bins(bins) => Paced::of(columns, &bins.rows),
             Keep::Free | Keep::Drawn(_) => None,
         };
+        let block = |scratch: &mut Scratch, b: usize| {
+            let frames = folds.blocks[b].clone();
+            match keep {
+                Keep::None => {
+                    let sums = match &paced {
+                        Some(paced) => paced.sums(columns, frames, None, scratch),
+                        None => Sums::over(columns, frames, None, scratch),
+                    };
+                    sums.block(scratch)
+                }
+                Keep::Free => {
+                    let bins = SolvedBins::frames(&frames);
+                    let sums = Sums::over(columns, frames, Some(&bins), scratch);
+                    sums.block(scratch).freed()
+                }
+                Keep::Drawn(precision) => {
+                    let bins = SolvedBins {
+                        least: 1,
+                        ..SolvedBins::frames(&frames)
+                    };
+                    let sums = Sums::over(columns, frames, Some(&bins), scratch);
+                    sums.drawn(precision, scratch)
+                }
+                Keep::Bins(bins) => {
+                    let bins = SolvedBins {
+                        frames: bins.rows[bins.folds.blocks[b].clone()].into(),
+                        least: SOLVING,
+                    };
+                    let sums = match &paced {
+                        Some(paced) => paced.sums(columns, frames, Some(&bins), scratch),
+                        None => Sums::over(columns, frames, Some(&bins), scratch),
+                    };
+                    sums.block(scratch)
+                }
+            }
+        };
         let blocks = (0..folds.blocks.len())
             .into_par_iter()
-            .map(|b| {
-                let frames = folds.blocks[b].clone();
-                match keep {
-                    Keep::None => match &paced {
-                        Some(paced) => paced.sums(columns, frames, None).block(),
-                        None => Sums::over(columns, frames, None).block(),
-                    },
-                    Keep::Free => {
-                        let bins = SolvedBins::frames(&frames);
-                        Sums::over(columns, frames, Some(&bins)).block().freed()
-                    }
-                    Keep::Drawn(precision) => {
-                        let bins = SolvedBins {
-                            least: 1,
-                            ..SolvedBins::frames(&frames)
-                        };
-                        Sums::over(columns, frames, Some(&bins)).drawn(precision)
-                    }
-                    Keep::Bins(bins) => {
-                        let bins = SolvedBins {
-                            frames: bins.rows[bins.folds.blocks[b].clone()].into(),
-                            least: SOLVING,
-                        };
-                        match &paced {
-                            Some(paced) => paced.sums(columns, frames, Some(&bins)).block(),
-                            None => Sums::over(columns, frames, Some(&bins)).block(),
-                        }
-                    }
-                }
-            })
+            .with_min_len(TOGETHER)
+            .map_init(Scratch::default, block)
             .collect();
         let (t_s, frames) = match keep {
             Keep::Bins(bins) => (

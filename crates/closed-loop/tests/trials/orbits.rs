@@ -38,3 +38,17 @@ fn an_orbit_that_no_channel_tells_is_found() {
         assert!(!report.unattributed.present, "{path:?}");
     }
 }
+
+/// Beside a line of its period an orbit of several turns leaves a white reference, and is still what is named: it has
+/// two unknowns less.
+#[test]
+fn an_orbit_is_held_against_the_line_in_its_place() {
+    let mut case = Case::new(Path::Still, 41);
+    case.duration_s = 6600.0;
+    case.stars = 5;
+    let orbit = "speed_m_s = 400.0\nperiod_s = 3000.0\nphase_rad = 0.7\nnode_deg = 40.0\ninclination_deg = 55.0";
+    let report = case.with("velocity_aberration", orbit).close().report;
+    let ids: Vec<&str> = report.effects.iter().map(|e| e.id.as_str()).collect();
+    assert_eq!(ids, ["velocity_aberration"]);
+    assert!(!report.unattributed.present);
+}

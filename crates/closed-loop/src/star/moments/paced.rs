@@ -119,6 +119,7 @@ impl Paced {
         columns: &StarColumns<'_>,
         frames: Range<usize>,
         bins: Option<&SolvedBins<'_>>,
+        whole: &mut Scratch,
     ) -> Sums {
         let bins = bins.map(|bins| SolvedBins {
             frames: bins.frames.iter().map(|b| self.nodes_of(b)).collect(),
@@ -138,8 +139,8 @@ impl Paced {
         };
         let layout = slow.layout_with(|c| self.fast[c]).leaving_out(&self.fast);
         let fast_layout = fast.layout_with(|_| true);
-        let mut products = Sums::of_none(fast_layout.clone(), None);
         let mut scratch = Scratch::default();
+        let mut products = Sums::of_none(fast_layout.clone(), None, &mut scratch);
         let at = self.places(&slow);
         let fill = |nodes: Range<usize>, layout: &Layout, out: &mut Filled| {
             slow.fill(nodes.clone(), layout, out);
@@ -171,7 +172,7 @@ impl Paced {
             if last == next { end - 1 } else { end }
         };
         let nodes = self.nodes_of(&frames);
-        let sums = Sums::filled_by(&slow, layout, nodes, bins.as_ref(), cut, fill);
+        let sums = Sums::filled_by(&slow, layout, nodes, bins.as_ref(), cut, fill, whole);
         products.put_all(&mut scratch);
         sums.corrected(at, products)
     }

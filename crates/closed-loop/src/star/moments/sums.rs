@@ -19,7 +19,7 @@ use nalgebra::{DMatrix, DMatrixView, DMatrixViewMut, DVector, Dyn, Matrix3, Vect
 use super::{Block, pick};
 use crate::star::columns::StarColumns;
 use crate::star::frame_rotation::rotation_row;
-use crate::star::layout::{Filled, Layout};
+use crate::star::layout::{Filled, Layout, zeros_in};
 
 /// Frames whose columns are filled at once: enough for the matrix product to
 /// dominate, few enough to stay in cache.
@@ -74,8 +74,18 @@ pub(super) struct Sums {
     fast: Option<(Vec<usize>, DMatrix<f64>)>,
 }
 
-/// Scratch of the inner loop.
+/// What [`Sums`] are in: nobody needs the values any more.
+struct Space {
+    shared: DMatrix<f64>,
+    cross: DMatrix<f64>,
+    own: DMatrix<f64>,
+    turn: DMatrix<f64>,
+    moments: DMatrix<f64>,
+}
+
+/// Scratch of the inner loop, and of one block after another.
 pub(super) struct Scratch {
+    space: Space,
     pub(super) filled: Filled,
     jacobian: Vec<[[f64; 3]; 2]>,
     /// N of each frame.
@@ -96,6 +106,13 @@ impl Default for Scratch {
     fn default() -> Self {
         let empty = || DMatrix::zeros(0, 0);
         Self {
+            space: Space {
+                shared: empty(),
+                cross: empty(),
+                own: empty(),
+                turn: empty(),
+                moments: empty(),
+            },
             filled: Filled::default(),
             jacobian: Vec::new(),
             normal: Vec::new(),
@@ -214,28 +231,34 @@ impl Sums {
         columns: &StarColumns<'_>,
         frames: Range<usize>,
         bins: Option<&SolvedBins<'_>>,
+        scratch: &mut Scratch,
     ) -> Self {
         let layout = columns.layout();
         let fill = |chunk: Range<usize>, layout: &Layout, filled: &mut Filled| {
             columns.fill(chunk.clone(), layout, filled);
             columns.weigh(chunk, filled)
         };
-        Self::filled_by(columns, layout, frames, bins, |end| end, fill)
+        Self::filled_by(columns, layout, frames, bins, |end| end, fill, scratch)
     }
 
     /// No rows yet.
-    pub(super) fn of_none(layout: Layout, bins: Option<&SolvedBins<'_>>) -> Self {
+    pub(super) fn of_none(
+        layout: Layout,
+        bins: Option<&SolvedBins<'_>>,
+        scratch: &mut Scratch,
+    ) -> Self {
         let (shared, own, turn) = (layout.shared, layout.own.len(), layout.turn.len());
         let width = layout.width();
+        let space = &mut scratch.space;
         Self {
-            shared: DMatrix::zeros(shared, shared),
-            cross: DMatrix::zeros(2 * shared, own),
-            own: DMatrix::zeros(own, own),
-            turn: DMatrix::zeros(width, turn),
+            shared: zeros_in(&mut space.shared, shared, shared),
+            cross: zeros_in(&mut space.cross, 2 * shared, own),
+            own: zeros_in(&mut space.own, own, own),
+            turn: zeros_in(&mut space.turn, width, turn),
             scalars: 0,
             bins: bins.map(|b| {
                 (
-                    DMatrix::zeros(width, 3 * b.frames.len()),
+                    zeros_in(&mut space.moments, width, 3 * b.frames.len()),
                     vec![Matrix3::zeros(); b.frames.len()],
                 )
             }),
@@ -254,9 +277,10 @@ impl Sums {
         bins: Option<&SolvedBins<'_>>,
         cut: impl Fn(usize) -> usize,
         mut fill: impl FnMut(Range<usize>, &Layout, &mut Filled) -> usize,
+        scratch: &mut Scratch,
     ) -> Self {
         let turn = layout.turn.len();
-        let mut sums = Self::of_none(layout, bins);
+        let mut sums = Self::of_none(layout, bins, scratch);
         let used = |frame: usize| {
             let rows = columns.data.frames.rows_of(frame);
             rows.filter(|&r| !columns.data.outlier[r]).count()
@@ -266,20 +290,20 @@ impl Sums {
             let frames = bins.frames.iter();
             frames.map(|r| stars(r) < bins.least).collect()
         });
-        let mut scratch = Scratch::default();
+        scratch.held = 0;
         let mut at = frames.start;
         let mut bin = 0;
         while at < frames.end {
             let chunk = at..cut((at + CHUNK_FRAMES).min(frames.end));
             at = chunk.end;
             sums.scalars += 2 * fill(chunk.clone(), &sums.layout, &mut scratch.filled);
-            sums.add_rows(&mut scratch);
+            sums.add_rows(scratch);
             if bins.is_none() && turn == 0 {
                 continue;
             }
             let held = scratch.moments(columns, chunk.clone(), &sums.layout);
             if turn > 0 && (scratch.held + CHUNK_FRAMES > TURN_FRAMES || at == frames.end) {
-                sums.add_turns(&mut scratch);
+                sums.add_turns(scratch);
             }
             if turn == 0 {
                 scratch.held = 0;
@@ -292,7 +316,7 @@ impl Sums {
                     bin += 1;
                 }
                 if without[bin] {
-                    sums.lose(columns, frame, k, &scratch);
+                    sums.lose(columns, frame, k, scratch);
                 } else if let Some((kept, normals)) = &mut sums.bins {
                     for (axis, moments) in scratch.moments.iter().enumerate() {
                         let mut kept = kept.column_mut(3 * bin + axis);
@@ -302,7 +326,7 @@ impl Sums {
                 }
             }
         }
-        sums.put_all(&mut scratch);
+        sums.put_all(scratch);
         sums
     }
 
@@ -461,8 +485,8 @@ impl Sums {
     }
 
     /// R, with the rotations of the bins kept apart.
-    pub(super) fn block(self) -> Block {
-        let (mut block, bins) = self.apart();
+    pub(super) fn block(self, scratch: &mut Scratch) -> Block {
+        let (mut block, bins) = self.apart(scratch);
         match bins {
             Some((moments, normals)) => block.keep_apart(moments, &normals),
             None => block.complete(),
@@ -471,8 +495,8 @@ impl Sums {
     }
 
     /// What rotations of the frames that have a prior of this `precision` do not explain.
-    pub(super) fn drawn(self, precision: [f64; 3]) -> Block {
-        let (mut block, bins) = self.apart();
+    pub(super) fn drawn(self, precision: [f64; 3], scratch: &mut Scratch) -> Block {
+        let (mut block, bins) = self.apart(scratch);
         match bins {
             Some((moments, normals)) => block.draw(&moments, &normals, precision),
             None => block.complete(),
@@ -480,8 +504,8 @@ impl Sums {
         block
     }
 
-    /// G, where it lies on the diagonal and below, and M and N of the bins.
-    fn apart(self) -> (Block, Option<Turned>) {
+    /// G, where it lies on the diagonal and below, and M and N of the bins. What they were summed in goes back.
+    fn apart(self, scratch: &mut Scratch) -> (Block, Option<Turned>) {
         let places = self.layout.places();
         let mut order = vec![0; places.len()];
         for (from, &to) in places.iter().enumerate() {
@@ -504,8 +528,16 @@ impl Sums {
             inverse: Vec::new(),
             log_scale: 0.0,
         };
-        let bins = self.bins;
-        let bins = bins.map(|(moments, n)| (moments.select_rows(&order).transpose(), n));
+        let space = &mut scratch.space;
+        let bins = self.bins.map(|(summed, normals)| {
+            let moments = summed.select_rows(&order).transpose();
+            space.moments = summed;
+            (moments, normals)
+        });
+        space.shared = self.shared;
+        space.cross = self.cross;
+        space.own = self.own;
+        space.turn = self.turn;
         (block, bins)
     }
 }

@@ -149,13 +149,18 @@ impl Field {
         };
         let strongest = |i: usize, line: &[Complex<f32>], other: &[Complex<f32>]| {
             let kx = frequency(0, i);
-            (0..=ny / 2)
-                .filter(|&j| !own.excludes([kx, frequency(1, j).abs()]))
-                .map(|j| {
-                    let p = line[j].norm_sqr() + other[opposite(1, j)].norm_sqr();
-                    (p, [kx, frequency(1, j)])
-                })
-                .max_by(|a, b| a.0.total_cmp(&b.0))
+            let mut best: Option<(f32, [f64; 2])> = None;
+            for (j, of) in line.iter().enumerate().take(ny / 2 + 1) {
+                let p = of.norm_sqr() + other[opposite(1, j)].norm_sqr();
+                // few are higher than all before them: others need not be asked whose they are
+                if best.is_none_or(|(most, _)| p >= most) {
+                    let ky = frequency(1, j);
+                    if !own.excludes([kx, ky.abs()]) {
+                        best = Some((p, [kx, ky]));
+                    }
+                }
+            }
+            best
         };
         let leading: Vec<usize> = (0..nx).filter(|&i| i <= opposite(0, i)).collect();
         let mut strong: Vec<(usize, (f32, [f64; 2]))> = leading

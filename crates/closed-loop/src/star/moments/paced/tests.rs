@@ -135,14 +135,18 @@ fn products_are_those_of_every_frame() {
         let folds = Folds::whole(FRAMES);
         let paced = Paced::of(columns, &folds.blocks).unwrap();
         assert_eq!(paced.fast, [true, false, false]);
-        let of = |sums: &dyn Fn(Range<usize>) -> Sums| {
-            let each = folds.blocks.iter().map(|b| sums(b.clone()).block());
+        let of = |sums: &dyn Fn(Range<usize>, &mut Scratch) -> Sums| {
+            let mut scratch = Scratch::default();
+            let each = folds.blocks.iter().map(|b| {
+                let sums = sums(b.clone(), &mut scratch);
+                sums.block(&mut scratch)
+            });
             each.map(|b| (b.rest.as_ref().clone(), b.scalars))
                 .reduce(|a, b| (a.0 + b.0, a.1 + b.1))
                 .unwrap()
         };
-        let (ours, scalars) = of(&|frames| paced.sums(columns, frames, None));
-        let (all, count) = of(&|frames| Sums::over(columns, frames, None));
+        let (ours, scalars) = of(&|frames, scratch| paced.sums(columns, frames, None, scratch));
+        let (all, count) = of(&|frames, scratch| Sums::over(columns, frames, None, scratch));
         assert!((scalars - count).abs() < 0.5);
         let (width, first) = (all.ncols(), paced.places(columns)[0]);
         let off = |i: usize, j: usize| {
