@@ -62,7 +62,7 @@ impl StarNuisance {
         let moments = moments(order);
         let distortion = (per_axis > 0.0 && order > 0)
             .then(|| (order, coefficient_precision(order) / per_axis.powi(2)));
-        Self {
+        let unknowns = Self {
             misalignment: (!data.free_attitude).then(|| {
                 let unknown = if data.free_directions {
                     UNKNOWN_MOUNT
@@ -74,14 +74,23 @@ impl StarNuisance {
                 })
             }),
             distortion,
+            directions: 0,
+            direction_sigma: data.camera.arcsec_per_px()[0],
+            zeros: Vec::new(),
+            moments,
+        };
+        unknowns.of_stars(data)
+    }
+
+    /// The same unknowns of the stars of other data.
+    pub(crate) fn of_stars(self, data: &StarData) -> Self {
+        Self {
             directions: if data.free_directions {
                 data.stars.len()
             } else {
                 0
             },
-            direction_sigma: data.camera.arcsec_per_px()[0],
-            zeros: Vec::new(),
-            moments,
+            ..self
         }
     }
 

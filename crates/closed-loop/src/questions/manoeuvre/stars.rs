@@ -29,6 +29,8 @@ const MOST_COPIES: i64 = 50;
 pub(crate) struct Sky<'a> {
     camera: &'a Camera,
     model: &'a Model,
+    /// What the model leaves open of the bundle.
+    nuisance: StarNuisance,
     /// Stars of one frame.
     stars: Vec<(i32, Star)>,
     attitude: UnitQuaternion<f64>,
@@ -61,6 +63,7 @@ impl<'a> Sky<'a> {
         Some(Self {
             camera: &data.camera,
             model,
+            nuisance: StarNuisance::declared(model, data),
             stars: stars.collect(),
             attitude: data.attitude[frame],
             free: [data.free_attitude, data.free_directions],
@@ -112,7 +115,7 @@ impl<'a> Sky<'a> {
         let none = || vec![0.0; data.t_s.len()];
         let evidence = StarEvidence {
             data: &data,
-            nuisance: StarNuisance::declared(self.model, &data),
+            nuisance: self.nuisance.clone().of_stars(&data),
             residuals: vec![[none(), none()]].into(),
             motion: Some(flown),
             resolved: true,
@@ -123,7 +126,8 @@ impl<'a> Sky<'a> {
             drawn: self.drawn,
             kept: Vec::new(),
         };
-        let folds = Folds::cut(data.frames.frames());
+        // nothing is predicted: only the sum over all is asked for
+        let folds = Folds::whole(data.frames.frames());
         match &self.noise {
             // slow noise does not average out over the frames that are left out
             Some(noise) => information(
