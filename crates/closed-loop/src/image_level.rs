@@ -10,9 +10,9 @@
 //!   anything else that the windows allow may stand in for it; or if it frees first moments of more than the spot
 //!   and pixel phase do, and no account is the worse for it;
 //! - the spot is claimed if first moments corrected by it beat first moments as they
-//!   are, and as well as any function of pixel phase does; or if its positions beat both first moments
-//!   and those of the Gaussian, a function of pixel phase beside them or not. That a fitted spot has less
-//!   noise than a first moment is no effect.
+//!   are. A function of pixel phase may do as well: but what the spot says is read off the pixels, not off the
+//!   centroids that it corrects. That a fitted spot has less noise than a first moment is no effect: it corrects no
+//!   error of the model.
 //!
 //! Once either is claimed centroids are formed anew, and then in the way that predicts
 //! best: a fitted spot also feels what is left of a warm pixel less. What is constant for a star is then known as
@@ -68,6 +68,7 @@ pub(crate) fn form(data: &StarData, windows: &WindowTable, folds: &Folds) -> Opt
 /// Centroids formed with or without a map.
 pub(crate) struct Side<'a> {
     pub(crate) moments: StarEvidence<'a>,
+    pub(crate) plain: StarEvidence<'a>,
     pub(crate) unbiased: StarEvidence<'a>,
     pub(crate) fitted: StarEvidence<'a>,
     pub(crate) gaussian: StarEvidence<'a>,
@@ -157,6 +158,24 @@ impl Scored {
     }
 }
 
+/// Centroids formed with or without a map.
+struct Scores {
+    moments: Scored,
+    plain: Scored,
+    unbiased: Scored,
+    fitted: Scored,
+    gaussian: Scored,
+}
+
+/// Which predicts better by itself.
+fn better_of<'a>(a: &'a Scored, b: &'a Scored) -> &'a Scored {
+    if a.alone.total() > b.alone.total() {
+        a
+    } else {
+        b
+    }
+}
+
 /// Compares the measured centroids with those formed `[without, with]` a map.
 pub(crate) fn compare(
     measured: &StarEvidence<'_>,
@@ -171,23 +190,25 @@ pub(crate) fn compare(
     };
     let measured = tell("declared model", measured)?;
     let [bare, map] = sides;
-    let bare = [
-        tell("moments anew", &bare.moments)?,
-        tell("moments anew - spot", &bare.unbiased)?,
-        tell("effective_psf", &bare.fitted)?,
-        tell("gaussian spot", &bare.gaussian)?,
-    ];
-    let map = [
-        tell("dark_map", &map.moments)?,
-        tell("dark_map - spot", &map.unbiased)?,
-        tell("dark_map + effective_psf", &map.fitted)?,
-        tell("dark_map + gaussian spot", &map.gaussian)?,
-    ];
+    let bare = Scores {
+        moments: tell("moments anew", &bare.moments)?,
+        plain: tell("moments anew - level", &bare.plain)?,
+        unbiased: tell("moments anew - spot", &bare.unbiased)?,
+        fitted: tell("effective_psf", &bare.fitted)?,
+        gaussian: tell("gaussian spot", &bare.gaussian)?,
+    };
+    let map = Scores {
+        moments: tell("dark_map", &map.moments)?,
+        plain: tell("dark_map - level", &map.plain)?,
+        unbiased: tell("dark_map - spot", &map.unbiased)?,
+        fitted: tell("dark_map + effective_psf", &map.fitted)?,
+        gaussian: tell("dark_map + gaussian spot", &map.gaussian)?,
+    };
     if let Some(followed) = &sides[1].followed {
         tell("dark_map, switching + effective_psf", followed)?;
     }
     // What only leads to a decision is not an account to be shown.
-    rivals.retain(|r| !r.what.contains(" - spot"));
+    rivals.retain(|r| !r.what.contains(" - "));
     let zero = rivals.first().map_or(0.0, |r| r.delta_loglik);
     for rival in &mut rivals {
         rival.delta_loglik -= zero;
@@ -201,14 +222,14 @@ pub(crate) fn compare(
             .unwrap_or_else(|| measured.alone.clone())
     };
     let (with, without) = (
-        best(&[&map[0], &map[2], &map[3]]),
-        best(&[&measured, &bare[0], &bare[2], &bare[3]]),
+        best(&[&map.moments, &map.fitted, &map.gaussian]),
+        best(&[&measured, &bare.moments, &bare.fitted, &bare.gaussian]),
     );
     let predicts = step(&with, &without, whole);
     // What the tracker sent are moments: pixels at the rim move them that no fitted spot feels.
     let frees = step(
-        map[0].best(),
-        &best(&[&measured, &bare[0], &bare[1]]),
+        map.moments.best(),
+        &best(&[&measured, &bare.moments, &bare.unbiased]),
         whole,
     );
     let harmless = with.total() > without.total() - LEAST_GAIN;
@@ -217,29 +238,22 @@ pub(crate) fn compare(
     } else {
         predicts
     };
-    // Without a map, plain moments are those of the table or those formed anew.
-    let plain = if bare[0].alone.total() > measured.alone.total() {
-        &bare[0]
+    // Without a map, moments are those of the table or those formed anew.
+    let better = |anew| better_of(anew, &measured);
+    let (moments, plain, side) = if claim.stands {
+        (&map.moments, &map.plain, &map)
     } else {
-        &measured
+        let plain = better(&bare.plain);
+        (plain, plain, &bare)
     };
-    let (moments, side) = if claim.stands {
-        (&map[0], &map)
-    } else {
-        (plain, &bare)
-    };
-    let corrected = step(&side[1].alone, &moments.alone, whole);
-    let corrects = corrected.stands && side[1].best().total() >= moments.best().total();
-    let sharper = step(&side[2].alone, &side[3].best().clone(), whole);
-    let beats = sharper.stands && step(&side[2].alone, moments.best(), whole).stands;
-    let spot_stands = corrects || beats;
-    let spot = if corrects { &corrected } else { &sharper };
+    let corrected = step(&side.unbiased.alone, &plain.alone, whole);
+    let spot_stands = corrected.stands;
     // the way to form centroids once there is a reason to
     let (way, last) = [
         (Way::Moments, moments),
-        (Way::Unbiased, &side[1]),
-        (Way::Fitted, &side[2]),
-        (Way::Gaussian, &side[3]),
+        (Way::Unbiased, &side.unbiased),
+        (Way::Fitted, &side.fitted),
+        (Way::Gaussian, &side.gaussian),
     ]
     .into_iter()
     .filter(|(way, _)| match way {
@@ -249,19 +263,14 @@ pub(crate) fn compare(
     })
     .max_by(|a, b| a.1.alone.total().total_cmp(&b.1.alone.total()))
     .unwrap_or((Way::Moments, moments));
-    let by_map = if spot_stands { &map[0] } else { last };
+    let by_map = match (claim.stands, spot_stands) {
+        (true, false) => last,
+        _ => &map.moments,
+    };
     let mut dark_map = Step {
         stands: claim.stands,
         p_value: claim.p_value,
-        ..step(
-            if claim.stands {
-                &by_map.alone
-            } else {
-                &map[0].alone
-            },
-            &plain.alone,
-            whole,
-        )
+        ..step(&by_map.alone, &better(&bare.moments).alone, whole)
     };
     // What switches is the map's, whatever the way; a static map is claimed by itself first.
     let side = if claim.stands { &sides[1] } else { &sides[0] };
@@ -285,7 +294,7 @@ pub(crate) fn compare(
     }
     let effective_psf = Step {
         stands: spot_stands,
-        p_value: spot.p_value,
+        p_value: corrected.p_value,
         ..step(&last.alone, &moments.alone, whole)
     };
     Ok(ImageLevel {

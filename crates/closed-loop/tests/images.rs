@@ -336,6 +336,48 @@ fn rivals_show_what_pixel_phase_explains() {
     }
 }
 
+/// Read noise in the far pixels of a wide window is most of what first moments scatter by, and a fitted spot has a
+/// third of it. That corrects no error: what is declared is what the tracker sends.
+#[test]
+fn a_fit_that_has_less_noise_is_no_effect() {
+    for seed in [1, 2] {
+        let closed = run(&Scene {
+            size: [8, 8],
+            sigma_px: 0.9,
+            flux: 2000.0,
+            seed,
+            ..Scene::default()
+        }
+        .make());
+        let [declared, fitted] =
+            ["declared model", "gaussian spot"].map(|what| rival(&closed, what).rms_arcsec[0]);
+        assert!(fitted < 0.5 * declared, "{fitted} {declared}");
+        assert!(ids(&closed).is_empty(), "{:?}", closed.report.effects);
+        assert!(!closed.report.unattributed.present);
+    }
+}
+
+/// A spot of 2.8 px in a window of six loses light at its edges, and first moments lag behind: the spot is named, with
+/// warm pixels under it or not. A narrow one is whole, and warm pixels are all that is.
+#[test]
+fn a_spot_that_its_window_cuts_off_is_named() {
+    let warm = || population(0.15, 60.0, &WIDE, 7);
+    let cases: [(f64, Warm, &[&str]); 3] = [
+        (1.2, Warm::new(), &["effective_psf"]),
+        (1.2, warm(), &["dark_map", "effective_psf"]),
+        (0.75, warm(), &["dark_map"]),
+    ];
+    for (sigma_px, warm, named) in cases {
+        let closed = run(&Scene {
+            sigma_px,
+            warm,
+            ..Scene::default()
+        }
+        .make());
+        assert_eq!(ids(&closed), named, "{sigma_px}");
+    }
+}
+
 /// A short, sparse scene for what only has to work.
 fn short() -> Scene {
     Scene {

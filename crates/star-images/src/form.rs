@@ -42,9 +42,12 @@ pub type Variants = Vec<[Vec<f64>; 2]>;
 /// Centroids formed anew with or without a map.
 #[derive(Clone, Debug, Default)]
 pub struct Centroids {
-    /// First moments.
+    /// First moments at the level at which they follow the star.
     pub moments: Variants,
-    /// First moments less what the effective spot says that they are off by: what
+    /// First moments above what lies under the star: what a spot that its window cuts off pulls them by is in
+    /// them. Without a map these are as a tracker forms them, hits left out.
+    pub plain: Variants,
+    /// Those less what the effective spot says that they are off by: what
     /// the spot explains, apart from the noise that fitting it saves.
     pub unbiased: Variants,
     /// Positions fitted with the effective spot.
@@ -150,8 +153,9 @@ fn centroids(data: &Stars<'_>, sample: &Sample, learned: &[Learned], fold: &[usi
     let mut out = Centroids::default();
     let any = made.iter().any(|m| m.switching > 0);
     for one in made {
-        let [moments, unbiased, fitted, gaussian, followed] = one.variants;
+        let [moments, plain, unbiased, fitted, gaussian, followed] = one.variants;
         out.moments.push(moments);
+        out.plain.push(plain);
         out.unbiased.push(unbiased);
         out.fitted.push(fitted);
         out.gaussian.push(gaussian);
@@ -167,7 +171,7 @@ fn centroids(data: &Stars<'_>, sample: &Sample, learned: &[Learned], fold: &[usi
 
 /// Centroids by what was learned from some frames.
 struct Made {
-    /// Moments, moments less their bias, fits, Gaussian fits, and fits with switching pixels followed.
+    /// Moments, plain moments, these less their bias, fits, Gaussian fits, and fits with switching pixels followed.
     variants: [[Vec<f64>; 2]; WAYS],
     /// Rows that are those of the table.
     fallback: usize,
@@ -176,7 +180,7 @@ struct Made {
 }
 
 /// Ways to form a centroid.
-const WAYS: usize = 5;
+const WAYS: usize = 6;
 
 /// Centroids of every star row by `one`, that was learned from the frames `taken`.
 ///
@@ -199,10 +203,10 @@ fn one_variant(
             let fit = one.fitted(sample, w, &mut pixels);
             let found = fit.and_then(|fit| {
                 let f = fit.at;
-                let m = one.moment(sample, w, &pixels)?;
-                let b = one.moment_bias(sample, w, f, &pixels)?;
+                let [m, plain] = one.moments(sample, w, &pixels)?;
+                let b = one.moment_bias(sample, w, &fit, &pixels)?;
                 let g = one.by_gaussian(sample, w, &mut pixels)?;
-                Some([m, [m[0] - b[0], m[1] - b[1]], f, g, f])
+                Some([m, plain, [plain[0] - b[0], plain[1] - b[1]], f, g, f])
             });
             fits.push(fit);
             formed.push(found);

@@ -66,10 +66,15 @@ pub(crate) struct Spot {
     pub(crate) background_variance: f64,
     /// Noise of the star's pixels over that of all.
     pub(crate) scale: f64,
-    /// What is taken off every pixel for a first moment.
+    /// What is taken off every pixel for a first moment that follows the star.
     level: f64,
+    /// What lies under the star and is none of its light: without a map by the table, with one by the Gaussian
+    /// nearest to the spot.
+    plain_level: f64,
     /// Spline coefficients of the Gaussian nearest to it; empty where there is none.
     gaussian: Vec<f64>,
+    /// What lies under that Gaussian, and in the spot, over the flux.
+    pedestal: f64,
 }
 
 /// What is learned from some frames.
@@ -168,14 +173,32 @@ pub(crate) fn learn(
         learned.learn_noise(sample, &windows, &state);
         star_weight = weights;
     }
-    let State { at, good, .. } = &state;
-    let level = |(star, list): (usize, &Vec<usize>)| {
-        let spot = &learned.spots[star];
-        moment_level::fit(sample, list, at, good, &learned.dark.value, spot.background)
-    };
-    let levels: Vec<f64> = windows.par_iter().enumerate().map(level).collect();
-    for (spot, level) in learned.spots.iter_mut().zip(levels) {
-        spot.level = level;
+    let levels: Vec<[f64; 2]> = windows
+        .par_iter()
+        .zip(&learned.spots)
+        .map(|(list, spot)| {
+            let typical = |of: &[f64]| robust_median(list.iter().map(|&w| of[w]).collect());
+            let plain = if mapped {
+                // the map holds a level that no table knows of
+                typical(&state.flux).map(|flux| spot.background + flux * spot.pedestal)
+            } else {
+                typical(&sample.background)
+            };
+            let following = moment_level::fit(
+                sample,
+                list,
+                |w| state.fitted[w].at,
+                &state.model,
+                // of a window that no spot fits no value is good
+                |w| state.good[sample.cells_of(w)].iter().any(|good| *good),
+                &learned.dark.value,
+                spot.background,
+            );
+            [following, plain.unwrap_or(spot.background)]
+        })
+        .collect();
+    for (spot, [following, plain]) in learned.spots.iter_mut().zip(levels) {
+        (spot.level, spot.plain_level) = (following, plain);
     }
     learned.clipped = windows
         .iter()
@@ -214,7 +237,9 @@ fn first_guess(sample: &Sample, list: &[usize], state: &mut State, grid: &Grid) 
         background_variance: BACKGROUND_VARIANCE,
         scale: 1.0,
         level: background,
+        plain_level: background,
         gaussian: Vec::new(),
+        pedestal: 0.0,
     }
 }
 
@@ -318,7 +343,9 @@ impl Learned {
             .zip(sums)
             .filter(|(spot, _)| !spot.psi.is_empty())
             .for_each(|(spot, (normal, _))| {
-                spot.gaussian = gaussian_spot::nearest(&grid, normal, &spot.psi)
+                let shape = gaussian_spot::nearest(&grid, normal, &spot.psi);
+                spot.pedestal = shape.map_or(0.0, |[_, _, pedestal]| pedestal);
+                spot.gaussian = shape
                     .and_then(|shape| gaussian_spot::coefficients(&finer, shape))
                     .unwrap_or_default();
             });
@@ -523,10 +550,15 @@ impl Learned {
         window_fit::fit(&known, sample, w, start, FINAL_STEPS, pixels)
     }
 
-    /// First moment of window `w`, map and a constant level taken off. Pixels with a
-    /// particle hit, as [`fitted`](Self::fitted) left them in `pixels`, take their
-    /// value from the spot.
-    pub(crate) fn moment(&self, sample: &Sample, w: usize, pixels: &Pixels) -> Option<[f64; 2]> {
+    /// First moments of window `w`, map and a constant level taken off: the one at which they follow the star, and
+    /// the plain one. Pixels with a particle hit, as [`fitted`](Self::fitted) left them in `pixels`, take their value
+    /// from the spot.
+    pub(crate) fn moments(
+        &self,
+        sample: &Sample,
+        w: usize,
+        pixels: &Pixels,
+    ) -> Option<[[f64; 2]; 2]> {
         let cells = sample.cells_of(w);
         if !sample.valid[cells.clone()].iter().all(|v| *v) {
             return None;
@@ -536,36 +568,44 @@ impl Learned {
             .zip(&pixels.good)
             .zip(&pixels.model)
             .map(|((&z, &good), &model)| if good { z } else { model });
-        self.moment_of(sample, w, values)
-            .filter(|&at| sample.near(w, at))
+        let spot = &self.spots[sample.star[w]];
+        let at = |level| {
+            let found = self.moment_of(sample, w, level, values.clone());
+            found.filter(|&at| sample.near(w, at))
+        };
+        Some([at(spot.level)?, at(spot.plain_level)?])
     }
 
-    /// How far the first moment of the noise-free spot of window `w`, at the position
-    /// that [`fitted`](Self::fitted) found and left in `pixels`, is from that position.
+    /// How far the plain first moment of the noise-free spot of window `w`, on the star's usual background, is from
+    /// the position where it was [`fitted`](Self::fitted), which left it in `pixels`. A background of its own is in part
+    /// the window's noise: taking off what that does to a moment would be no correction by the spot.
     pub(crate) fn moment_bias(
         &self,
         sample: &Sample,
         w: usize,
-        at: [f64; 2],
+        fit: &Fitted,
         pixels: &Pixels,
     ) -> Option<[f64; 2]> {
-        let [x, y] = self.moment_of(sample, w, pixels.model.iter().copied())?;
-        Some([x - at[0], y - at[1]])
+        let spot = &self.spots[sample.star[w]];
+        let own = fit.background - spot.background;
+        let values = pixels.model.iter().map(|v| v - own);
+        let [x, y] = self.moment_of(sample, w, spot.plain_level, values)?;
+        Some([x - fit.at[0], y - fit.at[1]])
     }
 
     fn moment_of(
         &self,
         sample: &Sample,
         w: usize,
+        level: f64,
         values: impl Iterator<Item = f64>,
     ) -> Option<[f64; 2]> {
-        let spot = &self.spots[sample.star[w]];
-        if spot.psi.is_empty() {
+        if self.spots[sample.star[w]].psi.is_empty() {
             return None;
         }
         let mut sum = [0.0; 3];
         for ((i, z), &[c, r]) in sample.cells_of(w).zip(values).zip(&sample.cells) {
-            let q = z - spot.level - self.dark.value[sample.pixel[i]];
+            let q = z - level - self.dark.value[sample.pixel[i]];
             sum = [sum[0] + q, sum[1] + q * c as f64, sum[2] + q * r as f64];
         }
         let corner = sample.corner[w];

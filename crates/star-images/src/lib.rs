@@ -14,6 +14,7 @@
 //! | what | where |
 //! |---|---|
 //! | first moments, less the map, at the level of background at which they follow the star | [`Centroids::moments`] |
+//! | first moments above what lies under the star, as a tracker forms them | [`Centroids::plain`] |
 //! | the same less what the spot says that they are off by | [`Centroids::unbiased`] |
 //! | positions of the effective spot | [`Centroids::fitted`] |
 //! | positions of the round Gaussian nearest to it | [`Centroids::gaussian`] |

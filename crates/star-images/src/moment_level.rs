@@ -1,14 +1,17 @@
 //! The constant level under first moments.
 //!
 //! ```text
-//! e(L) = sum (z - D - L)(p - s) / sum (z - D - L)      over the pixels of a window
+//! e(L) = sum (m - D - L)(p - s) / sum (m - D - L)      over the pixels of a window
 //! L minimises the scatter of e about its mean over the windows of a star
 //! ```
 //!
 //! A level that is left in pulls every first moment towards the middle of its
 //! window, and so does light of the spot beyond the window's edge. Background, dark
 //! level and the spot's own pedestal cannot be told apart; what a first moment needs
-//! is the level at which it follows the star, s the rigid position.
+//! is the level at which it follows the star, at s.
+//!
+//! m is what the fitted spot shows there, without noise: of values with noise a level that pulls
+//! towards the middle has less scatter, for it pulls the noise along, and that pull would be an error of the spot.
 //!
 //! Source: gain of a truncated first moment, expanded to first order in the level.
 
@@ -19,13 +22,14 @@ const STEPS: usize = 5;
 /// Prior standard deviation of the level, in mean signals of a pixel.
 const PRIOR: f64 = 0.2;
 
-/// The level for the star with these windows; windows with particle hits (pixels not
-/// `good`) do not take part.
+/// The level for the star with these windows, which show `shown` (with the map) where the star is `at`; none that
+/// is not `believed` takes part.
 pub(crate) fn fit(
     sample: &Sample,
     windows: &[usize],
-    at: &[[f64; 2]],
-    good: &[bool],
+    at: impl Fn(usize) -> [f64; 2],
+    shown: &[f64],
+    believed: impl Fn(usize) -> bool,
     dark: &[f64],
     start: f64,
 ) -> f64 {
@@ -33,13 +37,14 @@ pub(crate) fn fit(
     // light, and moments of light and of a level of one about the star
     let sums: Vec<[f64; 5]> = windows
         .iter()
-        .filter(|&&w| good[sample.cells_of(w)].iter().all(|g| *g))
+        .filter(|&&w| believed(w))
         .map(|&w| {
             let mut sum = [0.0; 5];
+            let at = at(w);
             for (i, &[c, r]) in sample.cells_of(w).zip(&sample.cells) {
-                let q = sample.z[i] - dark[sample.pixel[i]];
-                let x = sample.corner[w][0] + c as f64 - at[w][0];
-                let y = sample.corner[w][1] + r as f64 - at[w][1];
+                let q = shown[i] - dark[sample.pixel[i]];
+                let x = sample.corner[w][0] + c as f64 - at[0];
+                let y = sample.corner[w][1] + r as f64 - at[1];
                 for (s, t) in sum.iter_mut().zip([q, q * x, q * y, x, y]) {
                     *s += t;
                 }
@@ -94,7 +99,6 @@ mod tests {
     fn first_moments_follow_the_star_at_the_fitted_level() {
         let sample = few_windows(200);
         let windows: Vec<usize> = (0..sample.windows()).collect();
-        let good = vec![true; sample.z.len()];
         let dark = vec![0.0; sample.centre.len()];
         let scatter = |level: f64| {
             let error = |w: usize| {
@@ -113,8 +117,11 @@ mod tests {
             (errors.iter().map(|e| (e - mean).powi(2)).sum::<f64>() / errors.len() as f64).sqrt()
         };
         let known = sample.background[0];
-        let level = fit(&sample, &windows, &sample.start, &good, &dark, known);
-        let again = fit(&sample, &windows, &sample.start, &good, &dark, known + 30.0);
+        let from = |start: f64| {
+            let at = |w: usize| sample.start[w];
+            fit(&sample, &windows, at, &sample.z, |_| true, &dark, start)
+        };
+        let (level, again) = (from(known), from(known + 30.0));
         assert!(level > known, "light beyond the edge needs a higher level");
         assert!(scatter(known) > 0.02, "{}", scatter(known));
         assert!(

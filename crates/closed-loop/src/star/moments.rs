@@ -482,7 +482,16 @@ impl Block {
                 self.inverse.push(None);
             }
         }
-        add_products(-1.0, &whitened, Arc::make_mut(&mut self.rest));
+        let rest = Arc::make_mut(&mut self.rest);
+        let whole = rest.diagonal();
+        add_products(-1.0, &whitened, rest);
+        for k in 0..rest.ncols() {
+            // what rounding leaves of a column that is a rotation of every bin
+            if rest[(k, k)] < SINGULAR * whole[k] {
+                rest.row_mut(k).fill(0.0);
+                rest.column_mut(k).fill(0.0);
+            }
+        }
         self.complete();
         self.theta = moments;
     }

@@ -210,6 +210,7 @@ fn explain(
     let sides = formed.as_ref().map(|f| {
         [&f.without_map, &f.with_map].map(|c| Side {
             moments: anew(&c.moments, &c.zero_px),
+            plain: anew(&c.plain, &c.zero_px),
             unbiased: anew(&c.unbiased, &c.zero_px),
             fitted: anew(&c.fitted, &c.zero_px),
             gaussian: anew(&c.gaussian, &c.zero_px),

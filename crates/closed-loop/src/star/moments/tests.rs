@@ -412,7 +412,8 @@ fn a_free_attitude_leaves_what_no_rotation_explains() {
             dense += left.transpose() * &left;
             count += rows.len() - 3;
         }
-        // the misalignment is a rotation: nothing of it is left but rounding of its sums
+        // the misalignment is a rotation: nothing of it is left, and no rounding of its sums
+        assert!((0..3).all(|k| sum.column(k).norm() <= 0.0));
         let scale = c.norm_squared();
         assert!((sum - dense).norm() < 1e-11 * scale);
         assert!((scalars - count as f64).abs() < 0.5);
