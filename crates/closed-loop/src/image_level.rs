@@ -167,6 +167,16 @@ struct Scores {
     gaussian: Scored,
 }
 
+/// The account that predicts best, pixel phase beside it or not.
+fn best_of<'a, 'b>(
+    accounts: &[(&'a Scored, &'a StarEvidence<'b>)],
+) -> (&'a Scored, &'a StarEvidence<'b>) {
+    let total = |account: &(&Scored, &StarEvidence<'_>)| account.0.best().total();
+    let best = accounts.iter().copied();
+    best.max_by(|a, b| total(a).total_cmp(&total(b)))
+        .expect("there is an account")
+}
+
 /// Which predicts better by itself.
 fn better_of<'a>(a: &'a Scored, b: &'a Scored) -> &'a Scored {
     if a.alone.total() > b.alone.total() {
@@ -188,7 +198,8 @@ pub(crate) fn compare(
     let mut tell = |name: &str, evidence: &StarEvidence<'_>| {
         score(name, evidence, phase, folds, data, &mut rivals)
     };
-    let measured = tell("declared model", measured)?;
+    let table = measured;
+    let measured = tell("declared model", table)?;
     let [bare, map] = sides;
     let bare = Scores {
         moments: tell("moments anew", &bare.moments)?,
@@ -214,30 +225,39 @@ pub(crate) fn compare(
         rival.delta_loglik -= zero;
     }
     let whole = measured.alone.sse.iter().sum::<f64>();
-    let best = |list: &[&Scored]| -> Score {
-        let better = |a: &Score, b: &Score| a.total().total_cmp(&b.total());
-        list.iter()
-            .map(|s| s.best().clone())
-            .max_by(better)
-            .unwrap_or_else(|| measured.alone.clone())
-    };
-    let (with, without) = (
-        best(&[&map.moments, &map.fitted, &map.gaussian]),
-        best(&[&measured, &bare.moments, &bare.fitted, &bare.gaussian]),
+    let [plainly, mapped] = sides;
+    let freed = (&map.moments, &mapped.moments);
+    let with = best_of(&[
+        freed,
+        (&map.fitted, &mapped.fitted),
+        (&map.gaussian, &mapped.gaussian),
+    ]);
+    let of_moments = [(&measured, table), (&bare.moments, &plainly.moments)];
+    let without = best_of(
+        &[
+            &of_moments[..],
+            &[
+                (&bare.fitted, &plainly.fitted),
+                (&bare.gaussian, &plainly.gaussian),
+            ],
+        ]
+        .concat(),
     );
-    let predicts = step(&with, &without, whole);
+    let predicts = step(with.0.best(), without.0.best(), whole);
     // What the tracker sent are moments: pixels at the rim move them that no fitted spot feels.
-    let frees = step(
-        map.moments.best(),
-        &best(&[&measured, &bare.moments, &bare.unbiased]),
-        whole,
-    );
-    let harmless = with.total() > without.total() - LEAST_GAIN;
-    let claim = if !predicts.stands && frees.stands && harmless {
-        frees
+    let unfreed = best_of(&[&of_moments[..], &[(&bare.unbiased, &plainly.unbiased)]].concat());
+    let frees = step(freed.0.best(), unfreed.0.best(), whole);
+    let harmless = with.0.best().total() > without.0.best().total() - LEAST_GAIN;
+    let (mut claim, accounts) = if !predicts.stands && frees.stands && harmless {
+        (frees, [freed.1, unfreed.1])
     } else {
-        predicts
+        (predicts, [with.1, without.1])
     };
+    if claim.stands {
+        // what moves the stars otherwise may be what a map of nothing profits from
+        let [with, without] = accounts.map(|evidence| beside_others(evidence, others, folds));
+        claim.stands = step(&with?, &without?, whole).stands;
+    }
     // Without a map, moments are those of the table or those formed anew.
     let better = |anew| better_of(anew, &measured);
     let (moments, plain, side) = if claim.stands {
