@@ -367,8 +367,6 @@ fn a_spot_that_its_window_cuts_off_is_named() {
     ];
     for (sigma_px, warm, named) in cases {
         let closed = run(&Scene {
-            frames: 300,
-            count: 4,
             sigma_px,
             warm,
             ..Scene::default()
