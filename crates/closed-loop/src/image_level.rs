@@ -144,12 +144,13 @@ impl ImageLevel {
 }
 
 /// A level out of fold, by itself and with the best function of pixel phase.
-struct Scored {
+struct Scored<'a> {
+    evidence: &'a StarEvidence<'a>,
     alone: Score,
     phase: Option<Score>,
 }
 
-impl Scored {
+impl Scored<'_> {
     fn best(&self) -> &Score {
         self.phase
             .as_ref()
@@ -159,26 +160,27 @@ impl Scored {
 }
 
 /// Centroids formed with or without a map.
-struct Scores {
-    moments: Scored,
-    plain: Scored,
-    unbiased: Scored,
-    fitted: Scored,
-    gaussian: Scored,
+struct Scores<'a> {
+    moments: Scored<'a>,
+    plain: Scored<'a>,
+    unbiased: Scored<'a>,
+    fitted: Scored<'a>,
+    gaussian: Scored<'a>,
 }
 
-/// The account that predicts best, pixel phase beside it or not.
-fn best_of<'a, 'b>(
-    accounts: &[(&'a Scored, &'a StarEvidence<'b>)],
-) -> (&'a Scored, &'a StarEvidence<'b>) {
-    let total = |account: &(&Scored, &StarEvidence<'_>)| account.0.best().total();
-    let best = accounts.iter().copied();
-    best.max_by(|a, b| total(a).total_cmp(&total(b)))
-        .expect("there is an account")
+/// The account that predicts best, pixel phase beside it or not; of two alike the latter.
+fn best_of<'s, 'a>(first: &'s Scored<'a>, others: &[&'s Scored<'a>]) -> &'s Scored<'a> {
+    others.iter().fold(first, |best, other| {
+        if other.best().total() < best.best().total() {
+            best
+        } else {
+            other
+        }
+    })
 }
 
 /// Which predicts better by itself.
-fn better_of<'a>(a: &'a Scored, b: &'a Scored) -> &'a Scored {
+fn better_of<'s, 'a>(a: &'s Scored<'a>, b: &'s Scored<'a>) -> &'s Scored<'a> {
     if a.alone.total() > b.alone.total() {
         a
     } else {
@@ -187,76 +189,66 @@ fn better_of<'a>(a: &'a Scored, b: &'a Scored) -> &'a Scored {
 }
 
 /// Compares the measured centroids with those formed `[without, with]` a map.
-pub(crate) fn compare(
-    measured: &StarEvidence<'_>,
-    sides: &[Side<'_>; 2],
+pub(crate) fn compare<'a>(
+    measured: &'a StarEvidence<'a>,
+    sides: &'a [Side<'a>; 2],
     [phase, others]: [&[Arc<dyn Candidate>]; 2],
     folds: &Folds,
     data: &StarData,
 ) -> Result<ImageLevel, CloseError> {
     let mut rivals = Vec::new();
-    let mut tell = |name: &str, evidence: &StarEvidence<'_>| {
-        score(name, evidence, phase, folds, data, &mut rivals)
+    let mut account = |name: &str, evidence: &'a StarEvidence<'a>| {
+        score(Some(name), evidence, phase, folds, data, &mut rivals)
     };
-    let table = measured;
-    let measured = tell("declared model", table)?;
+    let measured = account("declared model", measured)?;
+    let mut scores = |side: &'a Side<'a>, [moments, fitted, gaussian]: [&str; 3]| {
+        // what only leads to a decision is not an account to be shown
+        let decides = |evidence| score(None, evidence, phase, folds, data, &mut Vec::new());
+        Ok::<_, CloseError>(Scores {
+            moments: account(moments, &side.moments)?,
+            plain: decides(&side.plain)?,
+            unbiased: decides(&side.unbiased)?,
+            fitted: account(fitted, &side.fitted)?,
+            gaussian: account(gaussian, &side.gaussian)?,
+        })
+    };
     let [bare, map] = sides;
-    let bare = Scores {
-        moments: tell("moments anew", &bare.moments)?,
-        plain: tell("moments anew - level", &bare.plain)?,
-        unbiased: tell("moments anew - spot", &bare.unbiased)?,
-        fitted: tell("effective_psf", &bare.fitted)?,
-        gaussian: tell("gaussian spot", &bare.gaussian)?,
-    };
-    let map = Scores {
-        moments: tell("dark_map", &map.moments)?,
-        plain: tell("dark_map - level", &map.plain)?,
-        unbiased: tell("dark_map - spot", &map.unbiased)?,
-        fitted: tell("dark_map + effective_psf", &map.fitted)?,
-        gaussian: tell("dark_map + gaussian spot", &map.gaussian)?,
-    };
-    if let Some(followed) = &sides[1].followed {
-        tell("dark_map, switching + effective_psf", followed)?;
+    let followed = map.followed.as_ref();
+    let bare = scores(bare, ["moments anew", "effective_psf", "gaussian spot"])?;
+    let with_map = [
+        "dark_map",
+        "dark_map + effective_psf",
+        "dark_map + gaussian spot",
+    ];
+    let map = scores(map, with_map)?;
+    if let Some(followed) = followed {
+        account("dark_map, switching + effective_psf", followed)?;
     }
-    // What only leads to a decision is not an account to be shown.
-    rivals.retain(|r| !r.what.contains(" - "));
     let zero = rivals.first().map_or(0.0, |r| r.delta_loglik);
     for rival in &mut rivals {
         rival.delta_loglik -= zero;
     }
     let whole = measured.alone.sse.iter().sum::<f64>();
-    let [plainly, mapped] = sides;
-    let freed = (&map.moments, &mapped.moments);
-    let with = best_of(&[
-        freed,
-        (&map.fitted, &mapped.fitted),
-        (&map.gaussian, &mapped.gaussian),
-    ]);
-    let of_moments = [(&measured, table), (&bare.moments, &plainly.moments)];
-    let without = best_of(
-        &[
-            &of_moments[..],
-            &[
-                (&bare.fitted, &plainly.fitted),
-                (&bare.gaussian, &plainly.gaussian),
-            ],
-        ]
-        .concat(),
-    );
-    let predicts = step(with.0.best(), without.0.best(), whole);
+    let with = best_of(&map.moments, &[&map.fitted, &map.gaussian]);
+    let without = best_of(&measured, &[&bare.moments, &bare.fitted, &bare.gaussian]);
+    let predicts = step(with.best(), without.best(), whole);
     // What the tracker sent are moments: pixels at the rim move them that no fitted spot feels.
-    let unfreed = best_of(&[&of_moments[..], &[(&bare.unbiased, &plainly.unbiased)]].concat());
-    let frees = step(freed.0.best(), unfreed.0.best(), whole);
-    let harmless = with.0.best().total() > without.0.best().total() - LEAST_GAIN;
+    let unfreed = best_of(&measured, &[&bare.moments, &bare.unbiased]);
+    let frees = step(map.moments.best(), unfreed.best(), whole);
+    let harmless = with.best().total() > without.best().total() - LEAST_GAIN;
     let (mut claim, accounts) = if !predicts.stands && frees.stands && harmless {
-        (frees, [freed.1, unfreed.1])
+        (frees, [&map.moments, unfreed])
     } else {
-        (predicts, [with.1, without.1])
+        (predicts, [with, without])
+    };
+    // what steps from one level to another beside what else moves the stars
+    let beside = |levels: [&StarEvidence<'_>; 2]| -> Result<Step, CloseError> {
+        let [with, without] = levels.map(|level| beside_others(level, others, folds));
+        Ok(step(&with?, &without?, whole))
     };
     if claim.stands {
         // what moves the stars otherwise may be what a map of nothing profits from
-        let [with, without] = accounts.map(|evidence| beside_others(evidence, others, folds));
-        claim.stands = step(&with?, &without?, whole).stands;
+        claim.stands = beside(accounts.map(|account| account.evidence))?.stands;
     }
     // Without a map, moments are those of the table or those formed anew.
     let better = |anew| better_of(anew, &measured);
@@ -267,7 +259,6 @@ pub(crate) fn compare(
         (plain, plain, &bare)
     };
     let corrected = step(&side.unbiased.alone, &plain.alone, whole);
-    let spot_stands = corrected.stands;
     // the way to form centroids once there is a reason to
     let (way, last) = [
         (Way::Moments, moments),
@@ -277,15 +268,16 @@ pub(crate) fn compare(
     ]
     .into_iter()
     .filter(|(way, _)| match way {
-        Way::Moments | Way::Gaussian => !spot_stands,
-        Way::Unbiased => spot_stands,
+        Way::Moments | Way::Gaussian => !corrected.stands,
+        Way::Unbiased => corrected.stands,
         Way::Fitted | Way::Followed => true,
     })
     .max_by(|a, b| a.1.alone.total().total_cmp(&b.1.alone.total()))
     .unwrap_or((Way::Moments, moments));
-    let by_map = match (claim.stands, spot_stands) {
-        (true, false) => last,
-        _ => &map.moments,
+    let by_map = if claim.stands && !corrected.stands {
+        last
+    } else {
+        &map.moments
     };
     let mut dark_map = Step {
         stands: claim.stands,
@@ -293,19 +285,8 @@ pub(crate) fn compare(
         ..step(&by_map.alone, &better(&bare.moments).alone, whole)
     };
     // What switches is the map's, whatever the way; a static map is claimed by itself first.
-    let side = if claim.stands { &sides[1] } else { &sides[0] };
-    let fixed = match way {
-        Way::Moments => &side.moments,
-        Way::Unbiased => &side.unbiased,
-        Way::Fitted | Way::Followed => &side.fitted,
-        Way::Gaussian => &side.gaussian,
-    };
-    let follows = match side.followed.as_ref().filter(|_| claim.stands) {
-        Some(followed) => {
-            let [with, without] =
-                [followed, fixed].map(|evidence| beside_others(evidence, others, folds));
-            Some(step(&with?, &without?, whole)).filter(|s| s.stands)
-        }
+    let follows = match followed.filter(|_| claim.stands) {
+        Some(followed) => Some(beside([followed, last.evidence])?).filter(|s| s.stands),
         None => None,
     };
     if let Some(further) = &follows {
@@ -313,7 +294,7 @@ pub(crate) fn compare(
         dark_map.explained += further.explained;
     }
     let effective_psf = Step {
-        stands: spot_stands,
+        stands: corrected.stands,
         p_value: corrected.p_value,
         ..step(&last.alone, &moments.alone, whole)
     };
@@ -377,38 +358,42 @@ fn with_one(fitted: &Fitted, folds: &Folds) -> impl Iterator<Item = (usize, Scor
     })
 }
 
-/// A level by itself and with the best phase term.
-fn score(
-    name: &str,
-    evidence: &StarEvidence<'_>,
+/// A level by itself and with the best phase term, both among the `rivals` if it has a name.
+fn score<'a>(
+    name: Option<&str>,
+    evidence: &'a StarEvidence<'a>,
     phase: &[Arc<dyn Candidate>],
     folds: &Folds,
     data: &StarData,
     rivals: &mut Vec<Rival>,
-) -> Result<Scored, CloseError> {
+) -> Result<Scored<'a>, CloseError> {
     let fitted = fit(evidence, folds, &borrowed(phase))?;
     let alone = scored(&fitted, &[], folds).ok_or(CloseError::Singular)?;
     let best = with_one(&fitted, folds).max_by(|a, b| a.1.total().total_cmp(&b.1.total()));
-    let columns = phase.iter().map(|c| c.coefficients().len()).sum();
-    let mut tell = |what: String, set: &[usize], loglik: f64| -> Result<(), CloseError> {
-        let amplitudes = amplitudes(&fitted, folds, set, columns).ok_or(CloseError::Singular)?;
-        let residual = evidence.residuals(folds, &borrowed(phase), &amplitudes);
-        rivals.push(Rival {
-            what,
-            rms_arcsec: figures::star_rms(&residual, data).to_vec(),
-            delta_loglik: loglik,
-        });
-        Ok(())
-    };
-    tell(name.to_owned(), &[], alone.total())?;
-    if let Some((g, score)) = &best {
-        tell(
-            format!("{name} + pixel_phase_harmonics"),
-            &[*g],
-            score.total(),
-        )?;
+    if let Some(name) = name {
+        let columns = phase.iter().map(|c| c.coefficients().len()).sum();
+        let mut tell = |what: String, set: &[usize], loglik: f64| -> Result<(), CloseError> {
+            let amplitudes =
+                amplitudes(&fitted, folds, set, columns).ok_or(CloseError::Singular)?;
+            let residual = evidence.residuals(folds, &borrowed(phase), &amplitudes);
+            rivals.push(Rival {
+                what,
+                rms_arcsec: figures::star_rms(&residual, data).to_vec(),
+                delta_loglik: loglik,
+            });
+            Ok(())
+        };
+        tell(name.to_owned(), &[], alone.total())?;
+        if let Some((g, score)) = &best {
+            tell(
+                format!("{name} + pixel_phase_harmonics"),
+                &[*g],
+                score.total(),
+            )?;
+        }
     }
     Ok(Scored {
+        evidence,
         alone,
         phase: best.map(|b| b.1),
     })

@@ -184,13 +184,14 @@ pub(crate) fn learn(
             } else {
                 typical(&sample.background)
             };
+            // of a window that no spot fits no value is good
+            let believed = |w: &usize| state.good[sample.cells_of(*w)].iter().any(|good| *good);
+            let believed: Vec<usize> = list.iter().copied().filter(believed).collect();
             let following = moment_level::fit(
                 sample,
-                list,
+                &believed,
                 |w| state.fitted[w].at,
                 &state.model,
-                // of a window that no spot fits no value is good
-                |w| state.good[sample.cells_of(w)].iter().any(|good| *good),
                 &learned.dark.value,
                 spot.background,
             );

@@ -22,14 +22,12 @@ const STEPS: usize = 5;
 /// Prior standard deviation of the level, in mean signals of a pixel.
 const PRIOR: f64 = 0.2;
 
-/// The level for the star with these windows, which show `shown` (with the map) where the star is `at`; none that
-/// is not `believed` takes part.
+/// The level for the star with these windows, which show `shown` (with the map) where the star is `at`.
 pub(crate) fn fit(
     sample: &Sample,
     windows: &[usize],
     at: impl Fn(usize) -> [f64; 2],
     shown: &[f64],
-    believed: impl Fn(usize) -> bool,
     dark: &[f64],
     start: f64,
 ) -> f64 {
@@ -37,7 +35,6 @@ pub(crate) fn fit(
     // light, and moments of light and of a level of one about the star
     let sums: Vec<[f64; 5]> = windows
         .iter()
-        .filter(|&&w| believed(w))
         .map(|&w| {
             let mut sum = [0.0; 5];
             let at = at(w);
@@ -119,7 +116,7 @@ mod tests {
         let known = sample.background[0];
         let from = |start: f64| {
             let at = |w: usize| sample.start[w];
-            fit(&sample, &windows, at, &sample.z, |_| true, &dark, start)
+            fit(&sample, &windows, at, &sample.z, &dark, start)
         };
         let (level, again) = (from(known), from(known + 30.0));
         assert!(level > known, "light beyond the edge needs a higher level");

@@ -148,39 +148,31 @@ impl StarMoments {
             Keep::Bins(bins) => Paced::of(columns, &bins.rows),
             Keep::Free | Keep::Drawn(_) => None,
         };
+        let sums = |frames, bins: Option<&SolvedBins<'_>>, scratch: &mut Scratch| match &paced {
+            Some(paced) => paced.sums(columns, frames, bins, scratch),
+            None => Sums::over(columns, frames, bins, scratch),
+        };
         let block = |scratch: &mut Scratch, b: usize| {
             let frames = folds.blocks[b].clone();
             match keep {
-                Keep::None => {
-                    let sums = match &paced {
-                        Some(paced) => paced.sums(columns, frames, None, scratch),
-                        None => Sums::over(columns, frames, None, scratch),
-                    };
-                    sums.block(scratch)
-                }
+                Keep::None => sums(frames, None, scratch).block(scratch),
                 Keep::Free => {
                     let bins = SolvedBins::frames(&frames);
-                    let sums = Sums::over(columns, frames, Some(&bins), scratch);
-                    sums.block(scratch).freed()
+                    sums(frames, Some(&bins), scratch).block(scratch).freed()
                 }
                 Keep::Drawn(precision) => {
                     let bins = SolvedBins {
                         least: 1,
                         ..SolvedBins::frames(&frames)
                     };
-                    let sums = Sums::over(columns, frames, Some(&bins), scratch);
-                    sums.drawn(precision, scratch)
+                    sums(frames, Some(&bins), scratch).drawn(precision, scratch)
                 }
                 Keep::Bins(bins) => {
                     let bins = SolvedBins {
                         frames: bins.rows[bins.folds.blocks[b].clone()].into(),
                         least: SOLVING,
                     };
-                    let sums = match &paced {
-                        Some(paced) => paced.sums(columns, frames, Some(&bins), scratch),
-                        None => Sums::over(columns, frames, Some(&bins), scratch),
-                    };
-                    sums.block(scratch)
+                    sums(frames, Some(&bins), scratch).block(scratch)
                 }
             }
         };
