@@ -8,7 +8,8 @@
 //! - or it is next to nothing beside what no effect explains.
 //!
 //! What refused an effect is kept in every fit from then on, described but not named, and
-//! the search is made anew: what is named has to stand beside it.
+//! the search is made anew: what is named has to stand beside it. So is what is left beside no effect at all:
+//! it may hide one.
 //!
 //! Not physics: the order of the steps.
 
@@ -32,9 +33,9 @@ use crate::star::landing::Elsewhere;
 use crate::star::search::{Searched, attempt, declared_noise};
 use changing_effect::{Changing, Inner, Way};
 use commonness::Slow;
-use description::{Described, Kept};
+use description::{Described, Kept, Part};
 use invariance::{Change, changing};
-use stand_ins::{BY_FAR, Part, describe, stand_ins};
+use stand_ins::{BY_FAR, describe, stand_ins};
 
 mod changing_effect;
 pub(crate) mod commonness;
@@ -48,7 +49,8 @@ mod stand_ins;
 const TIE: f64 = 2.0;
 /// Searches whose outcome is refused before one is taken as it is.
 const MOST_REFUSALS: usize = 10;
-/// Chance beyond which an effect is doubted beside slow noise of the stars.
+/// Chance beyond which an effect is doubted beside slow noise of the stars, and one that shows only beside what is
+/// described: of that something is always left.
 const DOUBT: f64 = 1e-4;
 /// The effect of the acceleration.
 pub(crate) const SMEAR: &str = "exposure_smear";
@@ -131,6 +133,8 @@ pub(crate) fn run<'a>(
     };
     let mut refused = Refused::new();
     let mut kept: Vec<Arc<dyn Candidate>> = Vec::new();
+    // what was found before anything was described
+    let mut seen: Vec<String> = Vec::new();
     let mut oversize = Vec::new();
     for round in 0.. {
         let beside = white.keeping(&kept);
@@ -141,6 +145,9 @@ pub(crate) fn run<'a>(
         let (mut searched, wander) = attempt(&beside, folds, quest.candidates, &may, start)?;
         let level = searched.evidence.as_ref().unwrap_or(&beside);
         searched.found = joined(level, folds, searched.found, &may)?;
+        if kept.is_empty() {
+            seen.extend(searched.found.chosen().map(family));
+        }
         let last = round == MOST_REFUSALS;
         if round == 0 {
             oversize =
@@ -190,6 +197,13 @@ pub(crate) fn run<'a>(
         let slow = slow_left(level, inside.as_deref());
         if let Some(slow) = slow.filter(|_| !last) {
             let doubtful = doubtful(&described, &searched.found, slow.inflation(), &may);
+            // what is slow may be what is described
+            if !doubtful.is_empty()
+                && let Some(left) = described.left()
+            {
+                kept.extend(whole(&described, left));
+                continue;
+            }
             if refuse(&mut refused, doubtful, Refusal::SlowStars) {
                 continue;
             }
@@ -213,10 +227,11 @@ pub(crate) fn run<'a>(
                 kept.extend(keep(&searched.found, g, change));
                 continue;
             }
-            // what is named has to stand beside what is left
+            // what is named has to stand beside what is left, and may stand there alone
             let named = !described.chosen.is_empty() || searched.wander.is_some();
-            let set = columns_of(&described.fitted.groups, &described.chosen);
-            if named && let Some((_, left)) = describe(&described, &set) {
+            if (named || kept.is_empty())
+                && let Some(left) = described.left()
+            {
                 kept.extend(whole(&described, left));
                 continue;
             }
@@ -265,16 +280,21 @@ pub(crate) fn run<'a>(
             continue;
         }
         let least = next_to_nothing(&described);
-        let small = chosen_that(&found, |gains| gains < least);
+        let doubted = |g: usize| {
+            let unseen = !seen.contains(&family(found.candidates[g].as_ref()));
+            unseen && found.selection.judged[g].p_value > DOUBT
+        };
+        let small = chosen_that(&found, |g, gains| gains < least || doubted(g));
         if !last && refuse(&mut refused, small, Refusal::Remainder) {
             continue;
         }
         // nor without the description, which is not in the model
         let found = judged_alone(found, &mut refused);
-        let small = chosen_that(&found, |gains| gains <= least);
+        let small = chosen_that(&found, |_, gains| gains <= least);
         if !last && refuse(&mut refused, small, Refusal::Remainder) {
             continue;
         }
+        let wander = wander.filter(|w| last || w.nats() > least);
         let searched = Searched {
             found,
             evidence: evidence.clone(),
@@ -333,14 +353,17 @@ fn reinstated(refused: &mut Refused) -> bool {
 }
 
 /// Judges every effect anew without what is only described: beside it, an effect that it stands for
-/// cannot be seen. What would stand then has been refused.
+/// cannot be seen. What would stand then has been refused. A chosen one gains what the model does, in which no
+/// description is; its chance stays that beside the description, whose scatter would hide it.
 fn judged_alone(mut found: Found, refused: &mut Refused) -> Found {
     let groups = &found.fitted.groups;
     let chosen = &found.selection.chosen;
     let cost = costs(groups, &vec![true; groups.len()]);
-    let judged = found.fitted.trials(&cost).judged(chosen);
-    for (g, judged) in judged.iter().enumerate() {
-        if judged.stands() && !chosen.contains(&g) {
+    let mut judged = found.fitted.trials(&cost).judged(chosen);
+    for (g, judged) in judged.iter_mut().enumerate() {
+        if chosen.contains(&g) {
+            judged.p_value = found.selection.judged[g].p_value;
+        } else if judged.stands() {
             let family = family(found.candidates[g].as_ref());
             refused.entry(family).or_insert(Refusal::Described);
         }
@@ -369,11 +392,11 @@ fn next_to_nothing(described: &Described) -> f64 {
     REMAINDER * gain.max(0.0)
 }
 
-/// Families of the chosen effects of whose gains, nats, this holds.
-fn chosen_that(found: &Found, holds: impl Fn(f64) -> bool) -> Vec<String> {
+/// Families of the chosen effects for whose place and gain, nats, this holds.
+fn chosen_that(found: &Found, holds: impl Fn(usize, f64) -> bool) -> Vec<String> {
     let chosen = found.selection.chosen.iter();
     chosen
-        .filter(|&&g| holds(found.selection.judged[g].delta_loglik))
+        .filter(|&&g| holds(g, found.selection.judged[g].delta_loglik))
         .map(|&g| family(found.candidates[g].as_ref()))
         .collect()
 }
@@ -388,24 +411,42 @@ fn pile(found: &Found, stars: usize) -> Vec<String> {
     all.map(|g| family(found.candidates[g].as_ref())).collect()
 }
 
-/// Terms for every fit from now on: whatever bends as well; of many stars only those that
-/// are meant.
+/// Terms for every fit from now on, and what bends as well.
 fn whole(described: &Described, parts: Vec<Part>) -> Vec<Arc<dyn Candidate>> {
     let mut kept: Vec<Arc<dyn Candidate>> = Vec::new();
     for (term, part) in parts {
         let term = &described.terms[term].term;
-        let all: Vec<usize> = (0..term.coefficients().len()).collect();
-        let columns = if term.is_of_many() { part } else { all };
+        let columns = term.bending(&part);
         kept.push(Arc::new(Kept::new(Arc::new(term.clone()), columns)));
     }
     kept
 }
 
 impl Described {
-    /// The terms that describe best what is left beside the chosen effects; none where nothing does.
+    /// What describes best what is left beside the chosen effects, if anything does: what else than the time
+    /// does, first.
+    fn left(&self) -> Option<Vec<Part>> {
+        let set = columns_of(&self.fitted.groups, &self.chosen);
+        describe(self, &set).map(|(_, parts)| self.before_time(parts))
+    }
+
+    /// The same with the time, as terms; none where nothing does.
     pub(crate) fn terms_left(&self) -> Vec<Arc<dyn Candidate>> {
         let set = columns_of(&self.fitted.groups, &self.chosen);
         describe(self, &set).map_or_else(Vec::new, |(_, parts)| whole(self, parts))
+    }
+
+    /// Whether these are of the time alone.
+    fn is_of_time(&self, parts: &[Part]) -> bool {
+        parts.iter().all(|(k, _)| self.terms[*k].term.is_of_time())
+    }
+
+    /// `parts` but for the time, where that is not alone: a step looks like it, and is looked for beside the others.
+    fn before_time(&self, mut parts: Vec<Part>) -> Vec<Part> {
+        if !self.is_of_time(&parts) {
+            parts.retain(|(k, _)| !self.terms[*k].term.is_of_time());
+        }
+        parts
     }
 }
 
@@ -419,9 +460,9 @@ fn in_place_of_wander(coloured: &Described, plain: &Described, axes: usize) -> O
     let with = coloured.fitted.fits.out_of_fold(&set)?.total_loglik() + coloured.fitted.log_scale;
     // a size and a time each
     let paid = axes as f64 * plain.fitted.scalars.max(2.0).ln();
-    let time = parts.iter().all(|(k, _)| plain.terms[*k].term.is_of_time());
     let looked = plain.looked() * parts.len() as f64;
-    (!time && worth - looked > with - paid + BY_FAR).then_some(parts)
+    let time = plain.is_of_time(&parts);
+    (!time && worth - looked > with - paid + BY_FAR).then(|| plain.before_time(parts))
 }
 
 /// Slow noise that is left of the stars themselves.

@@ -56,6 +56,9 @@ pub(crate) struct Term {
     pub(crate) parts: Vec<Vec<usize>>,
 }
 
+/// A term of a description and the columns of it, counted from its own first.
+pub(crate) type Part = (usize, Vec<usize>);
+
 /// See the module.
 #[derive(Debug)]
 pub(crate) struct Described {
@@ -180,6 +183,12 @@ impl Described {
         let mut told = figures::follows(&self.fitted.fits, &set, &terms, tried, each, left);
         self.stars_before_their_constants(&set, &mut told.depends_on);
         told
+    }
+
+    /// The columns of a part of a description.
+    pub(crate) fn columns(&self, (term, part): &Part) -> Vec<usize> {
+        let first = self.terms[*term].first;
+        part.iter().map(|c| first + c).collect()
     }
 
     /// Parts that a description may be made of.

@@ -20,6 +20,10 @@
 //! that it needs, one axis of three, say, and pays for having picked them: so the set pays for no more either,
 //! and is judged at its best part.
 //!
+//! What is left beside a set has a description, too. Where the set gains beside that one half of what it gained
+//! alone, it is no part of what is described, and the two are held against the description of all:
+//! of an effect of 10 sigma beside a cause of 30 that no effect explains the terms describe the cause.
+//!
 //! A line that the motion describes nearly as well is the motion's: of all frequencies it would have come
 //! upon that at which the tracker moves. An orbit that no channel tells takes the shape of whatever is slow: one
 //! that channels describe nearly as well is theirs.
@@ -29,7 +33,7 @@
 use block_regression::{Estimate, Fits};
 use statrs::function::factorial::ln_binomial;
 
-use crate::causes::description::Described;
+use crate::causes::description::{Described, Part};
 use crate::search::orbits::OWN_SHAPE;
 use crate::search::selection::{FAMILY_ALPHA, columns_of, each};
 
@@ -42,8 +46,8 @@ const MOST_TERMS: usize = 3;
 /// Nats that a further term must be worth.
 const WORTH: f64 = 3.0;
 
-/// A term and the columns of it, counted from its own first.
-pub(crate) type Part = (usize, Vec<usize>);
+/// Share of its gain that an effect has beside the description of another cause.
+const APART: f64 = 0.5;
 
 /// The chosen set (positions among the chosen) that a description beats by most, if one
 /// does, and that description.
@@ -65,6 +69,7 @@ pub(crate) fn stand_ins(described: &Described) -> Option<(Vec<usize>, Vec<Part>)
         let Some(own) = at_best(described, &set, &rest, times) else {
             continue;
         };
+        let own = own + beside_the_rest(described, &set, &rest, times);
         let lines = set.iter().all(|&k| described.names[k] == LINE);
         let motion = |(k, _): &Part| described.terms[*k].term.is_of_motion();
         let free = set.iter().all(|&k| groups[k].slopes > 0);
@@ -83,6 +88,25 @@ pub(crate) fn stand_ins(described: &Described) -> Option<(Vec<usize>, Vec<Part>)
         }
     }
     most
+}
+
+/// What a description of what `set` leaves adds to its worth, where the set is something else: of what it gained
+/// beside `rest` alone, it gains a good part beside that description, too.
+fn beside_the_rest(described: &Described, set: &[usize], rest: &[usize], times: f64) -> f64 {
+    let fits = &described.fitted.fits;
+    let part = columns_of(&described.fitted.groups, set);
+    let with = [rest, &part].concat();
+    let more = || {
+        let (worth, parts) = describe_at(described, &with, times)?;
+        let left: Vec<usize> = parts.iter().flat_map(|p| described.columns(p)).collect();
+        let gain = |beside: &[usize]| {
+            Some(likelihood(fits, beside, &part)? - likelihood(fits, beside, &[])?)
+        };
+        let apart = gain(&[rest, &left].concat())? > APART * gain(rest)?;
+        let paid = parts.len() as f64 * described.looked();
+        apart.then_some(worth - likelihood(fits, &with, &[])? - paid)
+    };
+    more().unwrap_or(0.0).max(0.0)
 }
 
 /// How many times white noise makes the gain of `set` beside `rest` too large, at least 1: where it

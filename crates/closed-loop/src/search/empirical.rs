@@ -40,6 +40,8 @@ const ORDERS: usize = 3;
 /// Harmonics of a pixel phase along its own axis, and across.
 pub(crate) const HARMONICS: usize = 6;
 const ACROSS: usize = 2;
+/// Fields that a variable of one number drives: a shift along each axis, a roll and a scale.
+const FIELDS: usize = 4;
 /// Columns of a variable that another one may multiply.
 const OF_A_PAIR: usize = 2;
 /// Where the columns of a motion start that are of its squares, of its size (the last that an acceleration has), along
@@ -229,12 +231,12 @@ impl Empirical {
             Variable::Phase(_) => 2 * (HARMONICS + ACROSS),
             Variable::Position(_) | Variable::Window => 2 * ORDERS,
             Variable::Half(_) | Variable::Quarter => 2,
-            Variable::Time if stars => 4 * ORDERS,
+            Variable::Time if stars => FIELDS * ORDERS,
             // A polynomial in time is only good outside its fold if it is straight.
             Variable::Time => 3,
             Variable::Rate => OF_A_RATE,
             Variable::Acceleration => BENT,
-            _ if stars => 4 * orders(&variable),
+            _ if stars => FIELDS * orders(&variable),
             _ => 3 * orders(&variable),
         };
         Some(Self {
@@ -345,12 +347,39 @@ impl Empirical {
             if n > own {
                 parts.extend([(0..own).collect(), vec![own, own + 1], (own..n).collect()]);
             }
-        } else if n == 4 * ORDERS {
+        } else if n == FIELDS * ORDERS {
             // what bends alone
             parts.extend([vec![4, 5], (4..8).collect()]);
         }
         parts.push((0..n).collect());
         parts
+    }
+}
+
+impl Empirical {
+    /// `part` and what bends as well: a cause is not as straight as what describes it. Of many stars only those that
+    /// are meant; of a motion all that is not in proportion to it; of one number the same fields. What else is in
+    /// proportion is left to the effects that it would hide: a motion's first columns are a time tag, a rolling
+    /// shutter and a smear.
+    pub(crate) fn bending(&self, part: &[usize]) -> Vec<usize> {
+        let of_number = self.by.is_none()
+            && matches!(
+                self.variable,
+                Variable::Time
+                    | Variable::Magnitude
+                    | Variable::Colour
+                    | Variable::Flux
+                    | Variable::Brightness
+                    | Variable::Housekeeping(..)
+            );
+        let belongs = |k: &usize| match () {
+            () if self.is_of_many() => false,
+            () if self.is_of_motion() => *k >= SQUARES,
+            () if of_number => part.iter().any(|p| p % FIELDS == k % FIELDS),
+            () => true,
+        };
+        let all = 0..self.coefficients.len();
+        all.filter(|k| part.contains(k) || belongs(k)).collect()
     }
 }
 
@@ -524,13 +553,13 @@ impl Candidate for Empirical {
                     // what turns whole frames to and fro is what a slow error of the reference does
                     let is_time = matches!(self.variable, Variable::Time);
                     let g = legendre(self.scale.of(values[i]));
-                    for (k, g) in g.into_iter().enumerate().take(count.div_ceil(4)) {
+                    for (k, g) in g.into_iter().enumerate().take(count.div_ceil(FIELDS)) {
                         if k == 0 || !is_time {
-                            put(4 * k, g, 0.0);
-                            put(4 * k + 1, 0.0, g);
-                            put(4 * k + 2, -y * g, x * g);
+                            put(FIELDS * k, g, 0.0);
+                            put(FIELDS * k + 1, 0.0, g);
+                            put(FIELDS * k + 2, -y * g, x * g);
                         }
-                        put(4 * k + 3, x * g, y * g);
+                        put(FIELDS * k + 3, x * g, y * g);
                     }
                 }
             }

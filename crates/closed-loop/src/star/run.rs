@@ -31,7 +31,7 @@ use crate::star::evidence::StarEvidence;
 use crate::star::finish::{Finish, finish};
 use crate::star::landing::Elsewhere;
 use crate::star::pointed::Pointed;
-use crate::star::search::Searched;
+use crate::star::search::{Searched, Wander};
 use crate::star::settling::{Settled, settle};
 use crate::star::steadied::steadied;
 use crate::unexplained::leftover::{self, Series};
@@ -380,7 +380,7 @@ fn orbit(
     look: Option<Look>,
 ) -> Result<Option<Arc<dyn Candidate>>, CloseError> {
     let wander = searched.wander.as_ref();
-    let slow = wander.map_or(0.0, |w| 0.5 * w.ratio.iter().sum::<f64>());
+    let slow = wander.map_or(0.0, Wander::nats);
     let turns = searched.found.chosen().any(|c| c.turns_camera());
     if wander.is_none() && !turns && !look.is_some_and(Look::follows) {
         return Ok(None);

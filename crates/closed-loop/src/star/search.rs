@@ -446,6 +446,11 @@ impl Wander {
         })
     }
 
+    /// What it gains about all axes.
+    pub(crate) fn nats(&self) -> f64 {
+        0.5 * self.ratio.iter().sum::<f64>()
+    }
+
     /// Chance of the likeliest of these where the noise is white.
     pub(crate) fn p_value(&self) -> f64 {
         let all = self.ratio.iter().copied().chain([self.alike]);

@@ -215,3 +215,19 @@ fn single_stars_are_tried_and_all() {
     assert!((x[0] + 0.6 * unit).abs() < 1e-12 && x[2] == 0.0);
     assert!((y[2] + 0.6 * unit).abs() < 1e-12 && y[0] == 0.0);
 }
+
+/// What is kept of a motion hides no time tag and no rolling shutter, of a number no field that is not described.
+#[test]
+fn what_bends_as_well_hides_no_effect() {
+    let range = [-2.0, 2.0];
+    let rate = Empirical::new(Variable::Rate, range, true).unwrap();
+    let curved: Vec<usize> = (SQUARES..OF_A_RATE).collect();
+    assert_eq!(rate.bending(&[SIZE]), curved);
+    assert_eq!(rate.bending(&[4, SIZE])[0], 4, "but what is meant");
+    let colour = Empirical::new(Variable::Colour, range, true).unwrap();
+    assert_eq!(colour.bending(&[4]), [0, 4, 8], "the same field, of any order");
+    let stars = Empirical::new(Variable::Star(vec![7, 9]), range, true).unwrap();
+    assert_eq!(stars.bending(&[2, 3]), [2, 3]);
+    let phase = Empirical::new(Variable::Phase(0), range, true).unwrap();
+    assert_eq!(phase.bending(&[0]).len(), phase.coefficients().len());
+}
