@@ -225,7 +225,11 @@ fn what_bends_as_well_hides_no_effect() {
     assert_eq!(rate.bending(&[SIZE]), curved);
     assert_eq!(rate.bending(&[4, SIZE])[0], 4, "but what is meant");
     let colour = Empirical::new(Variable::Colour, range, true).unwrap();
-    assert_eq!(colour.bending(&[4]), [0, 4, 8], "the same field, of any order");
+    assert_eq!(
+        colour.bending(&[4]),
+        [0, 4, 8],
+        "the same field, of any order"
+    );
     let stars = Empirical::new(Variable::Star(vec![7, 9]), range, true).unwrap();
     assert_eq!(stars.bending(&[2, 3]), [2, 3]);
     let phase = Empirical::new(Variable::Phase(0), range, true).unwrap();
