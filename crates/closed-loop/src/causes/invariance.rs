@@ -14,12 +14,13 @@
 //! beyond chance (all tests of one bundle are paid for) and the part that changes holds at
 //! least a tenth of the effect's own square: a third of its size. What a second effect of the
 //! catalogue does beside it changes it, too: where the change does not gain more by far than
-//! one would, it is not the catalogue that lacks something. And where a description of what is left gains twice as
-//! much as the change, there is another cause, of which the change is a part: it is judged beside that.
+//! one would, it is not the catalogue that lacks something. And where a description of what is left gains
+//! twenty times as much as the change, there is another cause, of which the change is a part: it is judged beside that.
 //!
 //! Source: Hausman 1978 (an estimate that differs between parts of the data has the wrong
 //! model behind it), as a test of an added variable.
 
+use crate::causes::REMAINDER;
 use crate::causes::changing_effect::Way;
 use crate::causes::description::Described;
 use crate::causes::stand_ins::{BY_FAR, describe};
@@ -29,9 +30,6 @@ use crate::search::selection::columns_of;
 const ALPHA: f64 = 0.003;
 /// Least square of what changes, over that of the effect.
 const LEAST_SHARE: f64 = 0.1;
-
-/// Share of what a description of the rest gains that a change has to gain.
-const CHIEF: f64 = 0.5;
 
 /// A chosen effect that is not the same everywhere.
 #[derive(Clone, Debug)]
@@ -44,8 +42,8 @@ pub(crate) struct Change {
 }
 
 /// The chosen effect that changes most certainly, if one does. No change counts that does not gain more by
-/// far than `instead` out of fold, what the best effect of the catalogue beside the chosen would, and half of what
-/// a description does.
+/// far than `instead` out of fold, what the best effect of the catalogue beside the chosen would, and the share of
+/// what a description does that no effect may lack.
 pub(crate) fn changing(described: &Described, instead: f64) -> Option<Change> {
     let groups = &described.fitted.groups;
     let fits = &described.fitted.fits;
@@ -53,7 +51,7 @@ pub(crate) fn changing(described: &Described, instead: f64) -> Option<Change> {
     let alone = fits.estimate(&set)?;
     let before = fits.out_of_fold(&set)?.total_loglik();
     let left = describe(described, &set).map_or(0.0, |(worth, _)| worth - before);
-    let instead = instead.max(CHIEF * left);
+    let instead = instead.max(REMAINDER * left);
     let tried: usize = described.changes.iter().map(Vec::len).sum();
     let mut worst: Option<Change> = None;
     let mut first = 0;

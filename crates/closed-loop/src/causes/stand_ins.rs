@@ -20,7 +20,7 @@
 //! that it needs, one axis of three, say, and pays for having picked them: so the set pays for no more either,
 //! and is judged at its best part.
 //!
-//! What is left beside a set has a description, too. Where the set gains beside that one half of what it gained
+//! What is left beside a set has a description, too. Where the set gains beside that one nearly all that it gained
 //! alone, it is no part of what is described, and the two are held against the description of all:
 //! of an effect of 10 sigma beside a cause of 30 that no effect explains the terms describe the cause.
 //!
@@ -33,6 +33,7 @@
 use block_regression::{Estimate, Fits};
 use statrs::function::factorial::ln_binomial;
 
+use crate::causes::REMAINDER;
 use crate::causes::description::{Described, Part};
 use crate::search::orbits::OWN_SHAPE;
 use crate::search::selection::{FAMILY_ALPHA, columns_of, each};
@@ -46,8 +47,8 @@ const MOST_TERMS: usize = 3;
 /// Nats that a further term must be worth.
 const WORTH: f64 = 3.0;
 
-/// Share of its gain that an effect has beside the description of another cause.
-const APART: f64 = 0.5;
+/// Share of its gain that an effect has beside the description of another cause: all that is not next to nothing.
+const APART: f64 = 1.0 - REMAINDER;
 
 /// The chosen set (positions among the chosen) that a description beats by most, if one
 /// does, and that description.
@@ -91,7 +92,7 @@ pub(crate) fn stand_ins(described: &Described) -> Option<(Vec<usize>, Vec<Part>)
 }
 
 /// What a description of what `set` leaves adds to its worth, where the set is something else: of what it gained
-/// beside `rest` alone, it gains a good part beside that description, too.
+/// beside `rest` alone, it gains nearly all beside that description, too.
 fn beside_the_rest(described: &Described, set: &[usize], rest: &[usize], times: f64) -> f64 {
     let fits = &described.fitted.fits;
     let part = columns_of(&described.fitted.groups, set);
