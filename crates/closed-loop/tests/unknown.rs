@@ -339,6 +339,26 @@ fn a_step_beside_what_no_effect_is() {
     }
 }
 
+/// A star misplaced by 1.5 arcsec, 30 sigma of its 1200 rows, beside the same scale: the terms that describe that gain
+/// more than the star, and say nothing of it.
+#[test]
+fn a_misplaced_star_beside_what_no_effect_is() {
+    let report = report_along(SLEWS, |stars, row, k| {
+        let [x, y] = way(stars, row, k);
+        let scale = 0.2 * x.hypot(y) / 512.0;
+        let first = stars.star_id[stars.rows_of(0).start];
+        let off = if stars.star_id[row] == first {
+            1.5
+        } else {
+            0.0
+        };
+        [scale * stars.x_px[row], scale * stars.y_px[row] + off]
+    });
+    let named = named(&report);
+    assert_eq!(named, ["catalogue_position"], "{:?}", left(&report));
+    assert!(left(&report)[0].contains("rate"), "{:?}", left(&report));
+}
+
 /// One star swings by 0.8 arcsec under 1.4 of noise an axis: sqrt(1200 / 2) * 0.8 / 1.4 = 14 sigma, at 0.021 3 Hz
 /// with a grid of half of 1/600 s.
 #[test]
