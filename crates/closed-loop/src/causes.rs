@@ -387,7 +387,7 @@ fn best_beside(found: &Found, may: &[bool]) -> f64 {
 fn next_to_nothing(described: &Described) -> f64 {
     let set = columns_of(&described.fitted.groups, &described.chosen);
     let alone = described.fitted.fits.out_of_fold(&set);
-    let gain = describe(described, &set).zip(alone);
+    let gain = described.rest().zip(alone);
     let gain = gain.map_or(0.0, |((worth, _), alone)| worth - alone.total_loglik());
     REMAINDER * gain.max(0.0)
 }
@@ -423,17 +423,22 @@ fn whole(described: &Described, parts: Vec<Part>) -> Vec<Arc<dyn Candidate>> {
 }
 
 impl Described {
-    /// What describes best what is left beside the chosen effects, if anything does: what else than the time
-    /// does, first.
-    fn left(&self) -> Option<Vec<Part>> {
-        let set = columns_of(&self.fitted.groups, &self.chosen);
-        describe(self, &set).map(|(_, parts)| self.before_time(parts))
+    /// What describes best what is left beside the chosen effects, and its likelihood after all prices, if anything
+    /// does.
+    fn rest(&self) -> Option<&(f64, Vec<Part>)> {
+        let set = || columns_of(&self.fitted.groups, &self.chosen);
+        self.rest.get_or_init(|| describe(self, &set())).as_ref()
     }
 
-    /// The same with the time, as terms; none where nothing does.
+    /// What else than the time does of that, first.
+    fn left(&self) -> Option<Vec<Part>> {
+        self.rest().map(|(_, parts)| self.before_time(parts))
+    }
+
+    /// All of it as terms; none where nothing does.
     pub(crate) fn terms_left(&self) -> Vec<Arc<dyn Candidate>> {
-        let set = columns_of(&self.fitted.groups, &self.chosen);
-        describe(self, &set).map_or_else(Vec::new, |(_, parts)| whole(self, parts))
+        let terms = self.rest().map(|(_, parts)| whole(self, parts.clone()));
+        terms.unwrap_or_default()
     }
 
     /// Whether these are of the time alone.
@@ -442,11 +447,10 @@ impl Described {
     }
 
     /// `parts` but for the time, where that is not alone: a step looks like it, and is looked for beside the others.
-    fn before_time(&self, mut parts: Vec<Part>) -> Vec<Part> {
-        if !self.is_of_time(&parts) {
-            parts.retain(|(k, _)| !self.terms[*k].term.is_of_time());
-        }
-        parts
+    fn before_time(&self, parts: &[Part]) -> Vec<Part> {
+        let alone = self.is_of_time(parts);
+        let first = |(k, _): &&Part| alone || !self.terms[*k].term.is_of_time();
+        parts.iter().filter(first).cloned().collect()
     }
 }
 
@@ -454,14 +458,13 @@ impl Described {
 /// `coloured` is beside it, `plain` under white noise. Not the time alone: a slow error is what the time
 /// alone describes, and folds that know nothing of each other's predict it worse.
 fn in_place_of_wander(coloured: &Described, plain: &Described, axes: usize) -> Option<Vec<Part>> {
-    let set = columns_of(&plain.fitted.groups, &plain.chosen);
-    let (worth, parts) = describe(plain, &set)?;
+    let (worth, parts) = plain.rest()?;
     let set = columns_of(&coloured.fitted.groups, &coloured.chosen);
     let with = coloured.fitted.fits.out_of_fold(&set)?.total_loglik() + coloured.fitted.log_scale;
     // a size and a time each
     let paid = axes as f64 * plain.fitted.scalars.max(2.0).ln();
     let looked = plain.looked() * parts.len() as f64;
-    let time = plain.is_of_time(&parts);
+    let time = plain.is_of_time(parts);
     (!time && worth - looked > with - paid + BY_FAR).then(|| plain.before_time(parts))
 }
 

@@ -11,7 +11,7 @@ use block_regression::Folds;
 use effects::{AttitudeRows, Candidate, Coefficient, Effect, EffectError, StarRows, Surroundings};
 use focal_plane::{AttitudeSeries, Camera, PointsMut, VectorsMut};
 use spectra::robust::median_step;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use crate::causes::changing_effect::{Changing, Inner, Way};
 use crate::error::CloseError;
@@ -74,6 +74,8 @@ pub(crate) struct Described {
     pub(crate) turns: Vec<bool>,
     /// What having looked for each chosen effect costs, nats ([`costs`]).
     pub(crate) paid: Vec<f64>,
+    /// What describes best what is left beside them, and its likelihood after all prices, once it was asked for.
+    pub(crate) rest: OnceLock<Option<(f64, Vec<Part>)>>,
 }
 
 impl Described {
@@ -161,6 +163,7 @@ impl Described {
             names,
             turns,
             paid,
+            rest: OnceLock::new(),
         })
     }
 }

@@ -23,7 +23,7 @@
 use crate::causes::REMAINDER;
 use crate::causes::changing_effect::Way;
 use crate::causes::description::Described;
-use crate::causes::stand_ins::{BY_FAR, describe};
+use crate::causes::stand_ins::BY_FAR;
 use crate::search::selection::columns_of;
 
 /// Chance that any effect of a bundle is called changing although it is constant.
@@ -50,7 +50,7 @@ pub(crate) fn changing(described: &Described, instead: f64) -> Option<Change> {
     let set = columns_of(groups, &described.chosen);
     let alone = fits.estimate(&set)?;
     let before = fits.out_of_fold(&set)?.total_loglik();
-    let left = describe(described, &set).map_or(0.0, |(worth, _)| worth - before);
+    let left = described.rest().map_or(0.0, |(worth, _)| worth - before);
     let instead = instead.max(REMAINDER * left);
     let tried: usize = described.changes.iter().map(Vec::len).sum();
     let mut worst: Option<Change> = None;

@@ -372,11 +372,14 @@ impl Empirical {
                     | Variable::Brightness
                     | Variable::Housekeeping(..)
             );
-        let belongs = |k: &usize| match () {
-            () if self.is_of_many() => false,
-            () if self.is_of_motion() => *k >= SQUARES,
-            () if of_number => part.iter().any(|p| p % FIELDS == k % FIELDS),
-            () => true,
+        let belongs = |k: &usize| {
+            if self.is_of_motion() {
+                *k >= SQUARES
+            } else if of_number {
+                part.iter().any(|p| p % FIELDS == k % FIELDS)
+            } else {
+                !self.is_of_many()
+            }
         };
         let all = 0..self.coefficients.len();
         all.filter(|k| part.contains(k) || belongs(k)).collect()
