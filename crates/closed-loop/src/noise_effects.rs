@@ -24,6 +24,7 @@ mod squares;
 #[cfg(test)]
 mod tests;
 mod variance;
+mod within_stars;
 
 use std::collections::BTreeMap;
 

@@ -43,6 +43,20 @@ impl Banded {
         self.entries.iter().step_by(self.width + 1).sum()
     }
 
+    /// The matrix times `v`.
+    pub(crate) fn times(&self, v: &[f64]) -> Vec<f64> {
+        let mut out = vec![0.0; v.len()];
+        for (i, row) in self.entries.chunks_exact(self.width + 1).enumerate() {
+            let reach = self.width.min(self.order - 1 - i);
+            let (here, below) = (v[i], &v[i + 1..=i + reach]);
+            out[i] += row[0] * here + dot(&row[1..=reach], below);
+            for (o, a) in out[i + 1..=i + reach].iter_mut().zip(&row[1..]) {
+                *o += a * here;
+            }
+        }
+        out
+    }
+
     /// L D L^T; `None` if the matrix is not positive definite.
     pub(crate) fn factor(mut self) -> Option<Factor> {
         let stride = self.width + 1;
@@ -190,10 +204,15 @@ mod tests {
         }
         assert!((band.trace() - dense.trace()).abs() < 1e-12);
         let inverse = dense.clone().try_inverse().unwrap();
+        let whole = band.clone();
+        let times = |v: &[f64]| whole.times(v);
         let factor = band.factor().unwrap();
         let mut x: Vec<f64> = (0..n).map(|i| (i as f64).cos()).collect();
         let b = nalgebra::DVector::from_vec(x.clone());
         let quadratic = factor.quadratic(&mut x.clone());
+        let product = times(&x);
+        let expected = &dense * &b;
+        assert!((0..n).all(|i| (product[i] - expected[i]).abs() < 1e-13));
         factor.solve(&mut x);
         let expected = &inverse * &b;
         assert!((quadratic - b.dot(&expected)).abs() < 1e-13);

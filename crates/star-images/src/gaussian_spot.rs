@@ -1,13 +1,14 @@
-//! A round Gaussian as a spot: what a tracker would fit that knows no better.
+//! A round Gaussian as a spot: what a tracker would fit that knows no better, and what a spot is thought to be where
+//! its windows do not say.
 //!
 //! ```text
-//! psi_G(q) = a G(q; s) + p,     G the Gaussian of width s integrated over the pixel
-//! minimise (psi - psi_G)^T A (psi - psi_G)   over a, p, a shift of G to first order, and s
+//! psi_G(q) = a G(q; s) + u . grad G + p,     G the Gaussian of width s integrated over the pixel
+//! minimise (psi - psi_G)^T A (psi - psi_G)   over a, p, the shift u to first order, and s
 //! ```
 //!
 //! psi is the effective spot, A its normal matrix: the Gaussian that the windows themselves ask for, without
-//! going through them again. G is written in splines with knots of half the distance: its own shape, not that
-//! of the splines, is compared. The shift is not kept: a spot has its own zero.
+//! going through them again. Where G is compared with the spot it is written in splines with knots of half the
+//! distance: its own shape, not that of the splines, is compared; and without its shift: a spot has its own zero.
 //!
 //! Source: linear least squares with one non-linear parameter profiled.
 
@@ -18,22 +19,51 @@ use super::spot::Normal;
 
 /// Widths that are looked at, px.
 const WIDTHS_PX: [f64; 2] = [0.15, 4.0];
-/// Halvings of the interval, by the golden section: to 1e-5 of the width.
+/// Parts of the interval, by the golden section: to 1e-5 of the width.
 const STEPS: usize = 28;
+/// How far from the last one a width is looked for while a spot is still learned, and how often the interval is
+/// parted: to 2e-3.
+const NEAR: f64 = 0.1;
+const NEAR_STEPS: usize = 10;
 
-/// Width, amplitude and pedestal of the Gaussian nearest to the spot `psi`.
-pub(crate) fn nearest(grid: &Grid, normal: &Normal, psi: &[f64]) -> Option<[f64; 3]> {
+/// A round Gaussian.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Gaussian {
+    pub(crate) width_px: f64,
+    amplitude: f64,
+    /// What lies under it.
+    pub(crate) pedestal: f64,
+    /// Amplitude times its shift along x and y, px.
+    shift: [f64; 2],
+}
+
+/// Where the width is looked for.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Widths {
+    All,
+    /// Within a tenth of this one, px, and roughly.
+    Near(f64),
+}
+
+/// The Gaussian nearest to the spot `psi`.
+pub(crate) fn nearest(
+    grid: &Grid,
+    normal: &Normal,
+    psi: &[f64],
+    widths: Widths,
+) -> Option<Gaussian> {
     let spline = Spline::new(grid)?;
+    let seen = normal.times(psi);
+    let level = vec![1.0; psi.len()];
+    let level_seen = normal.times(&level);
     let fit = |width: f64| -> Option<(f64, Vector4<f64>)> {
-        let [value, slope] = [0, 1].map(|k| spline.coefficients(|d| gaussian(d, width)[k]));
-        let columns = [
-            outer(&value, &value),
-            vec![1.0; psi.len()],
-            outer(&slope, &value),
-            outer(&value, &slope),
-        ];
-        let matrix = Matrix4::from_fn(|i, j| normal.product(&columns[i], &columns[j]));
-        let moment = Vector4::from_fn(|i, _| normal.product(&columns[i], psi));
+        let columns = spline.columns(width);
+        let [value_seen, x_seen, y_seen] = columns.each_ref().map(|c| normal.times(c));
+        let [value, x, y] = &columns;
+        let columns = [value, &level, x, y];
+        let by = [&value_seen, &level_seen, &x_seen, &y_seen];
+        let matrix = Matrix4::from_fn(|i, j| dot(columns[i], by[j]));
+        let moment = Vector4::from_fn(|i, _| dot(columns[i], &seen));
         // amplitudes and slopes differ by orders of magnitude
         let size = matrix.diagonal().map(|v| v.max(f64::MIN_POSITIVE).sqrt());
         let scaled = Matrix4::from_fn(|i, j| matrix[(i, j)] / (size[i] * size[j]));
@@ -41,12 +71,15 @@ pub(crate) fn nearest(grid: &Grid, normal: &Normal, psi: &[f64]) -> Option<[f64;
         let solution = solution.component_div(&size);
         Some((moment.dot(&solution), solution))
     };
-    let [mut low, mut high] = WIDTHS_PX.map(f64::ln);
+    let ([mut low, mut high], steps) = match widths {
+        Widths::All => (WIDTHS_PX.map(f64::ln), STEPS),
+        Widths::Near(width) => ([-NEAR, NEAR].map(|d| width.ln() + d), NEAR_STEPS),
+    };
     let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
     let power = |at: f64| fit(at.exp()).map_or(f64::NEG_INFINITY, |f| f.0);
     let mut inner = [high - golden * (high - low), low + golden * (high - low)];
     let mut found = inner.map(power);
-    for _ in 0..STEPS {
+    for _ in 0..steps {
         if found[0] > found[1] {
             high = inner[1];
             inner = [high - golden * (high - low), inner[0]];
@@ -57,19 +90,34 @@ pub(crate) fn nearest(grid: &Grid, normal: &Normal, psi: &[f64]) -> Option<[f64;
             found = [found[1], power(inner[1])];
         }
     }
-    let width = (0.5 * (low + high)).exp();
-    let (_, solution) = fit(width)?;
-    (solution[0] > 0.0).then(|| [width, solution[0], solution[1]])
+    let width_px = (0.5 * (low + high)).exp();
+    let (_, solution) = fit(width_px)?;
+    let [amplitude, pedestal, x, y]: [f64; 4] = solution.into();
+    (amplitude > 0.0).then_some(Gaussian {
+        width_px,
+        amplitude,
+        pedestal,
+        shift: [x, y],
+    })
 }
 
-/// The Gaussian of this width, amplitude and pedestal in splines.
-pub(crate) fn coefficients(
-    grid: &Grid,
-    [width, amplitude, pedestal]: [f64; 3],
-) -> Option<Vec<f64>> {
-    let axis = Spline::new(grid)?.coefficients(|d| gaussian(d, width)[0]);
-    let whole = outer(&axis, &axis);
-    Some(whole.iter().map(|v| amplitude * v + pedestal).collect())
+impl Gaussian {
+    /// In splines, at the spot's zero.
+    pub(crate) fn coefficients(&self, grid: &Grid) -> Option<Vec<f64>> {
+        Self {
+            shift: [0.0; 2],
+            ..*self
+        }
+        .shifted(grid)
+    }
+
+    /// In splines, where the spot has it.
+    pub(crate) fn shifted(&self, grid: &Grid) -> Option<Vec<f64>> {
+        let [value, x, y] = Spline::new(grid)?.columns(self.width_px);
+        let [u, v] = self.shift;
+        let at = |k: usize| self.amplitude * value[k] + u * x[k] + v * y[k] + self.pedestal;
+        Some((0..value.len()).map(at).collect())
+    }
 }
 
 /// Knots of half the distance.
@@ -93,6 +141,10 @@ fn outer(x: &[f64], y: &[f64]) -> Vec<f64> {
     x.iter()
         .flat_map(|a| y.iter().map(move |b| a * b))
         .collect()
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 /// Interpolation along one axis: the values at the knots, straight at both ends.
@@ -122,6 +174,16 @@ impl Spline {
         Some(Self { inverse, knots })
     }
 
+    /// A Gaussian of amplitude 1, and what a shift along x and y adds to it.
+    fn columns(&self, width: f64) -> [Vec<f64>; 3] {
+        let [value, slope] = [0, 1].map(|k| self.coefficients(|d| gaussian(d, width)[k]));
+        [
+            outer(&value, &value),
+            outer(&slope, &value),
+            outer(&value, &slope),
+        ]
+    }
+
     fn coefficients(&self, f: impl Fn(f64) -> f64) -> Vec<f64> {
         let mut values: Vec<f64> = self.knots.iter().map(|&d| f(d)).collect();
         values.extend([0.0; 2]);
@@ -143,7 +205,13 @@ mod tests {
     #[test]
     fn splines_follow_a_gaussian() {
         let grid = Grid::new(4.0, 0.2);
-        let psi = coefficients(&grid, [0.7, 2.0, 0.1]).unwrap();
+        let shape = Gaussian {
+            width_px: 0.7,
+            amplitude: 2.0,
+            pedestal: 0.1,
+            shift: [0.0; 2],
+        };
+        let psi = shape.coefficients(&grid).unwrap();
         for (x, y) in [(0.0, 0.0), (0.3, -0.7), (1.13, 0.41), (-2.2, 1.9)] {
             let got = grid.value(&psi, &grid.taps(x), &grid.taps(y));
             let mut expected = [0.0];
@@ -169,7 +237,12 @@ mod tests {
         let normal = spot::normal(&grid, &sample, &windows, flux, at, &weight, |_| level);
         let mut psi = normal.moment.clone();
         normal.factor(&grid, 1e-2).unwrap().solve(&mut psi);
-        let [width, amplitude, pedestal] = nearest(&grid, &normal, &psi).unwrap();
+        let Gaussian {
+            width_px: width,
+            amplitude,
+            pedestal,
+            ..
+        } = nearest(&grid, &normal, &psi, Widths::All).unwrap();
         assert!((width / 0.9 - 1.0).abs() < 2e-3, "{width}");
         // the fluxes of the sample are sums over a window that the spot does not fit into
         assert!(amplitude > 0.98 && amplitude < 1.2, "{amplitude}");

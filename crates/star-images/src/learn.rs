@@ -17,7 +17,7 @@ use rayon::prelude::*;
 use super::banded::Factor;
 use super::coupling::{self, Coupling};
 use super::dark::{self, Dark};
-use super::gaussian_spot;
+use super::gaussian_spot::{self, Gaussian, Widths};
 use super::geometry::Geometry;
 use super::moment_level;
 use super::pixel_noise::{self, MIN_READ_VARIANCE};
@@ -62,6 +62,10 @@ pub(crate) struct Spot {
     /// Spline coefficients; empty where there were too few windows.
     pub(crate) psi: Vec<f64>,
     roughness: f64,
+    /// Spline coefficients of the Gaussian nearest to the spot of the last round, which this one is drawn to, and its
+    /// width; zeros before there is one.
+    about: Vec<f64>,
+    width_px: Option<f64>,
     pub(crate) background: f64,
     pub(crate) background_variance: f64,
     /// Noise of the star's pixels over that of all.
@@ -157,12 +161,10 @@ pub(crate) fn learn(
     for outer in 0..OUTER {
         place(sample, taken, &mut state, &star_weight, length_px);
         weigh(sample, &windows, &mut state, learned.noise);
-        let sums = learned.learn_spots_and_dark(sample, &windows, &ordered, &state, mapped);
-        if outer == OUTER - 1 {
-            learned.learn_gaussians(&sums);
-            if with_variance {
-                learned.dark_variance = learned.free_variance(sample, &sums);
-            }
+        let last = outer == OUTER - 1;
+        let sums = learned.learn_spots_and_dark(sample, &windows, &ordered, &state, last);
+        if with_variance && last {
+            learned.dark_variance = learned.free_variance(sample, &sums);
         }
         let steps = if outer == 0 {
             FIRST_STEPS
@@ -234,6 +236,8 @@ fn first_guess(sample: &Sample, list: &[usize], state: &mut State, grid: &Grid) 
             vec![0.0; grid.len()]
         },
         roughness: ROUGHNESS,
+        about: vec![0.0; grid.len()],
+        width_px: None,
         background,
         background_variance: BACKGROUND_VARIANCE,
         scale: 1.0,
@@ -274,15 +278,15 @@ fn weigh(sample: &Sample, windows: &[Vec<usize>], state: &mut State, noise: Pixe
 }
 
 impl Learned {
-    /// Spots at the given map, the map at these spots, until both stand still.
-    /// Returns the sums they were made of.
+    /// Spots at the given map, the map at these spots, until both stand still; then the Gaussians, exactly in the
+    /// `last` round. Returns the sums they were made of.
     fn learn_spots_and_dark(
         &mut self,
         sample: &Sample,
         windows: &[Vec<usize>],
         ordered: &[Vec<[usize; 3]>],
         state: &State,
-        mapped: bool,
+        last: bool,
     ) -> Vec<(Normal, Coupling)> {
         let (grid, level) = (self.grid, |w: usize| state.fitted[w].background);
         let (flux, at, weight) = (&state.flux, &state.at, &state.weight);
@@ -318,38 +322,41 @@ impl Learned {
                 let Some(factor) = factor else { continue };
                 spot.psi.copy_from_slice(&normal.moment);
                 coupling.take_off_dark(&self.dark.value, &mut spot.psi);
+                spot::draw_to(&grid, spot.roughness, &spot.about, &mut spot.psi);
                 factor.solve(&mut spot.psi);
                 coupling.tell_pixels(&spot.psi, &mut moment, &mut total);
             }
-            if !mapped || self.dark.update(&moment, &total, &sample.group) < STANDS_STILL {
+            if !self.mapped || self.dark.update(&moment, &total, &sample.group) < STANDS_STILL {
                 break;
             }
         }
-        self.spots
-            .par_iter_mut()
-            .zip(&factors)
-            .for_each(|(spot, factor)| {
-                if let Some(factor) = factor {
-                    spot.roughness = spot::next_rho(&grid, factor, &spot.psi);
-                }
-            });
+        let finer = self.finer;
+        self.spots.par_iter_mut().zip(&factors).zip(&sums).for_each(
+            |((spot, factor), (normal, _))| {
+                let Some(factor) = factor else { return };
+                let own: Vec<f64> = spot
+                    .psi
+                    .iter()
+                    .zip(&spot.about)
+                    .map(|(psi, about)| psi - about)
+                    .collect();
+                spot.roughness = spot::next_rho(&grid, factor, &own);
+                let widths = match spot.width_px {
+                    Some(width) if !last => Widths::Near(width),
+                    _ => Widths::All,
+                };
+                let nearest = gaussian_spot::nearest(&grid, normal, &spot.psi, widths);
+                spot.width_px = nearest.map(|gaussian| gaussian.width_px);
+                spot.pedestal = nearest.map_or(0.0, |gaussian| gaussian.pedestal);
+                let written = |gaussian: Gaussian| {
+                    Some((gaussian.shifted(&grid)?, gaussian.coefficients(&finer)?))
+                };
+                (spot.about, spot.gaussian) = nearest
+                    .and_then(written)
+                    .unwrap_or_else(|| (vec![0.0; grid.len()], Vec::new()));
+            },
+        );
         sums
-    }
-
-    /// The Gaussian nearest to each spot.
-    fn learn_gaussians(&mut self, sums: &[(Normal, Coupling)]) {
-        let (grid, finer) = (self.grid, self.finer);
-        self.spots
-            .par_iter_mut()
-            .zip(sums)
-            .filter(|(spot, _)| !spot.psi.is_empty())
-            .for_each(|(spot, (normal, _))| {
-                let shape = gaussian_spot::nearest(&grid, normal, &spot.psi);
-                spot.pedestal = shape.map_or(0.0, |[_, _, pedestal]| pedestal);
-                spot.gaussian = shape
-                    .and_then(|shape| gaussian_spot::coefficients(&finer, shape))
-                    .unwrap_or_default();
-            });
     }
 
     /// Fits every window; returns the stars' weights in the attitude.

@@ -2,15 +2,16 @@
 //!
 //! ```text
 //! z = F psi(p - s) + B + D + noise       p pixel centre, s position of the star, px
-//! (A + R/rho + e 1) g = sum w F taps (z - B - D),     A = sum w F^2 taps taps^T
-//! rho = (g^T R g + tr(Q^-1 R)) / (K - 4),   Q = A + R/rho + e 1
+//! (A + R/rho + e 1) g = sum w F taps (z - B - D) + R/rho g0,     A = sum w F^2 taps taps^T
+//! rho = (d^T R d + tr(Q^-1 R)) / (K - 4),   d = g - g0,   Q = A + R/rho + e 1
 //! ```
 //!
 //! psi is integrated over the pixel already: it is what a pixel reads as a
 //! function of its offset from the star, flux 1, a tensor cubic spline g of K
-//! coefficients. R penalises second differences along both axes; its null space
-//! has 4 dimensions. rho is chosen by one step of expectation-maximisation of the
-//! marginal likelihood.
+//! coefficients. R penalises second differences along both axes of what it is more than
+//! g0, the Gaussian nearest to it: the wings of a spot are far smoother than its core, and what few
+//! windows saw is taken for that of a Gaussian. The null space of R has 4 dimensions. rho is chosen by one step of
+//! expectation-maximisation of the marginal likelihood.
 //!
 //! Source: Anderson & King 2000, PASP 112, 1360 (effective PSF); Eilers & Marx 1996
 //! (penalised splines); Dempster, Laird & Rubin 1977 (expectation-maximisation) for rho.
@@ -106,18 +107,9 @@ pub(crate) fn normal(
 }
 
 impl Normal {
-    /// `g^T A h`.
-    pub(crate) fn product(&self, g: &[f64], h: &[f64]) -> f64 {
-        let stride = self.band.width + 1;
-        let mut sum = 0.0;
-        for (row, entries) in self.band.entries.chunks_exact(stride).enumerate() {
-            let reach = stride.min(g.len() - row);
-            sum += entries[0] * g[row] * h[row];
-            for (offset, a) in entries[..reach].iter().enumerate().skip(1) {
-                sum += a * (g[row] * h[row + offset] + g[row + offset] * h[row]);
-            }
-        }
-        sum
+    /// A g.
+    pub(crate) fn times(&self, g: &[f64]) -> Vec<f64> {
+        self.band.times(g)
     }
 
     /// A + R/rho + ridge.
@@ -140,14 +132,26 @@ impl Normal {
     }
 }
 
-/// One step of expectation-maximisation for the variance of second differences.
-pub(crate) fn next_rho(grid: &Grid, factor: &Factor, psi: &[f64]) -> f64 {
+/// `g += R/rho g0`: what draws a spot to the Gaussian `about`.
+pub(crate) fn draw_to(grid: &Grid, rho: f64, about: &[f64], g: &mut [f64]) {
+    for_roughness(grid, |row, offset, value| {
+        let value = value / rho;
+        g[row] += value * about[row + offset];
+        if offset > 0 {
+            g[row + offset] += value * about[row];
+        }
+    });
+}
+
+/// One step of expectation-maximisation for the variance of second differences of `own`, what the spot is more than
+/// the Gaussian it is drawn to.
+pub(crate) fn next_rho(grid: &Grid, factor: &Factor, own: &[f64]) -> f64 {
     let mut inverse = factor.inverse_in_band();
     let mut sum = 0.0;
     for_roughness(grid, |row, offset, value| {
         // each pair off the diagonal stands for two entries
         let twice = if offset == 0 { 1.0 } else { 2.0 };
-        sum += twice * value * (psi[row] * psi[row + offset] + *inverse.at(row, offset));
+        sum += twice * value * (own[row] * own[row + offset] + *inverse.at(row, offset));
     });
     sum / (grid.len() as f64 - UNPENALISED).max(1.0)
 }
@@ -246,6 +250,37 @@ mod tests {
             .collect();
         let width = fwhm_px(&grid, &psi);
         assert!((width - 2.3548 * sigma).abs() < 0.02 * width, "{width}");
+    }
+
+    /// Windows that show the spot g0 itself are explained by it, however strongly a spot is drawn to g0: the moment is
+    /// A g0, and Q g0 = A g0 + R/rho g0, but for the ridge of 1e-9. Drawn to nothing, the same spot is smoothed.
+    #[test]
+    fn a_spot_that_is_what_it_is_drawn_to_stays() {
+        let sample = super::super::synthetic::few_windows(300);
+        let grid = Grid::new(sample.reach_px() + 0.5, 0.4);
+        let windows: Vec<usize> = (0..sample.windows()).collect();
+        let weight = vec![0.05; sample.z.len()];
+        let (flux, at) = (&sample.flux, &sample.start);
+        let sums = normal(&grid, &sample, &windows, flux, at, &weight, |_| 0.0);
+        let about: Vec<f64> = (0..grid.len())
+            .map(|k| {
+                let [x, y] = [k / grid.side, k % grid.side].map(|k| k as f64 - 8.0);
+                (-0.05 * (x * x + 0.7 * y * y)).exp()
+            })
+            .collect();
+        let rho = 1e-8;
+        let factor = sums.factor(&grid, rho).unwrap();
+        let off = |drawn: bool| {
+            let mut psi = sums.times(&about);
+            if drawn {
+                draw_to(&grid, rho, &about, &mut psi);
+            }
+            factor.solve(&mut psi);
+            let off = psi.iter().zip(&about).map(|(p, a)| (p - a).abs());
+            off.fold(0.0, f64::max)
+        };
+        assert!(off(true) < 1e-4, "{}", off(true));
+        assert!(off(false) > 0.1, "{}", off(false));
     }
 
     /// psi^T R psi + tr(Q^-1 R) with dense matrices; R built from its definition.

@@ -8,6 +8,7 @@
 //!     c: how much wider than chi2_2 the squares scatter
 //!     L_without: at no rate, no spikes, and for the slope next to none: nearer is as declared
 //!     var: over blocks of time; for the slope also over stars, which may differ for no reason at all
+//! for the rate, that each star's noise follows it where every star has its own level (`within_stars.rs`)
 //! gain = sum over the folds of ln L - ln L_without on the fold, both fitted on the others;
 //!        of slope and rate  Z(all) - Z(others) - the same without,   Z = max ln L - ln(I + I_all/N) / 2
 //! ```
@@ -34,6 +35,7 @@ use super::variance::{
     Covariance, Fit, LEVEL, MAGNITUDE, MOST_SHARE, Model, PARAMETERS, RATE, SHARE, SIZE, Vector,
     Without, information, logit, sigmoid,
 };
+use super::within_stars;
 use crate::search::selection::FAMILY_ALPHA;
 
 /// Effects that are tried.
@@ -388,6 +390,11 @@ impl Bench<'_> {
             let variance = variance * of_few(count, 2);
             p = p.max(wald(beyond, variance, count, 2));
             sigma2 = sigma2.max(variance);
+        }
+        if k == RATE {
+            let belief = self.model.belief(&full.at);
+            let sound = |row: &Row| belief(row)[1];
+            p = p.max(within_stars::chance(&self.rows, self.stars, sound, widened));
         }
         let p_value = (TRIED * p).min(1.0);
         let gain = if wanted == Gain::Told || p_value < FAMILY_ALPHA {

@@ -186,6 +186,30 @@ fn a_clean_detector_gets_no_map() {
     }
 }
 
+/// Stars that drift along a line over two pixels: what is left out was seen nowhere else.
+#[test]
+fn what_no_window_saw_is_a_gaussian() {
+    for seed in 0..40 {
+        let made = Scenario {
+            frames: 500,
+            motion: &|k| [0.0054 * k as f64, -0.0044 * k as f64],
+            seed,
+            ..scenario()
+        }
+        .make();
+        let formed = formed(&made);
+        let error = |v| rms(&made, &out_of_fold(&made, v), &every);
+        let c = &formed.without_map;
+        println!(
+            "{seed} plain {:.5} unbiased {:.5} fitted {:.5} gauss {:.5}",
+            error(&c.plain),
+            error(&c.unbiased),
+            error(&c.fitted),
+            error(&c.gaussian)
+        );
+    }
+}
+
 /// A hit of 3000 in one pixel moves the first moment by up to half a pixel and the
 /// fitted position by what the loss of one of 36 pixels costs: 0.8 to 1.2 times the
 /// scatter of the others over 40 seeds.
