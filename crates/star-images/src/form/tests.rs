@@ -186,28 +186,25 @@ fn a_clean_detector_gets_no_map() {
     }
 }
 
-/// Stars that drift along a line over two pixels: what is left out was seen nowhere else.
+/// Stars drift along a line over 2.7 px, so that what a fold leaves out no other window saw. They are Gaussians, and
+/// spots drawn to one place them as well as a Gaussian does: to 0.4 % over 40 seeds. Drawn to nothing they are 3.5
+/// to 5 % worse.
 #[test]
-fn what_no_window_saw_is_a_gaussian() {
-    for seed in 0..40 {
-        let made = Scenario {
-            frames: 500,
-            motion: &|k| [0.0054 * k as f64, -0.0044 * k as f64],
-            seed,
-            ..scenario()
-        }
-        .make();
-        let formed = formed(&made);
-        let error = |v| rms(&made, &out_of_fold(&made, v), &every);
-        let c = &formed.without_map;
-        println!(
-            "{seed} plain {:.5} unbiased {:.5} fitted {:.5} gauss {:.5}",
-            error(&c.plain),
-            error(&c.unbiased),
-            error(&c.fitted),
-            error(&c.gaussian)
-        );
+fn what_no_window_saw_is_a_gaussians() {
+    let made = Scenario {
+        frames: 500,
+        motion: &|k| [0.0054 * k as f64, -0.0044 * k as f64],
+        ..scenario()
     }
+    .make();
+    let formed = formed(&made);
+    let error = |ways| rms(&made, &out_of_fold(&made, ways), &every);
+    let ways = &formed.without_map;
+    let [fitted, gaussian, unbiased, plain] =
+        [&ways.fitted, &ways.gaussian, &ways.unbiased, &ways.plain].map(|way| error(way));
+    assert!(fitted < 1.015 * gaussian, "{fitted} {gaussian}");
+    // first moments of spots that the window cuts off lag behind, and their bias is known
+    assert!(unbiased < 0.7 * plain, "{unbiased} {plain}");
 }
 
 /// A hit of 3000 in one pixel moves the first moment by up to half a pixel and the
