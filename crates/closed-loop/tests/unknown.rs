@@ -339,6 +339,25 @@ fn a_step_beside_what_no_effect_is() {
     }
 }
 
+/// A clock off by 1 ms at up to 115 arcsec/s, ten sigma of it, beside a shear that grows with the rate: the terms that
+/// describe the shear hold more than the clock moves, and would take its place if what it leaves were not
+/// described, too.
+#[test]
+fn a_time_tag_beside_what_no_effect_is() {
+    let report = report_along(SLEWS, |stars, row, k| {
+        let [x, y] = way(stars, row, k);
+        let shear = 0.08 * x.hypot(y) / 512.0;
+        // four frames are 2 s, a pixel 70 arcsec
+        let late = |way_px: f64| 70.0 / 2.0 * way_px * 1e-3;
+        [shear * stars.y_px[row] + late(x), late(y)]
+    });
+    assert_eq!(named(&report), ["time_tag_offset"], "{:?}", left(&report));
+    assert!(left(&report)[0].contains("rate"), "{:?}", left(&report));
+    let late = &report.effects[0].parameters["offset_s"];
+    let off = late.value.abs() - 1e-3;
+    assert!(off.abs() < 4.0 * late.sigma.unwrap(), "{late:?}");
+}
+
 /// A star misplaced by 1.5 arcsec, 30 sigma of its 1200 rows, beside the same scale: the terms that describe that gain
 /// more than the star, and say nothing of it.
 #[test]
