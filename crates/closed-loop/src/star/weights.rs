@@ -13,7 +13,14 @@
 //!
 //! so that a weighted residual has the same noise everywhere, and weights of all rows
 //! multiply to 1: likelihoods are those of the residual itself. The error of a sigma from n
-//! changes is 1.2/sqrt(n) of it; stars seen for few frames are drawn to the common noise.
+//! changes is 1.2/sqrt(n) of it; stars seen for few frames are drawn to the noise that stars of their magnitude have,
+//!
+//! ```text
+//! ln sigma_s = a + b m_s      a, b: weighted least squares over the stars with 20 changes and more
+//! ```
+//!
+//! or where no magnitude tells, to that of all rows. Drawn to the latter alone a faint star that was seen
+//! once was misplaced by three sigmas of a bright one.
 //!
 //! Source: Aitken 1935 (weighted least squares); Rousseeuw & Croux 1993 (the median's scale).
 
@@ -24,6 +31,14 @@ use crate::star::data::StarData;
 
 /// Changes that the common noise counts for beside a star's own.
 const COMMON: f64 = 20.0;
+/// Fewest changes of a star that says how noise grows with the magnitude, fewest such stars, and their spread.
+const ENOUGH: usize = 20;
+const LEAST_STARS: usize = 4;
+const LEAST_SPREAD_MAG: f64 = 0.1;
+/// By how much stars of one magnitude differ, of their sigma.
+const SCATTER: f64 = 0.1;
+/// Steepest growth that is believed: sigma over a magnitude, where read noise alone is left 2.5.
+const STEEPEST: f64 = 1.2;
 /// A star is never taken for quieter than this share of the common noise.
 const QUIETEST: f64 = 0.1;
 /// Median of |x| for unit variance.
@@ -59,12 +74,15 @@ pub(crate) fn of(data: &StarData, changes: &[Vec<f64>; 2]) -> Vec<f64> {
     let Some(common) = all.filter(|s| *s > 0.0) else {
         return vec![1.0; rows];
     };
+    let usual = usual(data, &own);
     let sigma: Vec<f64> = own
         .into_iter()
-        .map(|(n, own)| {
+        .enumerate()
+        .map(|(star, (n, own))| {
+            let usual = usual(star).unwrap_or(common);
             let n = n as f64;
             let square = own.map_or(0.0, |s| s * s);
-            let drawn = (n * square + COMMON * common * common) / (n + COMMON);
+            let drawn = (n * square + COMMON * usual * usual) / (n + COMMON);
             drawn.sqrt().max(QUIETEST * common)
         })
         .collect();
@@ -72,6 +90,37 @@ pub(crate) fn of(data: &StarData, changes: &[Vec<f64>; 2]) -> Vec<f64> {
     let log: f64 = counted().map(|r| sigma[data.star[r]].ln()).sum();
     let geometric = (log / counted().count().max(1) as f64).exp();
     (0..rows).map(|r| geometric / sigma[data.star[r]]).collect()
+}
+
+/// The noise that a star of the magnitude of each has by the others: `own` are changes of each star and their sigma.
+fn usual(data: &StarData, own: &[(usize, Option<f64>)]) -> impl Fn(usize) -> Option<f64> + use<> {
+    let mut mags = vec![f64::NAN; own.len()];
+    for (row, &star) in data.star.iter().enumerate() {
+        mags[star] = data.mag[row];
+    }
+    let known = || {
+        let each = mags.iter().zip(own);
+        each.filter_map(|(mag, (n, sigma))| {
+            let sigma = sigma.filter(|s| *s > 0.0 && *n >= ENOUGH && mag.is_finite())?;
+            let weight = 1.0 / (1.44 / *n as f64 + SCATTER * SCATTER);
+            Some((weight, *mag, sigma.ln()))
+        })
+    };
+    let whole: f64 = known().map(|k| k.0).sum();
+    let [mag, ln] = known().fold([0.0; 2], |[m, l], (w, mag, ln)| {
+        [m + w * mag / whole, l + w * ln / whole]
+    });
+    let (mut square, mut product) = (0.0, 0.0);
+    for (w, m, l) in known() {
+        square += w * (m - mag).powi(2);
+        product += w * (m - mag) * (l - ln);
+    }
+    let told = known().count() >= LEAST_STARS && square > whole * LEAST_SPREAD_MAG.powi(2);
+    let slope = (product / square).clamp(-STEEPEST, STEEPEST);
+    move |star| {
+        let line = (ln + slope * (mags[star] - mag)).exp();
+        (told && line.is_finite()).then_some(line)
+    }
 }
 
 #[cfg(test)]
@@ -85,25 +134,25 @@ mod tests {
     use rand_distr::{Distribution, StandardNormal};
     use rand_xoshiro::Xoshiro256PlusPlus;
 
-    /// Stars of noise 0.02, 0.04 and 0.08 px on an image that grows slowly by far more than that; the
-    /// last is seen in four frames. The median of n changes is known to 1.2/sqrt(n): 2.4 % here.
-    #[test]
-    fn weights_are_those_of_the_noise_alone() {
+    /// Stars of these noises, px, on an image that grows slowly by far more; the last is seen in `seen` frames.
+    fn image_that_grows(sigma: &[f64], seen: u32) -> StarData {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(5);
-        let sigma = [0.02, 0.04, 0.08, 0.08];
         let camera = Camera::from_fov_deg([1024, 1024], [20.0, 20.0]).unwrap();
         let place = [
             [200.0, 10.0],
             [-150.0, 180.0],
             [-60.0, -220.0],
             [90.0, 90.0],
+            [-20.0, 130.0],
+            [-210.0, -120.0],
         ];
+        let last = i32::try_from(sigma.len()).unwrap() - 1;
         let mut frames = StarFrames::new();
         for k in 0..1250_u32 {
             let t = 0.5 * f64::from(k);
             frames.begin(t);
             for (s, (at, sigma)) in (0..).zip(place.iter().zip(sigma)) {
-                if s == 3 && k > 3 {
+                if s == last && k >= seen {
                     continue;
                 }
                 let mut noisy = |v: f64| {
@@ -114,7 +163,7 @@ mod tests {
                 frames.push(s, i64::from(s) + 1, x, y);
             }
         }
-        let data = StarData::prepare(&Inputs {
+        let mut data = StarData::prepare(&Inputs {
             camera: &camera,
             frames: &frames,
             reference: None,
@@ -124,13 +173,21 @@ mod tests {
         });
         // positions against where the first frame has them: the attitude solved frame by frame would
         // mix the stars' noise
-        let mut data = data;
         for row in 0..data.t_s.len() {
             for axis in 0..2 {
                 data.projected[axis][row] = place[data.star[row]][axis];
                 data.phase_error[axis][row] = 0.0;
             }
         }
+        data
+    }
+
+    /// Stars of noise 0.02, 0.04 and 0.08 px on an image that grows slowly by far more than that; the
+    /// last is seen in four frames. The median of n changes is known to 1.2/sqrt(n): 2.4 % here.
+    #[test]
+    fn weights_are_those_of_the_noise_alone() {
+        let sigma = [0.02, 0.04, 0.08, 0.08];
+        let data = image_that_grows(&sigma, 4);
         let weight = of(&data, &changes::of(&data));
         let of_star = |s: usize| weight[data.star.iter().position(|&k| k == s).unwrap()];
         for (a, b) in [(0, 1), (1, 2)] {
@@ -145,5 +202,24 @@ mod tests {
         assert!((0.35..1.1).contains(&ratio), "{ratio}");
         let log: f64 = weight.iter().map(|w| w.ln()).sum();
         assert!(log.abs() < 1e-9 * weight.len() as f64, "{log}");
+    }
+
+    /// Noise of 0.02 px doubles with every magnitude; a star of 4 mag that is seen once has 0.32 px, as the line
+    /// through the others has it. Five sigmas of 2.4 % are 0.12 of its logarithm, and a magnitude beyond the last 0.17.
+    #[test]
+    fn a_star_seen_once_has_the_noise_of_its_magnitude() {
+        let mag = [0.0, 1.0, 2.0, 3.0, 1.0, 4.0];
+        let sigma = mag.map(|m| 0.02 * 2_f64.powf(m));
+        let mut data = image_that_grows(&sigma, 1);
+        let of_star = |data: &StarData, s: usize| {
+            let row = data.star.iter().position(|&k| k == s).unwrap();
+            of(data, &changes::of(data))[row]
+        };
+        let unknown = of_star(&data, 5) / of_star(&data, 0);
+        data.mag = data.star.iter().map(|&s| mag[s]).collect();
+        let ratio = of_star(&data, 5) / of_star(&data, 0);
+        assert!((ratio * 16.0).ln().abs() < 0.17, "{ratio}");
+        // without magnitudes it is taken for what is usual
+        assert!(unknown > 3.0 / 16.0, "{unknown}");
     }
 }
