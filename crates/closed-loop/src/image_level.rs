@@ -12,7 +12,7 @@
 //! - the spot is claimed if first moments corrected by it beat first moments as they
 //!   are. A function of pixel phase may do as well: but what the spot says is read off the pixels, not off the
 //!   centroids that it corrects. That a fitted spot has less noise than a first moment is no effect: it corrects no
-//!   error of the model.
+//!   error of the model. Beside a map, a correction that is next to nothing of what a fit gains is what the map leaves.
 //!
 //! Once either is claimed centroids are formed anew, and then in the way that predicts
 //! best: a fitted spot also feels what is left of a warm pixel less. What is constant for a star is then known as
@@ -80,6 +80,10 @@ pub(crate) struct Side<'a> {
 const OWN_ZERO_PX: f64 = 0.05;
 /// Nats that a claim has to bring at least: pixels that are hardly off zero are no map.
 const LEAST_GAIN: f64 = 6.0;
+
+/// Share of what a fitted spot gains that a correction of moments beside a map brings at least: of spots that are whole
+/// it was 0.3 and 0.7 %, of those that are cut off 19 % and more.
+const LEAST_SHARE: f64 = 0.05;
 
 /// What one step from a level to the next brought.
 #[derive(Clone, Debug)]
@@ -258,7 +262,12 @@ pub(crate) fn compare<'a>(
         let plain = better(&bare.plain);
         (plain, plain, &bare)
     };
-    let corrected = step(&side.unbiased.alone, &plain.alone, whole);
+    let mut corrected = step(&side.unbiased.alone, &plain.alone, whole);
+    if claim.stands {
+        // what is left of pixels at the rim moves moments, and a spot's wings take some of it
+        let fit = side.fitted.alone.total() - plain.alone.total();
+        corrected.stands &= corrected.delta_loglik > LEAST_SHARE * fit;
+    }
     // the way to form centroids once there is a reason to
     let (way, last) = [
         (Way::Moments, moments),
