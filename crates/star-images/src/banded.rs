@@ -91,7 +91,7 @@ impl Banded {
 }
 
 /// Sum of products, in lanes.
-fn dot(a: &[f64], b: &[f64]) -> f64 {
+pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     const LANES: usize = 8;
     let mut sums = [0.0; LANES];
     let (mut x, mut y) = (a.chunks_exact(LANES), b.chunks_exact(LANES));

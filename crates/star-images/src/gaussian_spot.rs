@@ -14,6 +14,7 @@
 
 use nalgebra::{DMatrix, DVector, Matrix4, Vector4};
 
+use super::banded::dot;
 use super::spline::Grid;
 use super::spot::Normal;
 
@@ -141,10 +142,6 @@ fn outer(x: &[f64], y: &[f64]) -> Vec<f64> {
     x.iter()
         .flat_map(|a| y.iter().map(move |b| a * b))
         .collect()
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 /// Interpolation along one axis: the values at the knots, straight at both ends.

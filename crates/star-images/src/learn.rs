@@ -62,10 +62,10 @@ pub(crate) struct Spot {
     /// Spline coefficients; empty where there were too few windows.
     pub(crate) psi: Vec<f64>,
     roughness: f64,
-    /// Spline coefficients of the Gaussian nearest to the spot of the last round, which this one is drawn to, and its
-    /// width; zeros before there is one.
+    /// The Gaussian nearest to it, where there is one, and its spline coefficients, which the spot of the next round is
+    /// drawn to; zeros where there is none.
+    nearest: Option<Gaussian>,
     about: Vec<f64>,
-    width_px: Option<f64>,
     pub(crate) background: f64,
     pub(crate) background_variance: f64,
     /// Noise of the star's pixels over that of all.
@@ -77,8 +77,6 @@ pub(crate) struct Spot {
     plain_level: f64,
     /// Spline coefficients of the Gaussian nearest to it; empty where there is none.
     gaussian: Vec<f64>,
-    /// What lies under that Gaussian, and in the spot, over the flux.
-    pedestal: f64,
 }
 
 /// What is learned from some frames.
@@ -182,7 +180,9 @@ pub(crate) fn learn(
             let typical = |of: &[f64]| robust_median(list.iter().map(|&w| of[w]).collect());
             let plain = if mapped {
                 // the map holds a level that no table knows of
-                typical(&state.flux).map(|flux| spot.background + flux * spot.pedestal)
+                // and lies under the spot as under that Gaussian
+                let pedestal = spot.nearest.map_or(0.0, |gaussian| gaussian.pedestal);
+                typical(&state.flux).map(|flux| spot.background + flux * pedestal)
             } else {
                 typical(&sample.background)
             };
@@ -236,15 +236,14 @@ fn first_guess(sample: &Sample, list: &[usize], state: &mut State, grid: &Grid) 
             vec![0.0; grid.len()]
         },
         roughness: ROUGHNESS,
+        nearest: None,
         about: vec![0.0; grid.len()],
-        width_px: None,
         background,
         background_variance: BACKGROUND_VARIANCE,
         scale: 1.0,
         level: background,
         plain_level: background,
         gaussian: Vec::new(),
-        pedestal: 0.0,
     }
 }
 
@@ -293,11 +292,12 @@ impl Learned {
         let sums: Vec<(Normal, Coupling)> = windows
             .par_iter()
             .zip(ordered)
-            .map(|(list, ordered)| {
-                (
-                    spot::normal(&grid, sample, list, flux, at, weight, level),
-                    Coupling::new(&grid, sample, ordered, flux, at, weight, level),
-                )
+            .zip(&self.spots)
+            .map(|((list, ordered), spot)| {
+                let mut normal = spot::normal(&grid, sample, list, flux, at, weight, level);
+                normal.draw_to(&grid, spot.roughness, &spot.about);
+                let coupling = Coupling::new(&grid, sample, ordered, flux, at, weight, level);
+                (normal, coupling)
             })
             .collect();
         let factors: Vec<Option<Factor>> = self
@@ -322,7 +322,6 @@ impl Learned {
                 let Some(factor) = factor else { continue };
                 spot.psi.copy_from_slice(&normal.moment);
                 coupling.take_off_dark(&self.dark.value, &mut spot.psi);
-                spot::draw_to(&grid, spot.roughness, &spot.about, &mut spot.psi);
                 factor.solve(&mut spot.psi);
                 coupling.tell_pixels(&spot.psi, &mut moment, &mut total);
             }
@@ -341,19 +340,17 @@ impl Learned {
                     .map(|(psi, about)| psi - about)
                     .collect();
                 spot.roughness = spot::next_rho(&grid, factor, &own);
-                let widths = match spot.width_px {
-                    Some(width) if !last => Widths::Near(width),
+                let widths = match spot.nearest {
+                    Some(gaussian) if !last => Widths::Near(gaussian.width_px),
                     _ => Widths::All,
                 };
-                let nearest = gaussian_spot::nearest(&grid, normal, &spot.psi, widths);
-                spot.width_px = nearest.map(|gaussian| gaussian.width_px);
-                spot.pedestal = nearest.map_or(0.0, |gaussian| gaussian.pedestal);
-                let written = |gaussian: Gaussian| {
-                    Some((gaussian.shifted(&grid)?, gaussian.coefficients(&finer)?))
-                };
-                (spot.about, spot.gaussian) = nearest
-                    .and_then(written)
-                    .unwrap_or_else(|| (vec![0.0; grid.len()], Vec::new()));
+                spot.nearest = gaussian_spot::nearest(&grid, normal, &spot.psi, widths);
+                let about = spot.nearest.and_then(|gaussian| gaussian.shifted(&grid));
+                spot.about = about.unwrap_or_else(|| vec![0.0; grid.len()]);
+                if last {
+                    let written = spot.nearest.and_then(|g| g.coefficients(&finer));
+                    spot.gaussian = written.unwrap_or_default();
+                }
             },
         );
         sums

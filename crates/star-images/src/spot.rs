@@ -50,7 +50,7 @@ impl WindowTaps {
 pub(crate) struct Normal {
     /// A, bandwidth 3 side + 3.
     band: Banded,
-    /// `sum w F taps (z - B)`.
+    /// `sum w F taps (z - B)`, and what the spot is drawn to.
     pub(crate) moment: Vec<f64>,
 }
 
@@ -126,21 +126,21 @@ impl Normal {
         band
     }
 
+    /// Adds R/rho g0 to the moment: what draws a spot to the Gaussian `about`.
+    pub(crate) fn draw_to(&mut self, grid: &Grid, rho: f64, about: &[f64]) {
+        for_roughness(grid, |row, offset, value| {
+            let value = value / rho;
+            self.moment[row] += value * about[row + offset];
+            if offset > 0 {
+                self.moment[row + offset] += value * about[row];
+            }
+        });
+    }
+
     /// Factor of Q.
     pub(crate) fn factor(&self, grid: &Grid, rho: f64) -> Option<Factor> {
         self.penalised(grid, rho).factor()
     }
-}
-
-/// `g += R/rho g0`: what draws a spot to the Gaussian `about`.
-pub(crate) fn draw_to(grid: &Grid, rho: f64, about: &[f64], g: &mut [f64]) {
-    for_roughness(grid, |row, offset, value| {
-        let value = value / rho;
-        g[row] += value * about[row + offset];
-        if offset > 0 {
-            g[row + offset] += value * about[row];
-        }
-    });
 }
 
 /// One step of expectation-maximisation for the variance of second differences of `own`, what the spot is more than
@@ -271,10 +271,12 @@ mod tests {
         let rho = 1e-8;
         let factor = sums.factor(&grid, rho).unwrap();
         let off = |drawn: bool| {
-            let mut psi = sums.times(&about);
+            let mut sums = sums.clone();
+            sums.moment = sums.times(&about);
             if drawn {
-                draw_to(&grid, rho, &about, &mut psi);
+                sums.draw_to(&grid, rho, &about);
             }
+            let mut psi = sums.moment;
             factor.solve(&mut psi);
             let off = psi.iter().zip(&about).map(|(p, a)| (p - a).abs());
             off.fold(0.0, f64::max)

@@ -76,7 +76,7 @@ mod tests {
     use super::*;
 
     /// Six stars of 300 rows whose variances are `floor + declared`, which no power of the flux is, and grow by
-    /// `noise` times the squared rate: 1 on average, and 2 or none in turn.
+    /// `noise` times the squared rate: 1 on average, 1.3 and 0.7 in turn.
     fn rows(floor: f64, noise: f64, seed: u64) -> Vec<Row> {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
         let mut out = Vec::new();

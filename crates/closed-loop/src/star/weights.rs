@@ -37,7 +37,7 @@ const LEAST_STARS: usize = 4;
 const LEAST_SPREAD_MAG: f64 = 0.1;
 /// By how much stars of one magnitude differ, of their sigma.
 const SCATTER: f64 = 0.1;
-/// Steepest growth that is believed: sigma over a magnitude, where read noise alone is left 2.5.
+/// Steepest growth of ln sigma over a magnitude that is believed: that of read noise alone is ln 2.512 = 0.92.
 const STEEPEST: f64 = 1.2;
 /// A star is never taken for quieter than this share of the common noise.
 const QUIETEST: f64 = 0.1;
@@ -93,17 +93,16 @@ pub(crate) fn of(data: &StarData, changes: &[Vec<f64>; 2]) -> Vec<f64> {
 }
 
 /// The noise that a star of the magnitude of each has by the others: `own` are changes of each star and their sigma.
-fn usual(data: &StarData, own: &[(usize, Option<f64>)]) -> impl Fn(usize) -> Option<f64> + use<> {
-    let mut mags = vec![f64::NAN; own.len()];
-    for (row, &star) in data.star.iter().enumerate() {
-        mags[star] = data.mag[row];
-    }
+fn usual<'a>(
+    data: &'a StarData,
+    own: &[(usize, Option<f64>)],
+) -> impl Fn(usize) -> Option<f64> + use<'a> {
     let known = || {
-        let each = mags.iter().zip(own);
-        each.filter_map(|(mag, (n, sigma))| {
-            let sigma = sigma.filter(|s| *s > 0.0 && *n >= ENOUGH && mag.is_finite())?;
+        let each = data.stars.iter().zip(own);
+        each.filter_map(|(star, (n, sigma))| {
+            let sigma = sigma.filter(|s| *s > 0.0 && *n >= ENOUGH && star.mag.is_finite())?;
             let weight = 1.0 / (1.44 / *n as f64 + SCATTER * SCATTER);
-            Some((weight, *mag, sigma.ln()))
+            Some((weight, star.mag, sigma.ln()))
         })
     };
     let whole: f64 = known().map(|k| k.0).sum();
@@ -118,7 +117,7 @@ fn usual(data: &StarData, own: &[(usize, Option<f64>)]) -> impl Fn(usize) -> Opt
     let told = known().count() >= LEAST_STARS && square > whole * LEAST_SPREAD_MAG.powi(2);
     let slope = (product / square).clamp(-STEEPEST, STEEPEST);
     move |star| {
-        let line = (ln + slope * (mags[star] - mag)).exp();
+        let line = (ln + slope * (data.stars[star].mag - mag)).exp();
         (told && line.is_finite()).then_some(line)
     }
 }
@@ -216,7 +215,7 @@ mod tests {
             of(data, &changes::of(data))[row]
         };
         let unknown = of_star(&data, 5) / of_star(&data, 0);
-        data.mag = data.star.iter().map(|&s| mag[s]).collect();
+        data.stars.iter_mut().zip(mag).for_each(|(s, m)| s.mag = m);
         let ratio = of_star(&data, 5) / of_star(&data, 0);
         assert!((ratio * 16.0).ln().abs() < 0.17, "{ratio}");
         // without magnitudes it is taken for what is usual
