@@ -1,18 +1,96 @@
-//! The declared model's own parts: centroid error and declared effects.
+//! The declared model's own parts: what it does to centroids, and declared effects.
 //!
-//! Source: [M23] Eq. 10 for the triangle; effects as their files have them.
+//! What acts on a centroid acts where the light falls, distortion and all; where that is known to a variance v only,
+//! as its mean over it. Of effects that is the five-point rule of Gauss and Hermite, along the diagonal: x and y have
+//! errors of their own, and an effect on x hardly asks for y.
+//!
+//! ```text
+//! c(P) -> sum_j w_j c(P + z_j sqrt(v))      exp(-2 pi^2 k^2 v) of a wave, to 1 % of it for k sqrt(v) < 0.3
+//! ```
+//!
+//! Source: [M23] Eq. 10 for the triangle, Fig. 4 for where it acts; effects as their files have them.
 
 use std::sync::Arc;
 
 use centroid::{CentroidError, Triangle};
 use effects::{Effect, ParameterValue, Parameters};
+use focal_plane::Pixel;
+use star_tracker::StarView;
 use telemetry::{EffectValue, Model};
 
 use crate::error::CloseError;
 use crate::situation::Situation;
 
+/// Nodes, in standard deviations, and weights.
+const HERMITE: [(f64, f64); 5] = [
+    (0.0, 8.0 / 15.0),
+    (1.355_626_179_974_266, 0.222_075_922_005_612_6),
+    (-1.355_626_179_974_266, 0.222_075_922_005_612_6),
+    (2.856_970_013_872_806, 0.011_257_411_327_720_69),
+    (-2.856_970_013_872_806, 0.011_257_411_327_720_69),
+];
+/// A position that is known to less than this is known, px.
+const KNOWN_PX: f64 = 1e-3;
+
+/// What the declared model does to a centroid where the light falls.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct OnCentroids {
+    /// The declared centroid error, arcsec.
+    pub(crate) error: CentroidError,
+    /// Those of the declared effects that act on centroids.
+    effects: Vec<Arc<dyn Effect>>,
+}
+
+impl OnCentroids {
+    pub(crate) fn of(situation: &Situation<'_>) -> Result<Self, CloseError> {
+        let mut effects = effects(situation)?;
+        effects.retain(|e| e.stages().centroid);
+        Ok(Self {
+            effects,
+            ..Self::from(situation.model)
+        })
+    }
+
+    /// Whether any effect is among them.
+    pub(crate) fn has_effects(&self) -> bool {
+        !self.effects.is_empty()
+    }
+
+    /// What the effects shift a centroid by, px, where the light falls `at` a place known to `variance_px2`.
+    pub(crate) fn effects_px(&self, star: &StarView, variance_px2: [f64; 2]) -> [f64; 2] {
+        let shift = |star: &StarView| {
+            let each = self.effects.iter().map(|e| e.centroid_shift_px(star));
+            each.fold([0.0; 2], |[x, y], [dx, dy]| [x + dx, y + dy])
+        };
+        let sigma = variance_px2.map(f64::sqrt);
+        if sigma.iter().all(|s| *s < KNOWN_PX) {
+            return shift(star);
+        }
+        let (mut x, mut y) = (0.0, 0.0);
+        for (z, weight) in HERMITE {
+            let at = Pixel {
+                x: star.at.x + z * sigma[0],
+                y: star.at.y + z * sigma[1],
+            };
+            let [dx, dy] = shift(&StarView { at, ..*star });
+            (x, y) = (x + weight * dx, y + weight * dy);
+        }
+        [x, y]
+    }
+}
+
+impl From<&Model> for OnCentroids {
+    /// Without the effects.
+    fn from(model: &Model) -> Self {
+        Self {
+            error: centroid_error(model),
+            effects: Vec::new(),
+        }
+    }
+}
+
 /// The declared centroid error, arcsec: the triangle of [M23] Eq. 10, its peak as printed.
-pub(crate) fn centroid_error(model: &Model) -> CentroidError {
+fn centroid_error(model: &Model) -> CentroidError {
     match model.noise.centroid_arcsec {
         Some(peak) if peak > 0.0 => CentroidError::Triangle(Triangle::from_peak(peak)),
         _ => CentroidError::None,

@@ -29,8 +29,6 @@ mod within_stars;
 use std::collections::BTreeMap;
 
 use block_regression::Folds;
-use focal_plane::Pixel;
-use star_tracker::StarView;
 use telemetry::report::{ConsideredEffect, Estimate, FoundEffect};
 use telemetry::{EffectEntry, EffectValue, Model};
 
@@ -165,17 +163,7 @@ pub(crate) fn declared_variance(
     effects.retain(|e| e.stages().noise);
     let scale = data.camera.arcsec_per_px();
     let variance = (0..data.t_s.len()).map(|r| {
-        let star = StarView {
-            t_s: data.t_s[r],
-            slot: data.frames.slot[r],
-            star_id: data.frames.star_id[r],
-            mag: data.mag[r],
-            bv: data.bv[r],
-            at: Pixel {
-                x: data.modelled[0][r],
-                y: data.modelled[1][r],
-            },
-        };
+        let star = data.view(r);
         let speed = (data.velocity[0][r] * scale[0]).hypot(data.velocity[1][r] * scale[1]);
         let all = effects
             .iter()

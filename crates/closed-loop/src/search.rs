@@ -197,6 +197,7 @@ fn grouped(fits: &Fits, candidates: &[&dyn Candidate]) -> Vec<Group> {
             },
             kind: candidate.id(),
             stands_for: candidate.stands_for(),
+            rarity: candidate.rarity(),
         });
         column += p;
     }

@@ -10,10 +10,11 @@
 //! ```
 //!
 //! All regressors are evaluated at the *modelled* position, projection +
-//! misalignment + distortion, never at the measured one: regressing on measured
-//! positions explains noise by shrinking everything, and the triangle evaluated
-//! at the raw projection raises false alarms. The modelled position is improved
-//! once the first fit has given misalignment and distortion ([`crate::star::landing`]).
+//! misalignment + distortion + what the stars tell of the reference's error, never at
+//! the measured one: regressing on measured positions explains noise by shrinking
+//! everything, and the triangle evaluated at the raw projection raises false alarms.
+//! The modelled position is improved once the first fit has given misalignment and
+//! distortion ([`crate::star::landing`]).
 //!
 //! Source: [M23] Fig. 4 for the order of the terms.
 
@@ -21,14 +22,15 @@ use std::collections::HashMap;
 use std::ops::Range;
 use std::sync::Arc;
 
-use centroid::CentroidError;
 use effects::{Effect, PixelWaves, StarRows};
-use focal_plane::{AttitudeSeries, AttitudeSource, Camera, Points, PointsMut, StarFrames};
+use focal_plane::{AttitudeSeries, AttitudeSource, Camera, Pixel, Points, PointsMut, StarFrames};
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+use star_tracker::StarView;
 use telemetry::WindowTable;
 
 use spectra::robust;
 
+use crate::declared::OnCentroids;
 use crate::motion;
 use crate::star::directions;
 
@@ -49,7 +51,7 @@ pub(crate) struct Star {
     pub(crate) direction: Vector3<f64>,
 }
 
-/// By how much the light falls beside the modelled position, and how well that is known.
+/// By how much the reference puts each row off, as the stars tell it, and how well that is known.
 #[derive(Clone, Debug)]
 pub(crate) struct Light {
     pub(crate) beside_px: [Vec<f64>; 2],
@@ -57,7 +59,7 @@ pub(crate) struct Light {
 }
 
 impl Light {
-    /// Where it is modelled.
+    /// Where the reference has it.
     pub(crate) fn as_modelled(rows: usize) -> Self {
         let zeros = || [vec![0.0; rows], vec![0.0; rows]];
         Self {
@@ -101,15 +103,13 @@ pub(crate) struct StarData {
     pub(crate) modelled: [Vec<f64>; 2],
     /// Where effects that were found take the light, px, where that is far.
     pub(super) carried: Option<[Vec<f64>; 2]>,
-    /// How far beside it the light falls, [`crate::star::light`].
+    /// How far the reference puts them off, [`crate::star::light`].
     pub(super) light: Light,
-    /// Where the light falls, as far as is known, px.
-    landed: [Vec<f64>; 2],
     /// Velocity and acceleration of the image, px/s and px/s^2; zero where the
     /// motion is not known.
     pub(crate) velocity: [Vec<f64>; 2],
     pub(crate) acceleration: [Vec<f64>; 2],
-    /// Declared centroid error where the light falls, px.
+    /// What the declared model does to centroids where the light falls, px.
     pub(crate) phase_error: [Vec<f64>; 2],
     /// Rows left out of every fit and figure.
     pub(crate) outlier: Vec<bool>,
@@ -129,8 +129,8 @@ pub(crate) struct Inputs<'a> {
     pub(crate) reference: Option<&'a AttitudeSeries>,
     /// Direction, magnitude and colour by star id, if there is a catalogue.
     pub(crate) catalogue: Option<&'a dyn Fn(i64) -> Option<Star>>,
-    pub(crate) phase: &'a CentroidError,
-    /// Effects that the model declares: they move the projection.
+    pub(crate) phase: &'a OnCentroids,
+    /// Effects that the model declares: what they do before the centroid moves the projection.
     pub(crate) effects: &'a [Arc<dyn Effect>],
 }
 
@@ -315,7 +315,6 @@ impl StarData {
             modelled: pair(),
             carried: None,
             light: Light::as_modelled(n),
-            landed: pair(),
             velocity: pair(),
             acceleration: pair(),
             phase_error: pair(),
@@ -355,12 +354,11 @@ impl StarData {
             turned_back: self.turned_back.clone(),
             projected: pair(&self.projected),
             modelled: pair(&self.modelled),
-            carried: None,
+            carried: self.carried.as_ref().map(pair),
             light: Light {
                 beside_px: pair(&self.light.beside_px),
                 variance_px2: pair(&self.light.variance_px2),
             },
-            landed: pair(&self.landed),
             velocity: pair(&self.velocity),
             acceleration: pair(&self.acceleration),
             phase_error: pair(&self.phase_error),
@@ -371,7 +369,8 @@ impl StarData {
 
     /// Where the light falls, as far as is known, px.
     pub(crate) fn landed(&self) -> [&[f64]; 2] {
-        self.landed.each_ref().map(Vec::as_slice)
+        let landed = self.carried.as_ref().unwrap_or(&self.modelled);
+        landed.each_ref().map(Vec::as_slice)
     }
 
     /// Some rows, as candidates see them; the waves that these share are kept in `waves`.
@@ -402,21 +401,45 @@ impl StarData {
         }
     }
 
-    pub(crate) fn update_phase(&mut self, phase: &CentroidError) {
-        let from = self.carried.as_ref().unwrap_or(&self.modelled);
-        self.landed = std::array::from_fn(|axis| {
-            let beside = &self.light.beside_px[axis];
-            from[axis].iter().zip(beside).map(|(p, b)| p + b).collect()
-        });
+    /// Evaluates what the declared model does to centroids where the light falls.
+    pub(crate) fn update_phase(&mut self, phase: &OnCentroids) {
+        let [x, y] = self.carried.as_ref().unwrap_or(&self.modelled);
+        let at = Points { x, y };
         let [x, y] = &mut self.phase_error;
-        let at = Points {
-            x: &self.landed[0],
-            y: &self.landed[1],
-        };
         let variance = self.light.variance_px2.each_ref().map(Vec::as_slice);
         phase
+            .error
             .scaled(self.camera.arcsec_per_px().map(|s| 1.0 / s))
             .mean_error_into(at, variance, self.camera.pixel_centre(), PointsMut { x, y });
+        if phase.has_effects() {
+            for row in 0..self.t_s.len() {
+                let [x, y] = self.landed().map(|p| p[row]);
+                let star = StarView {
+                    at: Pixel { x, y },
+                    ..self.view(row)
+                };
+                let variance = self.light.variance_px2.each_ref().map(|v| v[row]);
+                let shift = phase.effects_px(&star, variance);
+                for axis in 0..2 {
+                    self.phase_error[axis][row] += shift[axis];
+                }
+            }
+        }
+    }
+
+    /// A row as effects with values see it, at its modelled position.
+    pub(crate) fn view(&self, row: usize) -> StarView {
+        StarView {
+            t_s: self.t_s[row],
+            slot: self.frames.slot[row],
+            star_id: self.frames.star_id[row],
+            mag: self.mag[row],
+            bv: self.bv[row],
+            at: Pixel {
+                x: self.modelled[0][row],
+                y: self.modelled[1][row],
+            },
+        }
     }
 
     /// The residual of the measured centroids, arcsec.

@@ -2,7 +2,7 @@
 //!
 //! Not physics: helpers of tests.
 
-use centroid::CentroidError;
+use crate::declared::OnCentroids;
 use focal_plane::{AttitudeSeries, Camera, Pixel, StarFrames};
 
 use crate::star::data::{Inputs, Star, StarData};
@@ -39,7 +39,7 @@ pub(crate) fn seen(
         frames,
         reference,
         catalogue: Some(&find),
-        phase: &CentroidError::None,
+        phase: &OnCentroids::default(),
         effects: &[],
     })
 }

@@ -9,12 +9,12 @@
 use std::sync::Arc;
 
 use block_regression::Folds;
-use centroid::CentroidError;
 use effects::{Candidate, Effect};
 use focal_plane::{ARCSEC_PER_RAD, AttitudeSource};
 use nalgebra::{DVector, UnitQuaternion, Vector3};
 use rayon::prelude::*;
 
+use crate::declared::OnCentroids;
 use crate::error::CloseError;
 use crate::evidence::{Amplitudes, Residuals};
 use crate::search::Found;
@@ -162,7 +162,7 @@ impl StarData {
         &mut self,
         inside: &Residuals,
         residual: &mut Residuals,
-        phase: &CentroidError,
+        phase: &OnCentroids,
     ) -> f64 {
         let scale = self.camera.arcsec_per_px();
         let known = self.phase_error.clone();
@@ -182,7 +182,7 @@ impl StarData {
         squares
     }
 
-    /// Where this takes each row from its projection, px.
+    /// Where this takes each row from its projection, and what the stars tell of their frame's rotation, px.
     fn shifted(&self, shift_arcsec: &[Vec<f64>]) -> [Vec<f64>; 2] {
         let scale = self.camera.arcsec_per_px();
         let of_frame = |k: usize| {
@@ -190,7 +190,8 @@ impl StarData {
                 let turned = self.turned_arcsec(row, k);
                 let at = |axis: usize| {
                     let shift = shift_arcsec[axis][row] - turned[axis];
-                    self.projected[axis][row] + shift / scale[axis]
+                    let beside = self.light.beside_px[axis][row];
+                    self.projected[axis][row] + shift / scale[axis] + beside
                 };
                 (at(0), at(1))
             })
@@ -226,17 +227,16 @@ impl StarData {
     pub(crate) fn land(
         &mut self,
         shifts: &Shifts,
-        phase: &CentroidError,
+        phase: &OnCentroids,
         effects: &[Arc<dyn Effect>],
     ) {
         if self.free_attitude {
             self.turn_frames(&shifts.whole, effects);
         }
-        let (modelled, carried) = (self.shifted(&shifts.fitted), self.shifted(&shifts.light));
-        self.modelled = modelled;
-        self.carried = Some(carried);
         let left = self.left(&shifts.whole);
         self.light = light::of(self, left.each_ref().map(Vec::as_slice));
+        self.modelled = self.shifted(&shifts.fitted);
+        self.carried = Some(self.shifted(&shifts.light));
         self.update_phase(phase);
     }
 }

@@ -107,9 +107,9 @@ impl AttitudeSource for Turned<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::declared::OnCentroids;
     use crate::motion;
     use crate::star::data::{Inputs, Star};
-    use centroid::CentroidError;
     use effects::{ParameterValue, Parameters, Surroundings};
     use focal_plane::{AttitudeSeries, Camera, StarFrames};
     use std::collections::BTreeMap;
@@ -170,7 +170,7 @@ mod tests {
                 frames: &frames,
                 reference: Some(reference),
                 catalogue: Some(&star),
-                phase: &CentroidError::None,
+                phase: &OnCentroids::default(),
                 effects: &effects,
             })
         };

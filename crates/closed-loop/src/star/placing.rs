@@ -98,7 +98,7 @@ impl StarData {
         AttitudeSeries::new(self.frames.t_s.clone(), self.attitude.clone(), None).ok()
     }
 
-    /// Adds what the declared effects do to the projected positions. Rows whose
+    /// Adds what the declared effects do to the projected positions, before the centroid. Rows whose
     /// exposure leaves the known motion are set aside.
     fn disturb(&mut self, motion: Option<&dyn AttitudeSource>, effects: &[Arc<dyn Effect>]) {
         let Some(motion) = motion.filter(|_| !effects.is_empty()) else {
@@ -117,7 +117,7 @@ impl StarData {
         };
         let (x, y, z) = (component(0), component(1), component(2));
         let [px, py] = &mut self.projected;
-        tracker.positions_into(
+        tracker.ideal_into(
             motion,
             Rows {
                 t_s: &self.frames.t_s,

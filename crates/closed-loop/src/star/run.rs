@@ -53,7 +53,7 @@ pub(crate) fn run(
         .as_ref()
         .ok_or(CloseError::NothingToCompare("no stars"))?;
     progress("joining stars, reference and catalogue");
-    let phase = declared::centroid_error(situation.model);
+    let phase = declared::OnCentroids::of(situation)?;
     let find = |id: i64| -> Option<Star> { situation.star(id) };
     let mut data = StarData::prepare(&Inputs {
         camera: &situation.camera,
@@ -98,7 +98,7 @@ pub(crate) fn run(
 fn trace(
     data: &mut StarData,
     situation: &Situation<'_>,
-    phase: &centroid::CentroidError,
+    phase: &declared::OnCentroids,
     folds: &Folds,
     progress: &dyn Fn(&str),
 ) -> Result<Closed, CloseError> {

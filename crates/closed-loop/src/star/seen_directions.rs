@@ -75,8 +75,8 @@ impl StarData {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::declared::OnCentroids;
     use crate::star::data::Inputs;
-    use centroid::CentroidError;
     use focal_plane::{AttitudeSeries, Camera, StarFrames, rotation_from_vector};
 
     /// Stars that join and leave over 11 degrees of turns: what a change of the misalignment by 7 arcsec does to
@@ -109,7 +109,7 @@ mod tests {
             frames: &frames,
             reference: Some(&reference),
             catalogue: None,
-            phase: &CentroidError::None,
+            phase: &OnCentroids::default(),
             effects: &[],
         });
         let (theta, more) = (

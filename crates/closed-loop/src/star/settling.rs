@@ -38,7 +38,7 @@ pub(crate) struct Settled {
 pub(crate) fn settle(
     data: &mut StarData,
     situation: &Situation<'_>,
-    phase: &centroid::CentroidError,
+    phase: &declared::OnCentroids,
     folds: &Folds,
 ) -> Result<Settled, CloseError> {
     let (mut round, mut turns) = (0, 0);

@@ -125,9 +125,9 @@ fn usual<'a>(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::declared::OnCentroids;
     use crate::star::changes;
     use crate::star::data::Inputs;
-    use centroid::CentroidError;
     use focal_plane::{Camera, StarFrames};
     use rand_core::SeedableRng;
     use rand_distr::{Distribution, StandardNormal};
@@ -167,7 +167,7 @@ mod tests {
             frames: &frames,
             reference: None,
             catalogue: None,
-            phase: &CentroidError::None,
+            phase: &OnCentroids::default(),
             effects: &[],
         });
         // positions against where the first frame has them: the attitude solved frame by frame would

@@ -15,7 +15,7 @@ use spectra::robust::median_step;
 use telemetry::Model;
 
 use super::{Flown, information};
-use crate::declared;
+use crate::declared::OnCentroids;
 use crate::star::data::{Inputs, Star, StarData};
 use crate::star::evidence::StarEvidence;
 use crate::star::nuisance::StarNuisance;
@@ -106,7 +106,7 @@ impl<'a> Sky<'a> {
             frames: &frames,
             reference: Some(&series),
             catalogue: Some(&find),
-            phase: &declared::centroid_error(self.model),
+            phase: &OnCentroids::from(self.model),
             effects: &[],
         });
         [data.free_attitude, data.free_directions] = self.free;

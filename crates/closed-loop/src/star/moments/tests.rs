@@ -1,6 +1,6 @@
 //! The one pass against dense algebra on every row.
 
-use centroid::CentroidError;
+use crate::declared::OnCentroids;
 use coloured_noise::Coloured;
 use effects::{AttitudeRows, Candidate, Coefficient, Effect, EffectError, StarRows, Surroundings};
 use focal_plane::{ARCSEC_PER_RAD, Camera, Pixel, PointsMut, StarFrames, VectorsMut};
@@ -101,7 +101,7 @@ fn data(single: bool, number: usize) -> StarData {
         frames: &frames,
         reference: None,
         catalogue: None,
-        phase: &CentroidError::None,
+        phase: &OnCentroids::default(),
         effects: &[],
     });
     data.free_attitude = false;
