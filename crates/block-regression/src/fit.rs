@@ -11,7 +11,8 @@
 //! G is the sum over the training blocks. A held-out block b is judged with the
 //! nuisance *and* the amplitudes of the others: its squared error is the
 //! quadratic form of `[-beta, 1]` in `T^T G_b T`. Nuisance that lives in the fold alone (the direction of
-//! a star that is seen at no other time) is the fold's own: the others know nothing of it. The likelihood
+//! a star that is seen at no other time) is the fold's own: the others know nothing of it, nor of how what they
+//! know in [`pieces`] fits together. The likelihood
 //! takes account of how well all these are known,
 //!
 //! ```text
@@ -60,6 +61,7 @@
 //! observation); Liang & Zeger 1986 (cluster-robust variance); Smyth 2004 (moderated variance);
 //! Box 1954 and Greenhouse & Geisser 1959 (F of unequal variances).
 
+use std::ops::Range;
 use std::sync::OnceLock;
 
 use nalgebra::{DMatrix, DVector};
@@ -73,6 +75,7 @@ mod elimination;
 mod estimate;
 mod moderation;
 mod out_of_fold;
+mod pieces;
 #[cfg(test)]
 mod tests;
 
@@ -94,6 +97,9 @@ const UNSEEN: f64 = 1e-9;
 pub struct Layout {
     /// Prior precision of the nuisance columns' amplitudes, the inverse of their covariance; zero leaves them free.
     pub nuisance_precision: DMatrix<f64>,
+    /// Nuisance columns that are told by one another alone, as directions of stars are in frames with attitudes of their
+    /// own.
+    pub relative: Range<usize>,
     /// How many candidate columns follow the nuisance.
     pub candidates: usize,
     /// Residual columns: one, or one per fold and a last one for all data, where
@@ -225,7 +231,10 @@ impl Fits {
             let mut fold = Eliminated::new(&train, layout, variance, &pick)?;
             let (own, scalars) = &sums.fold[f];
             let unseen = |&k: &usize| train.0[(k, k)] < UNSEEN * own[(k, k)];
-            let alone: Vec<usize> = (0..n).filter(unseen).collect();
+            let mut alone = pieces::apart(&train.0, own, layout.relative.clone());
+            alone.extend((0..n).filter(unseen));
+            alone.sort_unstable();
+            alone.dedup();
             if !alone.is_empty() {
                 fold.learn(&alone, own, &pick)?;
             }

@@ -53,6 +53,7 @@
 //! }));
 //! let layout = Layout {
 //!     nuisance_precision: DMatrix::zeros(1, 1),
+//!     relative: 0..0,
 //!     candidates: 2,
 //!     residuals: 1,
 //! };

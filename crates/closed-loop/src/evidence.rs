@@ -6,6 +6,8 @@
 //!
 //! Not physics: an interface.
 
+use std::ops::Range;
+
 use block_regression::{BlockGrams, Folds};
 use effects::Candidate;
 use nalgebra::{DMatrix, DVector};
@@ -32,6 +34,10 @@ pub(crate) struct Residuals {
 pub(crate) trait Evidence: Sync {
     /// Prior precision of the nuisance columns, 1/arcsec^2 (or free: 0).
     fn precision(&self) -> DMatrix<f64>;
+    /// Nuisance columns that are told by one another alone (see [`block_regression::Layout`]).
+    fn relative(&self) -> Range<usize> {
+        0..0
+    }
     /// Residual columns (see [`block_regression::Layout`]).
     fn residual_columns(&self) -> usize;
     /// First guess of the noise variance of a scalar of the design.

@@ -155,6 +155,7 @@ pub(crate) fn fit_grams(
 ) -> Result<Fitted, CloseError> {
     let layout = Layout {
         nuisance_precision: evidence.precision(),
+        relative: evidence.relative(),
         candidates: candidates.iter().map(|c| c.coefficients().len()).sum(),
         residuals: evidence.residual_columns(),
     };

@@ -47,6 +47,7 @@ fn fits(table: &Table, precision: Matrix2<f64>) -> (Fits, Folds) {
     let grams = BlockGrams::accumulate(table, &folds);
     let layout = Layout {
         nuisance_precision: DMatrix::from_fn(2, 2, |i, j| precision[(i, j)]),
+        relative: 0..0,
         candidates: 3,
         residuals: 1,
     };
@@ -351,6 +352,7 @@ fn products_of_few_columns_are_those_of_all() {
     let whole = BlockGrams::accumulate(&table, &folds);
     let layout = Layout {
         nuisance_precision: DMatrix::from_diagonal(&DVector::from_vec(vec![0.0, 25.0])),
+        relative: 0..0,
         candidates: 3,
         residuals: 1,
     };
@@ -457,6 +459,7 @@ fn windowed(rho: f64, size: f64, seed: u64) -> (Fits, Folds) {
     let grams = BlockGrams::accumulate(&table, &folds);
     let layout = Layout {
         nuisance_precision: DMatrix::zeros(1, 1),
+        relative: 0..0,
         candidates,
         residuals: 1,
     };

@@ -326,6 +326,7 @@ pub(crate) fn information(
 ) -> Option<DMatrix<f64>> {
     let layout = Layout {
         nuisance_precision: evidence.precision(),
+        relative: evidence.relative(),
         candidates: candidates.iter().map(|c| c.coefficients().len()).sum(),
         residuals: evidence.residual_columns(),
     };

@@ -540,6 +540,7 @@ mod tests {
         let rows: usize = rows.map(|(_, block)| block.len()).sum();
         let layout = Layout {
             nuisance_precision: DMatrix::zeros(0, 0),
+            relative: 0..0,
             candidates: 2,
             residuals: 1,
         };
@@ -603,6 +604,7 @@ mod tests {
         let folds = Folds::cut(1000);
         let layout = Layout {
             nuisance_precision: DMatrix::zeros(0, 0),
+            relative: 0..0,
             candidates: 10,
             residuals: 1,
         };
@@ -666,6 +668,7 @@ mod tests {
         let folds = Folds::cut(2000);
         let layout = Layout {
             nuisance_precision: DMatrix::zeros(0, 0),
+            relative: 0..0,
             candidates: 3,
             residuals: 1,
         };

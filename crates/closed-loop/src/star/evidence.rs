@@ -235,6 +235,14 @@ impl Evidence for StarEvidence<'_> {
         own.resize(all, all, 0.0)
     }
 
+    fn relative(&self) -> Range<usize> {
+        if self.data.free_attitude {
+            self.nuisance.directions()
+        } else {
+            0..0
+        }
+    }
+
     fn residual_columns(&self) -> usize {
         self.residuals.len()
     }

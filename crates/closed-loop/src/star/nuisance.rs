@@ -151,6 +151,13 @@ impl StarNuisance {
         )
     }
 
+    /// Columns of unknown directions.
+    pub(crate) fn directions(&self) -> Range<usize> {
+        let (misalignment, polynomials, _) = self.parts();
+        let first = misalignment + 2 * polynomials;
+        first..first + 2 * self.directions
+    }
+
     /// The misalignment among the amplitudes of the columns, arcsec.
     pub(crate) fn misalignment_of(&self, amplitudes: &DVector<f64>) -> Option<Vector3<f64>> {
         self.misalignment?;

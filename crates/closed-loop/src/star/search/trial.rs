@@ -75,6 +75,8 @@ impl Trial<'_> {
     fn layout(&self, columns: &[usize]) -> Layout {
         Layout {
             nuisance_precision: self.precision.clone(),
+            // the attitudes are the reference's
+            relative: 0..0,
             candidates: columns.len() - self.precision.nrows() - 1,
             residuals: 1,
         }
