@@ -53,12 +53,21 @@ impl StarData {
             *q = turn * back * *q;
         }
         self.take_directions();
+        self.place_beside(reference, effects);
+        true
+    }
+
+    /// Places the stars by a reference that the camera is turned against.
+    pub(super) fn place_beside(
+        &mut self,
+        reference: &dyn AttitudeSource,
+        effects: &[Arc<dyn Effect>],
+    ) {
         let turned = Turned {
             source: reference,
-            turn,
+            turn: self.turn(),
         };
         self.place(Some(&turned), effects);
-        true
     }
 
     /// The misalignment that the projection goes through.

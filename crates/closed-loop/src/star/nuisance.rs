@@ -216,8 +216,8 @@ impl StarNuisance {
     }
 }
 
-/// Two unit vectors across `u`; any pair serves, the amplitudes are never read.
-fn tangent_axes(u: &Vector3<f64>) -> [Vector3<f64>; 2] {
+/// Two unit vectors across `u`, along which a direction is moved; any pair serves.
+pub(super) fn tangent_axes(u: &Vector3<f64>) -> [Vector3<f64>; 2] {
     let seed = if u.z.abs() < 0.9 {
         Vector3::z()
     } else {

@@ -2,7 +2,8 @@
 //!
 //! What it leaves unknown is fitted, modelled positions move with it, and so does the declared
 //! centroid error there; what stands out of that residual is an outlier. A few rounds settle it. Before
-//! anything stands out, stars are projected through the misalignment that was found.
+//! anything stands out, stars are projected through the misalignment that was found, and directions that nothing
+//! else tells are taken where the fit has them.
 //!
 //! Not physics: fits until positions and outliers stand still.
 
@@ -46,13 +47,15 @@ pub(crate) fn settle(
     let mut last = f64::INFINITY;
     let effects = declared::effects(situation)?;
     loop {
-        let (mut before, inside, loglik, variance, misalignment) = {
+        let (mut before, inside, loglik, variance, misalignment, directions) = {
             let evidence = StarEvidence::new(data, situation, vec![data.measured_residual()], None);
             let fitted = fit(&evidence, folds, &[])?;
             let amplitudes = amplitudes(&fitted, folds, &[], 0).ok_or(CloseError::Singular)?;
             let none = DVector::zeros(0);
             let whole = fitted.fits.nuisance(None, &[], &none);
             let misalignment = evidence.nuisance.misalignment_of(&whole);
+            let unknown = evidence.nuisance.directions();
+            let directions = (!unknown.is_empty()).then(|| whole.rows_range(unknown).into_owned());
             let inside = Amplitudes {
                 nuisance: vec![whole; folds.count],
                 candidates: vec![none; folds.count],
@@ -61,7 +64,7 @@ pub(crate) fn settle(
             let variance = fitted.fits.variance(&[]).unwrap_or(0.0);
             // where other folds have no stars they know little of the distortion, and so of where the light fell
             let [before, inside] = evidence.residuals_of(folds, &[], [&amplitudes, &inside]);
-            (before, inside, loglik, variance, misalignment)
+            (before, inside, loglik, variance, misalignment, directions)
         };
         if let Some((theta, reference)) = misalignment.zip(situation.reference.as_ref())
             && turns < TURNS
@@ -69,6 +72,17 @@ pub(crate) fn settle(
         {
             // beside the misalignment the distortion is what it was
             data.move_modelled(&inside, &mut before, phase);
+            turns += 1;
+            continue;
+        }
+        if let Some(directions) = directions
+            && turns < TURNS
+            && data.move_directions(
+                directions.as_slice(),
+                situation.reference.as_ref(),
+                &effects,
+            )
+        {
             turns += 1;
             continue;
         }
