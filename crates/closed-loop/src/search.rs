@@ -198,7 +198,6 @@ fn grouped(fits: &Fits, candidates: &[&dyn Candidate]) -> Vec<Group> {
             },
             kind: candidate.id(),
             stands_for: candidate.stands_for(),
-            rarity: candidate.rarity(),
         });
         column += p;
     }

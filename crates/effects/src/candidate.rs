@@ -208,10 +208,6 @@ pub trait Candidate: Debug + Send + Sync {
     fn stands_for(&self) -> f64 {
         1.0
     }
-    /// How many times less often than other causes nature makes this one: so many times its chance of a mistake counts.
-    fn rarity(&self) -> f64 {
-        1.0
-    }
     /// The same candidate with other values of [`nonlinear`](Self::nonlinear), in its order; `None`
     /// when a value is out of range or there is nothing to change.
     fn with_nonlinear(&self, values: &[f64]) -> Option<Box<dyn Candidate>> {

@@ -18,9 +18,7 @@ use core::f64::consts::TAU;
 use std::sync::Arc;
 
 use block_regression::Folds;
-use effects::{
-    Candidate, SHORTEST_ORBIT_S, Surroundings, free_orbit, nearest_circle, orbit_could_show,
-};
+use effects::{Candidate, Surroundings, free_orbit, nearest_circle, orbit_could_show};
 use focal_plane::{ARCSEC_PER_RAD, AttitudeSource, SPEED_OF_LIGHT_M_S};
 use nalgebra::{Matrix6, SMatrix, SVector, Vector3, Vector6};
 use telemetry::report::ConsideredEffect;
@@ -35,6 +33,8 @@ use crate::unexplained::leftover::Track;
 const ABERRATION: &str = "velocity_aberration";
 /// Cycles in the span of the periods that are tried: nearly constant, and by quarters to where there are lines.
 const CYCLES: [f64; 8] = [0.05, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 1.75];
+/// Beside the surface of solid osmium an orbit takes sqrt(3 pi / G rho) = 42 minutes, s: a faster line is none.
+const SHORTEST_S: f64 = 2500.0;
 /// What is shorter than two cycles may be told from nothing else: the bound for that, s.
 const SHORTEST_TURN_S: f64 = 300.0;
 /// Fits about the circle.
@@ -217,7 +217,7 @@ pub(crate) fn propose(
     let span_s = surroundings.span_s;
     let lines = turn.iter().flat_map(|c| c.nonlinear());
     let lines = lines.filter(|n| n.unit == "Hz").map(|n| n.value.recip());
-    let lines = lines.filter(|p| *p > SHORTEST_ORBIT_S);
+    let lines = lines.filter(|p| *p > SHORTEST_S);
     let periods: Vec<f64> = usual_periods(surroundings).chain(lines).collect();
     let free: Vec<Box<dyn Candidate>> = periods.iter().map(|&p| free_orbit(p, span_s)).collect();
     let mut all: Vec<&dyn Candidate> = free.iter().map(AsRef::as_ref).collect();

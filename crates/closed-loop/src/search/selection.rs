@@ -74,8 +74,6 @@ pub(crate) struct Group {
     pub(crate) kind: &'static str,
     /// How many of its kind were looked at for each that is tried.
     pub(crate) stands_for: f64,
-    /// What its own chance counts beside that.
-    pub(crate) rarity: f64,
 }
 
 /// One group's standing beside the chosen ones.
@@ -147,8 +145,7 @@ pub(crate) fn costs(groups: &[Group], may: &[bool]) -> Vec<f64> {
     }
     let all: f64 = of_kind.values().map(|n| n.sqrt()).sum();
     let root = |g: &Group| of_kind.get(g.kind).map_or(1.0, |n| n.sqrt());
-    let cost = |g: &Group| root(g) * all.max(1.0) * g.rarity;
-    groups.iter().map(cost).collect()
+    groups.iter().map(|g| root(g) * all.max(1.0)).collect()
 }
 
 /// What a group pays for its sizes and choices, nats.
@@ -467,7 +464,6 @@ mod tests {
             family: kind.to_owned(),
             kind,
             stands_for: 1.0,
-            rarity: 1.0,
         }
     }
 
@@ -492,10 +488,6 @@ mod tests {
         let picked = costs(&groups, &may);
         let each = 20.0 * (1.0 + 20.0 + 14.0_f64.sqrt());
         assert!((picked[3] - each).abs() < 1e-9 && (picked[4] - each).abs() < 1e-9);
-        // and one that nature hardly makes pays for that alone
-        groups[4].rarity = 10.0;
-        let rare = costs(&groups, &may);
-        assert!((rare[3] - each).abs() < 1e-9 && (rare[4] - 10.0 * each).abs() < 1e-9);
     }
 
     /// Two columns that act in the same eight of fifty blocks, of which one changes its sign from block to block.

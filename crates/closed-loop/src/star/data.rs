@@ -37,6 +37,8 @@ use crate::star::directions;
 /// A star that moves by less of the detector's width than this is where it was, to
 /// a declared distortion of the usual order.
 const NEAR_SHARE: f64 = 1.0 / 16.0;
+/// A star that moves by fewer times what its reference puts it off by is at rest.
+const RESTS: f64 = 100.0;
 /// Frames with a smaller share of stars that stayed are unrelated.
 const SAME_SHARE: f64 = 0.1;
 
@@ -59,6 +61,13 @@ pub(crate) struct Light {
 }
 
 impl Light {
+    fn beside(&self, from: &[Vec<f64>; 2]) -> [Vec<f64>; 2] {
+        std::array::from_fn(|axis| {
+            let beside = self.beside_px[axis].iter();
+            from[axis].iter().zip(beside).map(|(p, b)| p + b).collect()
+        })
+    }
+
     /// Where the reference has it.
     pub(crate) fn as_modelled(rows: usize) -> Self {
         let zeros = || [vec![0.0; rows], vec![0.0; rows]];
@@ -105,6 +114,8 @@ pub(crate) struct StarData {
     pub(super) carried: Option<[Vec<f64>; 2]>,
     /// How far the reference puts them off, [`crate::star::light`].
     pub(super) light: Light,
+    /// Where the light falls, as far as is known, px.
+    landed: [Vec<f64>; 2],
     /// Velocity and acceleration of the image, px/s and px/s^2; zero where the
     /// motion is not known.
     pub(crate) velocity: [Vec<f64>; 2],
@@ -315,6 +326,7 @@ impl StarData {
             modelled: pair(),
             carried: None,
             light: Light::as_modelled(n),
+            landed: pair(),
             velocity: pair(),
             acceleration: pair(),
             phase_error: pair(),
@@ -359,6 +371,7 @@ impl StarData {
                 beside_px: pair(&self.light.beside_px),
                 variance_px2: pair(&self.light.variance_px2),
             },
+            landed: pair(&self.landed),
             velocity: pair(&self.velocity),
             acceleration: pair(&self.acceleration),
             phase_error: pair(&self.phase_error),
@@ -367,10 +380,31 @@ impl StarData {
         }
     }
 
+    /// Whether stars hardly move but for what the reference puts them off by: then columns that cancel each other in
+    /// what is the same all the time leave that.
+    fn rests(&self) -> bool {
+        let off = self.light.beside_px.iter().flatten();
+        let off: f64 = off.map(|b| b * b).sum();
+        if off == 0.0 {
+            return false;
+        }
+        let mut sums = vec![[0.0; 5]; self.stars.len()];
+        for (row, &star) in self.star.iter().enumerate() {
+            let [x, y] = [0, 1].map(|a| self.modelled[a][row]);
+            for (sum, value) in sums[star].iter_mut().zip([1.0, x, y, x * x, y * y]) {
+                *sum += value;
+            }
+        }
+        let moved = sums.iter().filter(|s| s[0] > 0.0);
+        let moved: f64 = moved
+            .map(|[n, x, y, xx, yy]| xx + yy - (x * x + y * y) / n)
+            .sum();
+        moved < RESTS * RESTS * off
+    }
+
     /// Where the light falls, as far as is known, px.
     pub(crate) fn landed(&self) -> [&[f64]; 2] {
-        let landed = self.carried.as_ref().unwrap_or(&self.modelled);
-        landed.each_ref().map(Vec::as_slice)
+        self.landed.each_ref().map(Vec::as_slice)
     }
 
     /// Some rows, as candidates see them; the waves that these share are kept in `waves`.
@@ -403,8 +437,15 @@ impl StarData {
 
     /// Evaluates what the declared model does to centroids where the light falls.
     pub(crate) fn update_phase(&mut self, phase: &OnCentroids) {
-        let [x, y] = self.carried.as_ref().unwrap_or(&self.modelled);
-        let at = Points { x, y };
+        let from = self.carried.as_ref().unwrap_or(&self.modelled);
+        self.landed = self.light.beside(from);
+        if self.rests() {
+            self.modelled = self.light.beside(&self.modelled);
+        }
+        let at = Points {
+            x: &self.landed[0],
+            y: &self.landed[1],
+        };
         let [x, y] = &mut self.phase_error;
         let variance = self.light.variance_px2.each_ref().map(Vec::as_slice);
         phase

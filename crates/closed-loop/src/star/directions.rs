@@ -33,8 +33,9 @@ use crate::star::nuisance::tangent_axes;
 /// share of its frames among all.
 const ALTERNATIONS: usize = 12;
 
-/// Directions that are right to this, rms, need not be moved, px.
-const RIGHT_PX: f64 = 0.02;
+/// Nats that the prior of a pixel about where directions are may cost. What noise moves them by where next to nothing
+/// tells them, a rotation but for its second order, costs half of one.
+const PRIOR_NATS: f64 = 2.0;
 
 /// Attitude of each frame and direction of each star.
 #[derive(Clone, Debug)]
@@ -140,8 +141,8 @@ impl StarData {
         effects: &[Arc<dyn Effect>],
     ) -> bool {
         let squares: f64 = by_arcsec.iter().map(|a| a * a).sum();
-        let rms = (squares / by_arcsec.len().max(1) as f64).sqrt();
-        if rms < RIGHT_PX * self.camera.arcsec_per_px()[0] {
+        let px = self.camera.arcsec_per_px()[0];
+        if 0.5 * squares < PRIOR_NATS * px * px {
             return false;
         }
         for (star, by) in self.stars.iter_mut().zip(by_arcsec.chunks_exact(2)) {

@@ -182,7 +182,7 @@ impl StarData {
         squares
     }
 
-    /// Where this takes each row from its projection, and what the stars tell of their frame's rotation, px.
+    /// Where this takes each row from its projection, px.
     fn shifted(&self, shift_arcsec: &[Vec<f64>]) -> [Vec<f64>; 2] {
         let scale = self.camera.arcsec_per_px();
         let of_frame = |k: usize| {
@@ -190,8 +190,7 @@ impl StarData {
                 let turned = self.turned_arcsec(row, k);
                 let at = |axis: usize| {
                     let shift = shift_arcsec[axis][row] - turned[axis];
-                    let beside = self.light.beside_px[axis][row];
-                    self.projected[axis][row] + shift / scale[axis] + beside
+                    self.projected[axis][row] + shift / scale[axis]
                 };
                 (at(0), at(1))
             })
@@ -210,12 +209,13 @@ impl StarData {
     /// Whether `shift_arcsec`, with the effects that were found, takes the light off from where it was
     /// taken to fall by enough for its pixel phase to be another one.
     pub(crate) fn lands_elsewhere(&self, shift_arcsec: &[Vec<f64>]) -> bool {
-        let known = self.carried.as_ref().unwrap_or(&self.modelled);
         let at = self.shifted(shift_arcsec);
+        let known = self.landed();
         let (mut squares, mut count) = (0.0, 0.0);
         for row in (0..self.t_s.len()).filter(|&r| !self.outlier[r]) {
             for axis in 0..2 {
-                squares += (at[axis][row] - known[axis][row]).powi(2);
+                let at = at[axis][row] + self.light.beside_px[axis][row];
+                squares += (at - known[axis][row]).powi(2);
             }
             count += 2.0;
         }

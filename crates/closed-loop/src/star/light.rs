@@ -43,7 +43,7 @@ use crate::star::changes;
 use crate::star::data::{Light, StarData};
 use crate::star::frame_rotation::{Turns, rotation_row};
 use crate::star::weights;
-use lasting::Lasting;
+use lasting::{Lasting, shows};
 
 mod lasting;
 
@@ -72,26 +72,29 @@ pub(crate) fn of(data: &StarData, residual: [&[f64]; 2]) -> Light {
     if !data.free_attitude && turns.reference[..2].iter().all(|s| *s < known * known) {
         return light;
     }
-    // information of the reference, none where there is none
-    let mut reference = turns.reference.map(|s| {
-        if data.free_attitude {
-            0.0
-        } else {
-            s.max(1e-3 * known * known).recip()
-        }
+    let t_s = &data.frames.t_s;
+    // what chance makes of the stars' noise would put that noise into their positions
+    let errs: [bool; 3] = std::array::from_fn(|axis| shows(&turns, axis, 1));
+    let lasting: [Option<Lasting>; 3] = std::array::from_fn(|axis| {
+        let told = (!data.free_attitude).then(|| Lasting::of(&turns, t_s, axis));
+        told.flatten()
     });
-    let changed = changes.each_ref().map(Vec::as_slice);
-    let lasting = if data.free_attitude {
-        [None; 3]
-    } else {
-        Lasting::of(&turns, &Turns::of(data, changed, &weight), &data.frames.t_s)
-    };
+    if !data.free_attitude && errs == [false; 3] && lasting.iter().all(Option::is_none) {
+        return light;
+    }
+    // information of the reference, none where there is none
+    let exact = (1e-3 * known * known).recip();
+    let mut reference: [f64; 3] = std::array::from_fn(|axis| match turns.reference[axis] {
+        _ if data.free_attitude => 0.0,
+        s if errs[axis] => s.recip().min(exact),
+        _ => exact,
+    });
     let mut around = around(data, &turns, reference);
     for (axis, lasting) in lasting.iter().enumerate() {
         if let Some(lasting) = lasting {
             // no prior of each frame anew
             reference[axis] = 0.0;
-            let told = lasting.around(axis, &turns, &data.frames.t_s);
+            let told = lasting.around(axis, &turns, t_s);
             around
                 .iter_mut()
                 .zip(told)

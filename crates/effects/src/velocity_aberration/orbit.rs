@@ -35,11 +35,6 @@ use crate::{AttitudeRows, Candidate, Coefficient, Effect, EffectError, StarRows,
 const YEAR_S: f64 = 365.256_363 * 86_400.0;
 /// Speed that would not surprise, m/s.
 const PLAUSIBLE_M_S: f64 = 3000.0;
-/// Beside the surface of solid osmium an orbit takes sqrt(3 pi / G rho) = 42 minutes, s: a faster one is none.
-pub const SHORTEST_ORBIT_S: f64 = 2500.0;
-/// What a faster one pays beside others. It is no orbit of a planet, but what somebody made may turn so: a slow wander
-/// that comes back within the data is explained by its five unknowns as well as by noise, and is not one.
-const RARE: f64 = 1000.0;
 /// Largest turn, and share of the frequency, by which columns are taken elsewhere at once.
 const STEP: f64 = 0.5;
 /// Steps towards the nearest circle.
@@ -141,16 +136,12 @@ trait Velocities: Clone + core::fmt::Debug + Send + Sync {
     const COUNT: usize;
     /// `out`: one a coefficient.
     fn at(&self, t_s: f64, out: &mut [Vector3<f64>]);
-    fn period_s(&self) -> f64;
 }
 
 impl Velocities for Circle {
     const COUNT: usize = LINEAR;
     fn at(&self, t_s: f64, out: &mut [Vector3<f64>]) {
         out.copy_from_slice(&self.columns(t_s));
-    }
-    fn period_s(&self) -> f64 {
-        self.period_s
     }
 }
 
@@ -170,9 +161,6 @@ impl Velocities for Free {
             out[3 + k] = Vector3::ith(k, sin);
         }
     }
-    fn period_s(&self) -> f64 {
-        self.period_s
-    }
 }
 
 /// The same velocity all the time.
@@ -187,9 +175,6 @@ impl Velocities for Steady {
         for (k, v) in out.iter_mut().enumerate() {
             *v = Vector3::ith(k, 1.0);
         }
-    }
-    fn period_s(&self) -> f64 {
-        YEAR_S
     }
 }
 
@@ -296,7 +281,7 @@ impl Told for OrbitCandidate<Steady> {
         let phase = -TAU * self.velocities.middle_s / YEAR_S;
         Orbit {
             speed_m_s,
-            period_s: self.velocities.period_s(),
+            period_s: YEAR_S,
             phase_rad: phase - TAU * (phase / TAU).round(),
             node_deg: (-v.x).atan2(v.y).to_degrees().rem_euclid(360.0),
             inclination_deg: north.asin().to_degrees(),
@@ -319,12 +304,6 @@ where
     }
     fn stands_for(&self) -> f64 {
         self.picked_from as f64
-    }
-    fn rarity(&self) -> f64 {
-        match self.velocities.period_s() < SHORTEST_ORBIT_S {
-            true => RARE,
-            false => 1.0,
-        }
     }
     fn refined(&self, values: &[f64]) -> Option<Box<dyn Candidate>> {
         Told::refined(self, values)

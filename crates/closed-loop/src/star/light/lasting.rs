@@ -16,8 +16,12 @@ use coloured_noise::Coloured;
 
 use crate::star::frame_rotation::Turns;
 
-/// Share of its variance that changes with every frame below which an error lasts.
-const LASTS: f64 = 0.75;
+/// Nats by which an error that lasts is likelier than one that is new in every frame.
+const BEYOND_DOUBT: f64 = 4.0;
+/// Frames of which the mean shows what lasts.
+const TOGETHER: usize = 16;
+/// Sigmas of what chance makes of the stars' own noise.
+const BEYOND_CHANCE: f64 = 3.0;
 /// Frames by which an error is known well enough.
 const ENOUGH: usize = 4096;
 
@@ -32,24 +36,31 @@ pub(super) struct Lasting {
 }
 
 impl Lasting {
-    /// About each axis on which it lasts; `changes` have twice what is new in each frame.
-    pub(super) fn of(turns: &Turns, changes: &Turns, t_s: &[f64]) -> [Option<Self>; 3] {
-        std::array::from_fn(|axis| {
-            let (fresh, all) = (0.5 * changes.reference[axis], turns.reference[axis]);
-            if fresh >= LASTS * all {
-                return None;
-            }
-            let known = turns.frames.iter().take(ENOUGH);
-            let (y, count): (Vec<f64>, Vec<f64>) = known
-                .map(|turn| {
-                    let known = turn.as_ref();
-                    known.map_or((0.0, 0.0), |t| (t.theta[axis], t.variance[axis].recip()))
-                })
-                .unzip();
-            let slow = Coloured::fit_above(turns.noise.sqrt(), &t_s[..y.len()], &y, &count);
+    /// About an axis, where the rotations say beyond doubt that it lasts.
+    pub(super) fn of(turns: &Turns, t_s: &[f64], axis: usize) -> Option<Self> {
+        if !shows(turns, axis, TOGETHER) {
+            return None;
+        }
+        let known = turns.frames.iter().take(ENOUGH);
+        let (y, count): (Vec<f64>, Vec<f64>) = known
+            .map(|turn| {
+                let known = turn.as_ref();
+                known.map_or((0.0, 0.0), |t| (t.theta[axis], t.variance[axis].recip()))
+            })
+            .unzip();
+        let t_s = &t_s[..y.len()];
+        let slow = Coloured::fit_above(turns.noise.sqrt(), t_s, &y, &count);
+        let frame =
+            turns.noise + turns.reference[axis] * count.iter().sum::<f64>() / y.len() as f64;
+        let white = Coloured {
+            white: frame.sqrt(),
+            ..Coloured::WHITE
+        };
+        let likely = |law: &Coloured| law.log_likelihood(t_s, &y, &count);
+        (slow.slow > 0.0 && likely(&slow) > likely(&white) + BEYOND_DOUBT).then(|| {
             let frame = slow.white * slow.white;
             let own = (frame - turns.noise).max(0.0);
-            (slow.slow > 0.0).then_some(Self { slow, frame, own })
+            Self { slow, frame, own }
         })
     }
 
@@ -96,4 +107,24 @@ impl Lasting {
             })
             .collect()
     }
+}
+
+/// Whether means of `together` frames scatter about an axis by more than the stars' noise and chance.
+pub(super) fn shows(turns: &Turns, axis: usize, together: usize) -> bool {
+    let parts = turns.frames.chunks_exact(together);
+    let (mut beyond, mut count) = (0.0, 0.0);
+    for part in parts {
+        let known = part.iter().flatten();
+        let (sum, variance) = known.fold((0.0, 0.0), |(sum, variance), t| {
+            (
+                sum + t.theta[axis],
+                variance + t.variance[axis] * turns.noise,
+            )
+        });
+        if variance > 0.0 {
+            beyond += sum * sum / variance - 1.0;
+            count += 1.0;
+        }
+    }
+    beyond > BEYOND_CHANCE * f64::sqrt(2.0 * count)
 }
