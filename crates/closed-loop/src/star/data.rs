@@ -10,8 +10,8 @@
 //! ```
 //!
 //! All regressors are evaluated at the *modelled* position, projection +
-//! misalignment + distortion + what the stars tell of the reference's error, never at
-//! the measured one: regressing on measured positions explains noise by shrinking
+//! misalignment + distortion and, where stars rest, what they tell of the reference's
+//! error, never at the measured one: regressing on measured positions explains noise by shrinking
 //! everything, and the triangle evaluated at the raw projection raises false alarms.
 //! The modelled position is improved once the first fit has given misalignment and
 //! distortion ([`crate::star::landing`]).
