@@ -112,7 +112,13 @@ pub(crate) fn solve(camera: &Camera, frames: &StarFrames, star: &[usize], stars:
         }
     }
     let mut attitude = attitudes(camera, frames, star, &direction);
-    for _ in 0..ALTERNATIONS {
+    let solved = |attitude: &[Option<_>]| attitude.iter().flatten().count();
+    let (mut left, mut before) = (ALTERNATIONS, 0);
+    while left > 0 {
+        // a sky that passes by is reached field by field
+        let now = solved(&attitude);
+        left -= usize::from(now <= before);
+        before = now;
         let known = |k: usize| attitude[k];
         let sum = sums(frames, star, stars, known, |row| seen[row]);
         for (u, s) in direction.iter_mut().zip(&sum) {

@@ -2,7 +2,9 @@
 //!
 //! A pixel is 70 arcsec; the declared triangle has its 5.06 arcsec.
 
-use crate::kit::{Case, Path, named};
+use scenarios::simulate;
+
+use crate::kit::{Case, Path, closed, named};
 
 /// A reference of 8 arcsec puts every star off by 0.11 px, and a frame's own attitude, of six stars with
 /// three times the usual noise, by 0.1 px: of the triangle's first harmonic, 4.1 arcsec, that leaves a fifth.
@@ -95,4 +97,56 @@ fn two_orders_are_one_effect() {
             assert!(off < 4.0, "{seed}, {name}: {got:?}");
         }
     }
+}
+
+/// A declared wave of 3 arcsec under a declared distortion of 3.2 arcsec, 0.045 px, which takes its phase on by 0.28
+/// rad: 0.6 arcsec rms under 10 080 rows of 5.3 arcsec, a hundred times what they know, where it was taken at the
+/// projection.
+#[test]
+fn declared_waves_act_where_the_distortion_takes_the_light() {
+    let acts = "x1_amplitude_arcsec = 3.0\nx1_phase_rad = 0.7\ny1_amplitude_arcsec = 3.0";
+    for seed in 0..3 {
+        let case = Case::new(Path::Slews, 3500 + seed).with("pixel_phase_harmonics", acts);
+        let scenario = case.scenario();
+        let bundle = simulate(&scenario).expect("a bundle");
+        let report = closed(&scenario.model, &bundle)
+            .expect("the loop closes")
+            .report;
+        assert!(report.effects.is_empty(), "{seed}: {:?}", report.effects);
+        let left = &report.unattributed;
+        assert!(!left.present, "{seed}: {:?}", left.depends_on);
+    }
+}
+
+/// Four stars that move by a third of a pixel, a reference that puts them off by as much as a tenth, and three stars
+/// whose frames have attitudes of their own: columns that cancel each other in what is the same all the time leave
+/// what changes, which is noise.
+#[test]
+fn stars_at_rest_follow_nothing() {
+    for seed in 0..3 {
+        for (reference, stars) in [("white_arcsec = [8.0, 8.0, 8.0]", 4), ("none", 3), ("", 8)] {
+            let mut case = Case::new(Path::Still, 3600 + seed).reference(reference);
+            case.stars = stars;
+            let report = case.close().report;
+            let what = (seed, reference);
+            assert!(report.effects.is_empty(), "{what:?}: {:?}", report.effects);
+            let left = &report.unattributed;
+            assert!(!left.present, "{what:?}: {:?}", left.depends_on);
+        }
+    }
+}
+
+/// Stars alone, all of them others after 7 min, for an hour and a half: a chain of more fields than there are rounds of
+/// alternation, of which what is before a fold has nothing in common with what is after it.
+#[test]
+fn a_sky_that_passes_by_leaves_its_noise() {
+    let mut case = Case::new(Path::Scan, 3700).reference("none");
+    case.duration_s = 5400.0;
+    case.stars = 6;
+    let (model, mut bundle) = case.make();
+    bundle.catalog = None;
+    let report = closed(&model, &bundle).expect("the loop closes").report;
+    assert!(report.effects.is_empty(), "{:?}", report.effects);
+    let squares = report.before.chi2_per_dof.expect("noise is declared");
+    assert!((0.95..1.08).contains(&squares), "{squares}");
 }
