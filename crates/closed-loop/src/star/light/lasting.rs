@@ -23,7 +23,7 @@ const TOGETHER: usize = 16;
 /// Sigmas of what chance makes of the stars' own noise.
 const BEYOND_CHANCE: f64 = 3.0;
 /// Frames by which an error is known well enough.
-const ENOUGH: usize = 4096;
+const ENOUGH: usize = 1024;
 
 /// The error about one axis.
 #[derive(Clone, Copy, Debug)]
