@@ -21,8 +21,8 @@ use crate::harmonics::Harmonics;
 use crate::phase;
 use crate::triangle::{self, Triangle};
 
-/// Nodes and weights of a mean over a normal variable, exact to the ninth power.
-const GAUSS_HERMITE_5: [(f64, f64); 5] = [
+/// Nodes (in standard deviations) and weights of a mean over a normal variable, exact to the ninth power.
+pub const GAUSS_HERMITE_5: [(f64, f64); 5] = [
     (-2.856_970_013_872_806, 0.011_257_411_327_720_69),
     (-1.355_626_179_974_266, 0.222_075_922_005_612_6),
     (0.0, 0.533_333_333_333_333_3),

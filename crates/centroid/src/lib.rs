@@ -35,7 +35,7 @@ mod triangle;
 mod window;
 
 pub use batch::{EstimatesMut, WindowBatch};
-pub use error_model::CentroidError;
+pub use error_model::{CentroidError, GAUSS_HERMITE_5};
 pub use failure::CentroidFailure;
 pub use first_moment::FirstMoment;
 pub use gaussian_psf::GaussianPsf;

@@ -12,7 +12,7 @@
 
 use std::sync::Arc;
 
-use centroid::{CentroidError, Triangle};
+use centroid::{CentroidError, GAUSS_HERMITE_5, Triangle};
 use effects::{Effect, ParameterValue, Parameters};
 use focal_plane::Pixel;
 use star_tracker::StarView;
@@ -21,14 +21,6 @@ use telemetry::{EffectValue, Model};
 use crate::error::CloseError;
 use crate::situation::Situation;
 
-/// Nodes, in standard deviations, and weights.
-const HERMITE: [(f64, f64); 5] = [
-    (0.0, 8.0 / 15.0),
-    (1.355_626_179_974_266, 0.222_075_922_005_612_6),
-    (-1.355_626_179_974_266, 0.222_075_922_005_612_6),
-    (2.856_970_013_872_806, 0.011_257_411_327_720_69),
-    (-2.856_970_013_872_806, 0.011_257_411_327_720_69),
-];
 /// A position that is known to less than this is known, px.
 const KNOWN_PX: f64 = 1e-3;
 
@@ -67,7 +59,7 @@ impl OnCentroids {
             return shift(star);
         }
         let (mut x, mut y) = (0.0, 0.0);
-        for (z, weight) in HERMITE {
+        for (z, weight) in GAUSS_HERMITE_5 {
             let at = Pixel {
                 x: star.at.x + z * sigma[0],
                 y: star.at.y + z * sigma[1],

@@ -110,8 +110,6 @@ pub(crate) struct StarData {
     pub(crate) projected: [Vec<f64>; 2],
     /// Modelled position, px: where regressors are evaluated.
     pub(crate) modelled: [Vec<f64>; 2],
-    /// Where effects that were found take the light, px, where that is far.
-    pub(super) carried: Option<[Vec<f64>; 2]>,
     /// How far the reference puts them off, [`crate::star::light`].
     pub(super) light: Light,
     /// Where the light falls, as far as is known, px.
@@ -181,7 +179,8 @@ impl StarData {
             .flatten();
         let motion = inputs.reference.or(own.as_ref());
         data.place(motion.map(|m| m as &dyn AttitudeSource), inputs.effects);
-        data.update_phase(inputs.phase);
+        let modelled = std::mem::take(&mut data.modelled);
+        data.fall_at(modelled, None, inputs.phase);
         data.log_flux = data.fluxes();
         data.frames.flux = None;
         data
@@ -324,7 +323,6 @@ impl StarData {
             turned_back: Vec::new(),
             projected: pair(),
             modelled: pair(),
-            carried: None,
             light: Light::as_modelled(n),
             landed: pair(),
             velocity: pair(),
@@ -366,7 +364,6 @@ impl StarData {
             turned_back: self.turned_back.clone(),
             projected: pair(&self.projected),
             modelled: pair(&self.modelled),
-            carried: self.carried.as_ref().map(pair),
             light: Light {
                 beside_px: pair(&self.light.beside_px),
                 variance_px2: pair(&self.light.variance_px2),
@@ -380,9 +377,9 @@ impl StarData {
         }
     }
 
-    /// Whether stars hardly move but for what the reference puts them off by: then columns that cancel each other in
-    /// what is the same all the time leave that.
-    fn rests(&self) -> bool {
+    /// Whether stars at these places hardly move but for what the reference puts them off by: then columns that cancel
+    /// each other in what is the same all the time leave that.
+    fn rest_at(&self, places: &[Vec<f64>; 2]) -> bool {
         let off = self.light.beside_px.iter().flatten();
         let off: f64 = off.map(|b| b * b).sum();
         if off == 0.0 {
@@ -390,7 +387,7 @@ impl StarData {
         }
         let mut sums = vec![[0.0; 5]; self.stars.len()];
         for (row, &star) in self.star.iter().enumerate() {
-            let [x, y] = [0, 1].map(|a| self.modelled[a][row]);
+            let [x, y] = [0, 1].map(|a| places[a][row]);
             for (sum, value) in sums[star].iter_mut().zip([1.0, x, y, x * x, y * y]) {
                 *sum += value;
             }
@@ -435,13 +432,20 @@ impl StarData {
         }
     }
 
-    /// Evaluates what the declared model does to centroids where the light falls.
-    pub(crate) fn update_phase(&mut self, phase: &OnCentroids) {
-        let from = self.carried.as_ref().unwrap_or(&self.modelled);
-        self.landed = self.light.beside(from);
-        if self.rests() {
-            self.modelled = self.light.beside(&self.modelled);
-        }
+    /// Takes columns to be those at `modelled`, and the light to fall there or, where effects that were found take it
+    /// far, at `carried`, px, each but for what the reference puts it off by; and evaluates what the declared model does
+    /// to centroids there.
+    pub(super) fn fall_at(
+        &mut self,
+        modelled: [Vec<f64>; 2],
+        carried: Option<[Vec<f64>; 2]>,
+        phase: &OnCentroids,
+    ) {
+        self.landed = self.light.beside(carried.as_ref().unwrap_or(&modelled));
+        self.modelled = match self.rest_at(&modelled) {
+            true => self.light.beside(&modelled),
+            false => modelled,
+        };
         let at = Points {
             x: &self.landed[0],
             y: &self.landed[1],

@@ -18,13 +18,14 @@
 //! Source: [M23] Eq. 12 for the attitude; the mean direction is the
 //! least-squares one for small errors.
 
+use std::sync::Arc;
+
 use effects::Effect;
 use focal_plane::{
     ARCSEC_PER_RAD, AttitudeSeries, AttitudeSource, Camera, Pixel, StarFrames, Vectors,
 };
 use nalgebra::{UnitQuaternion, Vector3};
 use star_tracker::solve_frames;
-use std::sync::Arc;
 
 use crate::star::data::StarData;
 use crate::star::nuisance::tangent_axes;

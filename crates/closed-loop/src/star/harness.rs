@@ -2,9 +2,9 @@
 //!
 //! Not physics: helpers of tests.
 
-use crate::declared::OnCentroids;
 use focal_plane::{AttitudeSeries, Camera, Pixel, StarFrames};
 
+use crate::declared::OnCentroids;
 use crate::star::data::{Inputs, Star, StarData};
 
 /// Places of six stars in a detector of 1024 pixels, from its centre, px.

@@ -167,8 +167,7 @@ impl StarData {
         let scale = self.camera.arcsec_per_px();
         let known = self.phase_error.clone();
         self.light = light::of(self, [&inside.axes[0], &inside.axes[1]]);
-        self.modelled = self.shifted(&inside.modelled);
-        self.update_phase(phase);
+        self.fall_at(self.shifted(&inside.modelled), None, phase);
         let mut squares = 0.0;
         for axis in 0..2 {
             for (row, known) in known[axis].iter().enumerate() {
@@ -202,7 +201,6 @@ impl StarData {
 
     /// Takes the light to fall where it is modelled.
     pub(crate) fn lands_as_modelled(&mut self) {
-        self.carried = None;
         self.light = Light::as_modelled(self.t_s.len());
     }
 
@@ -235,8 +233,7 @@ impl StarData {
         }
         let left = self.left(&shifts.whole);
         self.light = light::of(self, left.each_ref().map(Vec::as_slice));
-        self.modelled = self.shifted(&shifts.fitted);
-        self.carried = Some(self.shifted(&shifts.light));
-        self.update_phase(phase);
+        let carried = self.shifted(&shifts.light);
+        self.fall_at(self.shifted(&shifts.fitted), Some(carried), phase);
     }
 }

@@ -65,30 +65,30 @@ const NOTHING: Known = [(0.0, f64::INFINITY); 3];
 pub(crate) fn of(data: &StarData, residual: [&[f64]; 2]) -> Light {
     let rows = data.t_s.len();
     let mut light = Light::as_modelled(rows);
-    let changes = changes::of(data);
-    let weight = weights::of(data, &changes);
+    let weight = weights::of(data, &changes::of(data));
     let turns = Turns::of(data, residual, &weight);
-    let known = KNOWN_PX * data.camera.arcsec_per_px()[0];
-    if !data.free_attitude && turns.reference[..2].iter().all(|s| *s < known * known) {
-        return light;
-    }
     let t_s = &data.frames.t_s;
-    // what chance makes of the stars' noise would put that noise into their positions
-    let errs: [bool; 3] = std::array::from_fn(|axis| shows(&turns, axis, 1));
-    let lasting: [Option<Lasting>; 3] = std::array::from_fn(|axis| {
-        let told = (!data.free_attitude).then(|| Lasting::of(&turns, t_s, axis));
-        told.flatten()
-    });
-    if !data.free_attitude && errs == [false; 3] && lasting.iter().all(Option::is_none) {
-        return light;
-    }
-    // information of the reference, none where there is none
-    let exact = (1e-3 * known * known).recip();
-    let mut reference: [f64; 3] = std::array::from_fn(|axis| match turns.reference[axis] {
-        _ if data.free_attitude => 0.0,
-        s if errs[axis] => s.recip().min(exact),
-        _ => exact,
-    });
+    // information of the reference, none where there is none, and what of its errors lasts
+    let (mut reference, lasting) = if data.free_attitude {
+        ([0.0; 3], [None; 3])
+    } else {
+        let known = KNOWN_PX * data.camera.arcsec_per_px()[0];
+        if turns.reference[..2].iter().all(|s| *s < known * known) {
+            return light;
+        }
+        // what chance makes of the stars' noise would put that noise into their positions
+        let errs: [bool; 3] = std::array::from_fn(|axis| shows(&turns, axis, 1));
+        let lasting: [_; 3] = std::array::from_fn(|axis| Lasting::of(&turns, t_s, axis));
+        if errs == [false; 3] && lasting.iter().all(Option::is_none) {
+            return light;
+        }
+        let exact = (1e-3 * known * known).recip();
+        let information = |axis: usize| match errs[axis] {
+            true => turns.reference[axis].recip().min(exact),
+            false => exact,
+        };
+        (std::array::from_fn(information), lasting)
+    };
     let mut around = around(data, &turns, reference);
     for (axis, lasting) in lasting.iter().enumerate() {
         if let Some(lasting) = lasting {
