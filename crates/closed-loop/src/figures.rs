@@ -26,7 +26,7 @@ use crate::evidence::Residuals;
 use crate::questions::hypothesis::{Questions, Told};
 use crate::search::empirical::EMPIRICAL;
 use crate::search::refusal::Refused;
-use crate::search::selection::{columns_of, each};
+use crate::search::selection::{Group, columns_of, each};
 use crate::search::{Found, family, first_column};
 use crate::star::data::StarData;
 use crate::unexplained::SEARCH_ALPHA;
@@ -284,13 +284,14 @@ fn refused(found: &Found, id: &str, surroundings: &Surroundings<'_>) -> Option<R
 /// effects. `left` is the share of the before variance that is left.
 pub(crate) fn unattributed(found: &Found, left: f64) -> Unattributed {
     let set = columns_of(&found.fitted.groups, &found.selection.chosen);
-    let terms: Vec<Followed> = (0..found.candidates.len())
+    let terms: Vec<Followed<'_>> = (0..found.candidates.len())
         .filter(|&g| found.candidates[g].id() == EMPIRICAL && found.selection.judged[g].observable)
         .filter_map(|g| {
             let name = found.candidates[g].selectors().get("variable")?.clone();
             Some(Followed {
                 variable: name,
                 parts: vec![found.fitted.groups[g].columns.clone()],
+                group: &found.fitted.groups[g],
                 of_many: false,
             })
         })
@@ -314,10 +315,12 @@ struct Part {
 }
 
 /// A variable that the leftover may follow.
-pub(crate) struct Followed {
+pub(crate) struct Followed<'a> {
     pub(crate) variable: String,
     /// Columns by which it is judged.
     pub(crate) parts: Vec<Vec<usize>>,
+    /// All its columns, and their credible sizes.
+    pub(crate) group: &'a Group,
     /// Its parts are single stars or slots, and all.
     pub(crate) of_many: bool,
 }
@@ -328,7 +331,7 @@ pub(crate) struct Followed {
 pub(crate) fn follows(
     fits: &Fits,
     set: &[usize],
-    terms: &[Followed],
+    terms: &[Followed<'_>],
     tried: usize,
     each: f64,
     left: f64,
@@ -336,13 +339,18 @@ pub(crate) fn follows(
     let (base, before) = fits
         .out_of_fold(set)
         .map_or((0.0, 0.0), |o| (o.total_sse(), o.total_loglik()));
-    let judge = |part: &[usize], parts: usize| -> Option<Part> {
+    let judge = |part: &[usize], term: &Followed<'_>| -> Option<Part> {
         let mut with = set.to_vec();
         with.extend(part);
         let which: Vec<usize> = (set.len()..with.len()).collect();
         let fold = fits.out_of_fold(&with)?;
-        let p = fits.estimate(&with)?.p_value(&which);
-        let tried = parts * tried;
+        let estimate = fits.estimate(&with)?;
+        let sizes = &estimate.value.as_slice()[set.len()..];
+        if !term.group.believes(part, sizes) {
+            return None;
+        }
+        let p = estimate.p_value(&which);
+        let tried = term.parts.len() * tried;
         let share = if base > 0.0 {
             1.0 - fold.total_sse() / base
         } else {
@@ -362,9 +370,7 @@ pub(crate) fn follows(
         .par_iter()
         .filter_map(|term| {
             let all = term.parts.iter();
-            let all: Vec<Part> = all
-                .filter_map(|part| judge(part, term.parts.len()))
-                .collect();
+            let all: Vec<Part> = all.filter_map(|part| judge(part, term)).collect();
             let worthy = all
                 .iter()
                 .filter(|p| p.p_value < SEARCH_ALPHA && p.worth > 0.0);
@@ -493,4 +499,33 @@ pub(crate) fn rms(values: &[f64], outlier: &[bool]) -> Option<f64> {
 /// Star residual per axis over all rows that count.
 pub(crate) fn star_rms(residual: &Residuals, data: &StarData) -> [f64; 2] {
     std::array::from_fn(|a| rms(&residual.axes[a], &data.outlier).unwrap_or(f64::NAN))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A size at its bound is believed, one beyond it not; what the group does not have has no bound.
+    #[test]
+    fn sizes_within_their_bounds_are_believed() {
+        let group = Group {
+            columns: vec![4, 6],
+            bounds: vec![[-1.0, 1.0], [0.0, 2.0]],
+            choices: 0,
+            shapes: 0,
+            slopes: 0,
+            family: String::new(),
+            kind: EMPIRICAL,
+            stands_for: 1.0,
+        };
+        for (columns, sizes, believed) in [
+            (&[4, 6][..], &[-1.0, 2.0][..], true),
+            (&[6], &[1.5], true),
+            (&[4], &[1.5], false),
+            (&[6, 4], &[-0.1, 0.5], false),
+            (&[5], &[9.0], true),
+        ] {
+            assert_eq!(group.believes(columns, sizes), believed, "{columns:?}");
+        }
+    }
 }

@@ -130,7 +130,7 @@ pub struct Coefficient {
     pub name: String,
     /// Unit.
     pub unit: &'static str,
-    /// 1 sigma of plausible sizes, in `unit`: a proper prior, and the scale that conditions a fit.
+    /// 1 sigma of plausible sizes, in `unit`. No prior of the fit: sizes far beyond it are not believed.
     pub plausible: f64,
     /// Smallest physical value (0 for a squared exposure), or minus infinity.
     pub lower: f64,

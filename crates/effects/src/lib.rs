@@ -56,7 +56,7 @@ pub use hot_pixel::hot_pixel_at;
 pub use parameters::{Parameter, ParameterValue, Parameters};
 pub use path::mean_turn;
 pub use periodic_misalignment::line_at;
-pub use pixel_phase_harmonics::harmonics_of;
+pub use pixel_phase_harmonics::{LARGEST_WAVE_PX, harmonics_of};
 pub use pixel_wave::{PixelWave, PixelWaves};
 pub use scene::{FrameGeometry, Scene, StarFacts, Surroundings, VectorFrame};
 pub use step_misalignment::step_at;

@@ -29,6 +29,11 @@ const ID: &str = "pixel_phase_harmonics";
 
 /// Highest order.
 const ORDERS: u32 = 4;
+/// A wave of 2" on the pixels of \[M23\] (70"), as 1 sigma of what is plausible, px.
+const PLAUSIBLE_PX: f64 = 0.03;
+/// Largest amplitude of a wave in the pixel phase, px. A spot much smaller than a pixel has its centroid in the
+/// pixel's middle: the error is a sawtooth of half a pixel either way, and order k of that is 1/(pi k).
+pub const LARGEST_WAVE_PX: f64 = core::f64::consts::FRAC_1_PI;
 
 /// The kind.
 #[derive(Debug)]
@@ -164,10 +169,12 @@ impl Shift for Phase {
     fn coefficients(&self) -> Vec<Coefficient> {
         let mut all = Vec::new();
         for k in &self.orders {
-            for axis in ["x", "y"] {
+            for (axis, scale) in ["x", "y"].into_iter().zip(self.camera.arcsec_per_px()) {
+                let largest = LARGEST_WAVE_PX * scale;
                 for wave in ["sin", "cos"] {
                     let name = format!("{axis}{k}_{wave}_arcsec");
-                    all.push(Coefficient::new(name, "arcsec", 2.0));
+                    let coefficient = Coefficient::new(name, "arcsec", PLAUSIBLE_PX * scale);
+                    all.push(coefficient.at_least(-largest).at_most(largest));
                 }
             }
         }

@@ -18,7 +18,7 @@ use crate::error::CloseError;
 use crate::figures::{self, Followed};
 use crate::gaps::longest_step;
 use crate::search::empirical::{Empirical, Variable, flux_of, range};
-use crate::search::selection::{FAMILY_ALPHA, Judgement, columns_of, costs, each};
+use crate::search::selection::{FAMILY_ALPHA, Group, Judgement, columns_of, costs, each};
 use crate::search::{Fitted, Found, borrowed, fit};
 use crate::situation::Situation;
 use crate::situation::channels_of_interest;
@@ -54,6 +54,8 @@ pub(crate) struct Term {
     pub(crate) first: usize,
     /// Parts by which it is judged, as columns; those that the data cannot show are left out.
     pub(crate) parts: Vec<Vec<usize>>,
+    /// All its columns, and their credible sizes.
+    pub(crate) group: Group,
 }
 
 /// A term of a description and the columns of it, counted from its own first.
@@ -152,6 +154,7 @@ impl Described {
                     term,
                     first: own,
                     parts,
+                    group: group.clone(),
                 }
             })
             .collect();
@@ -178,6 +181,7 @@ impl Described {
             .map(|t| Followed {
                 variable: t.term.name(),
                 parts: t.parts.clone(),
+                group: &t.group,
                 of_many: t.term.is_of_many(),
             })
             .collect();
@@ -249,6 +253,7 @@ impl Described {
         let term = Followed {
             variable: name.clone(),
             parts: all,
+            group: &stars.group,
             of_many: false,
         };
         let whole = figures::follows(fits, set, &[term], tried, 0.0, 1.0);
@@ -386,10 +391,11 @@ pub(crate) fn terms(
         })
         .collect();
     let mut terms = Vec::new();
-    let one =
-        |(variable, range): &(Variable, [f64; 2])| Empirical::new(variable.clone(), *range, true);
+    let one = |(variable, range): &(Variable, [f64; 2])| {
+        Some(Empirical::new(variable.clone(), *range, true)?.on(&data.camera))
+    };
     let two = |of: &(Variable, [f64; 2]), by: &(Variable, [f64; 2])| {
-        Empirical::pair(of.0.clone(), of.1, by.0.clone(), by.1)
+        Some(Empirical::pair(of.0.clone(), of.1, by.0.clone(), by.1)?.on(&data.camera))
     };
     for axis in 0..2 {
         terms.extend(one(&position[axis]));
@@ -400,8 +406,9 @@ pub(crate) fn terms(
     for single in [&time, &mag, &colour] {
         terms.extend(one(single));
     }
-    // of a camera that turns steadily every place has its rate: that says what the place says
-    let moves = !turns_steadily(data);
+    // of a camera that turns steadily every place has its rate: that says what the place says; of one at rest there
+    // is the noise of its reference
+    let moves = !turns_steadily(data) && !data.is_still();
     if moves {
         terms.extend(one(&rate));
     }

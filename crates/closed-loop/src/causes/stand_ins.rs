@@ -239,8 +239,11 @@ fn describe_at(described: &Described, rest: &[usize], times: f64) -> Option<(f64
                 // what is in the description already has been paid for
                 let more = price.worth(likelihood - base, part.len());
                 let certain = || {
-                    beside(fits, &with, part)
-                        .is_some_and(|(e, which)| e.p_value(&which) * (tried as f64) < FAMILY_ALPHA)
+                    beside(fits, &with, part).is_some_and(|(e, which)| {
+                        let sizes = &e.value.as_slice()[with.len()..];
+                        e.p_value(&which) * (tried as f64) < FAMILY_ALPHA
+                            && term.group.believes(part, sizes)
+                    })
                 };
                 if more > WORTH && best.as_ref().is_none_or(|best| more > best.more) && certain() {
                     best = Some(Best {

@@ -27,7 +27,10 @@
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 
-use effects::{AttitudeRows, Candidate, Coefficient, Effect, EffectError, StarRows, Surroundings};
+use effects::{
+    AttitudeRows, Candidate, Coefficient, Effect, EffectError, LARGEST_WAVE_PX, StarRows,
+    Surroundings,
+};
 use focal_plane::{Camera, PointsMut, Series, VectorsMut};
 
 use crate::search::LEADING;
@@ -268,6 +271,21 @@ impl Empirical {
         }
         term.by = Some((by, scale));
         Some(term)
+    }
+
+    /// The same with waves in the pixel phase no larger than this camera's pixels let them be.
+    #[must_use]
+    pub(crate) fn on(mut self, camera: &Camera) -> Self {
+        let Variable::Phase(axis) = self.variable else {
+            return self;
+        };
+        let scale = camera.arcsec_per_px();
+        for (k, coefficient) in self.coefficients.iter_mut().enumerate() {
+            let axis = if k < 2 * HARMONICS { axis } else { 1 - axis };
+            coefficient.upper = LARGEST_WAVE_PX * scale[axis];
+            coefficient.lower = -coefficient.upper;
+        }
+        self
     }
 
     /// Whether it has a shift for each of many (stars, slots).

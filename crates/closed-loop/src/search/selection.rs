@@ -76,6 +76,16 @@ pub(crate) struct Group {
     pub(crate) stands_for: f64,
 }
 
+impl Group {
+    /// Whether `values` of `columns`, some of its own, are all credible.
+    pub(crate) fn believes(&self, columns: &[usize], values: &[f64]) -> bool {
+        columns.iter().zip(values).all(|(column, value)| {
+            let at = self.columns.iter().position(|c| c == column);
+            at.is_none_or(|k| (self.bounds[k][0]..=self.bounds[k][1]).contains(value))
+        })
+    }
+}
+
 /// One group's standing beside the chosen ones.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Judgement {

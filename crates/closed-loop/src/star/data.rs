@@ -114,6 +114,8 @@ pub(crate) struct StarData {
     pub(super) light: Light,
     /// Where the light falls, as far as is known, px.
     landed: [Vec<f64>; 2],
+    /// Axes along which it is not known to move.
+    still: [bool; 2],
     /// Velocity and acceleration of the image, px/s and px/s^2; zero where the
     /// motion is not known.
     pub(crate) velocity: [Vec<f64>; 2],
@@ -325,6 +327,7 @@ impl StarData {
             modelled: pair(),
             light: Light::as_modelled(n),
             landed: pair(),
+            still: [false; 2],
             velocity: pair(),
             acceleration: pair(),
             phase_error: pair(),
@@ -399,9 +402,42 @@ impl StarData {
         moved < RESTS * RESTS * off
     }
 
+    /// Along an axis along which the light is not known to move, each star's falls at its mean place: of a position to a
+    /// variance V that moves by M its estimates scatter by M + V. Waves whose slopes cancel in all but a turn of the
+    /// frame would explain a slow error of the reference by what of it is in such estimates.
+    fn hold_still(&mut self, places: &[Vec<f64>; 2]) {
+        let at = self.light.beside(places);
+        for (axis, at) in at.iter().enumerate() {
+            let mut sums = vec![[0.0; 2]; self.stars.len()];
+            for (&star, at) in self.star.iter().zip(at) {
+                sums[star][0] += 1.0;
+                sums[star][1] += at;
+            }
+            let off = |row: usize| at[row] - sums[self.star[row]][1] / sums[self.star[row]][0];
+            let scatter: f64 = (0..at.len()).map(|row| off(row).powi(2)).sum();
+            let seen = sums.iter().filter(|s| s[0] > 0.0).count();
+            let scatter = scatter / at.len().saturating_sub(seen).max(1) as f64;
+            let variance = &self.light.variance_px2[axis];
+            let variance = variance.iter().sum::<f64>() / variance.len() as f64;
+            let moves = (scatter - variance).max(0.0);
+            self.still[axis] = moves < variance;
+            if self.still[axis] {
+                let off: Vec<f64> = (0..at.len()).map(off).collect();
+                let beside = self.light.beside_px[axis].iter_mut();
+                beside.zip(off).for_each(|(beside, off)| *beside -= off);
+                self.light.variance_px2[axis].fill(moves);
+            }
+        }
+    }
+
     /// Where the light falls, as far as is known, px.
     pub(crate) fn landed(&self) -> [&[f64]; 2] {
         self.landed.each_ref().map(Vec::as_slice)
+    }
+
+    /// Whether stars are not known to move.
+    pub(crate) fn is_still(&self) -> bool {
+        self.still == [true; 2]
     }
 
     /// Some rows, as candidates see them; the waves that these share are kept in `waves`.
@@ -441,8 +477,13 @@ impl StarData {
         carried: Option<[Vec<f64>; 2]>,
         phase: &OnCentroids,
     ) {
+        let rests = self.rest_at(&modelled);
+        self.still = [false; 2];
+        if rests {
+            self.hold_still(&modelled);
+        }
         self.landed = self.light.beside(carried.as_ref().unwrap_or(&modelled));
-        self.modelled = match self.rest_at(&modelled) {
+        self.modelled = match rests {
             true => self.light.beside(&modelled),
             false => modelled,
         };

@@ -12,6 +12,8 @@ use telemetry::{Bundle, Model};
 pub(crate) enum Path {
     /// A slow drift, tens of pixels within the run.
     Drift,
+    /// Not at all.
+    Rest,
     /// Hardly a pixel within the run.
     Still,
     /// Steadily on: after 7 min all stars are others.
@@ -52,6 +54,7 @@ impl Path {
             Self::Drift => {
                 format!("[motion]\nkind = \"hold\"\n{start}\ndrift_arcsec_s = [6.0, -9.0, 1.0]\n")
             }
+            Self::Rest => format!("[motion]\nkind = \"hold\"\n{start}\n"),
             Self::Still => {
                 format!(
                     "[motion]\nkind = \"hold\"\n{start}\ndrift_arcsec_s = [0.06, -0.09, 0.01]\n"

@@ -136,6 +136,22 @@ fn stars_at_rest_follow_nothing() {
     }
 }
 
+/// A reference that wanders by 1.5 arcsec is all that moves stars at rest: what of it is left in their positions is no
+/// motion, whose rate or phases the residual could follow.
+#[test]
+fn a_wander_beside_stars_at_rest_is_no_motion() {
+    let wander = "wander_arcsec = [1.5, 1.5, 1.5]\nwander_tau_s = [100.0, 100.0, 100.0]";
+    for seed in [1, 3, 7] {
+        let mut case = Case::new(Path::Rest, 3800 + seed).reference(wander);
+        case.stars = 9;
+        case.noise = 0.5;
+        let report = case.close().report;
+        assert_eq!(named(&report), ["reference_error"], "{seed}");
+        let left = &report.unattributed;
+        assert!(!left.present, "{seed}: {:?}", left.depends_on);
+    }
+}
+
 /// Stars alone, all of them others after 7 min, for an hour and a half: a chain of more fields than there are rounds of
 /// alternation, of which what is before a fold has nothing in common with what is after it.
 #[test]

@@ -44,6 +44,24 @@ fn columns(term: &Empirical) -> [Vec<f64>; 2] {
     [x, y]
 }
 
+/// A centroid is off by half a pixel at most, and a sawtooth of that has a first harmonic of 1/pi px.
+#[test]
+fn waves_are_no_larger_than_pixels_let_them_be() {
+    let camera = camera();
+    let range = [0.0, 1.0];
+    let largest = camera.arcsec_per_px()[0] / core::f64::consts::PI;
+    let one = Empirical::new(Variable::Phase(0), range, true).unwrap();
+    let two = Empirical::pair(Variable::Phase(1), range, Variable::Time, range).unwrap();
+    for term in [one.on(&camera), two.on(&camera)] {
+        for c in term.coefficients() {
+            assert!((c.upper - largest).abs() < 1e-9 && c.lower == -c.upper);
+        }
+    }
+    let other = Empirical::new(Variable::Time, range, true).unwrap();
+    let free = |c: &Coefficient| c.upper.is_infinite();
+    assert!(other.on(&camera).coefficients().iter().all(free));
+}
+
 #[test]
 fn a_pair_is_the_first_columns_of_one_times_the_other() {
     let (whole, range) = ([-2.0, 2.0], [0.0, 4.0]);
