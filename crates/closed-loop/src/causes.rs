@@ -54,6 +54,8 @@ const MOST_REFUSALS: usize = 10;
 const DOUBT: f64 = 1e-4;
 /// The effect of the acceleration.
 pub(crate) const SMEAR: &str = "exposure_smear";
+/// An effect does not make the squares of the error this many times as large.
+const WORSE: f64 = 1.02;
 /// Share of what a description gains below which an effect beside it is what it leaves.
 const REMAINDER: f64 = 0.05;
 /// Slow: over this share of the span.
@@ -166,6 +168,13 @@ pub(crate) fn run<'a>(
             continue;
         }
         let level = searched.evidence.as_ref().unwrap_or(&beside);
+        if !last
+            && searched.evidence.is_some()
+            && let worse = worse(level, folds, &searched.found)?
+            && refuse(&mut refused, worse, Refusal::NoLessError)
+        {
+            continue;
+        }
         let inside = noise_effects::in_sample(level, &searched.found);
         if slow_of_stars(level, &searched, inside.as_deref()).is_some() {
             start = None;
@@ -409,6 +418,32 @@ fn pile(found: &Found, stars: usize) -> Vec<String> {
     }
     let all = (0..groups.len()).filter(|&g| groups[g].kind == MISPLACED);
     all.map(|g| family(found.candidates[g].as_ref())).collect()
+}
+
+/// Effects with which the error out of fold is larger than without them: white noise would have seen that, but beside
+/// a slow error of the reference likelihoods are those of changes.
+fn worse(
+    level: &StarEvidence<'_>,
+    folds: &Folds,
+    found: &Found,
+) -> Result<Vec<String>, CloseError> {
+    let chosen = &found.selection.chosen;
+    let power = |set: &[usize]| -> Result<f64, CloseError> {
+        let left = found.left_out_of_fold(level, folds, set)?;
+        Ok(figures::star_power(&left, level.data))
+    };
+    let all = power(chosen)?;
+    if chosen.is_empty() || all < WORSE * power(&[])? {
+        return Ok(Vec::new());
+    }
+    let mut families = Vec::new();
+    for g in chosen {
+        let others: Vec<usize> = chosen.iter().copied().filter(|c| c != g).collect();
+        if all > WORSE * power(&others)? {
+            families.push(family(found.candidates[*g].as_ref()));
+        }
+    }
+    Ok(families)
 }
 
 /// Terms for every fit from now on, and what bends as well.

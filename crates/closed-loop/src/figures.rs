@@ -501,6 +501,11 @@ pub(crate) fn star_rms(residual: &Residuals, data: &StarData) -> [f64; 2] {
     std::array::from_fn(|a| rms(&residual.axes[a], &data.outlier).unwrap_or(f64::NAN))
 }
 
+/// Sum of the mean squares of both axes, arcsec^2.
+pub(crate) fn star_power(residual: &Residuals, data: &StarData) -> f64 {
+    star_rms(residual, data).iter().map(|v| v * v).sum()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -16,7 +16,7 @@ use effects::{Candidate, Coefficient};
 use nalgebra::DVector;
 
 use crate::error::CloseError;
-use crate::evidence::{Amplitudes, Evidence};
+use crate::evidence::{Amplitudes, Evidence, Residuals};
 use selection::{Group, Selection, Trials, columns_of, costs};
 
 pub(crate) mod catalogue;
@@ -268,6 +268,19 @@ impl Found {
             fitted,
             selection,
         })
+    }
+
+    /// What `chosen` leave out of fold.
+    pub(crate) fn left_out_of_fold(
+        &self,
+        level: &dyn Evidence,
+        folds: &Folds,
+        chosen: &[usize],
+    ) -> Result<Residuals, CloseError> {
+        let only = self.only(chosen);
+        let amplitudes = amplitudes_as(&self.fitted, folds, chosen, |beta| only.spread(beta));
+        let amplitudes = amplitudes.ok_or(CloseError::Singular)?;
+        Ok(level.residuals(folds, &only.candidates, &amplitudes))
     }
 
     /// Whether one of the candidates put forward last, `count` at the end of the list, was chosen.

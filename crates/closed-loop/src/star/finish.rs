@@ -12,7 +12,7 @@ use telemetry::{DarkMap, Model, StarResiduals};
 use crate::causes::commonness::Slow;
 use crate::causes::description::{self, Described};
 use crate::error::CloseError;
-use crate::evidence::{Evidence, Residuals};
+use crate::evidence::Residuals;
 use crate::figures;
 use crate::image_level::{self, ImageLevel};
 use crate::noise_effects;
@@ -24,7 +24,7 @@ use crate::search::instants;
 use crate::search::orbits::Look;
 use crate::search::refusal::Refused;
 use crate::search::selection::columns_of;
-use crate::search::{Found, amplitudes_as, fit};
+use crate::search::{Found, fit};
 use crate::situation::Situation;
 use crate::star::data::StarData;
 use crate::star::evidence::StarEvidence;
@@ -57,14 +57,7 @@ pub(crate) struct Finish<'a> {
 
 impl Finish<'_> {
     pub(crate) fn residuals(&self, chosen: &[usize]) -> Result<Residuals, CloseError> {
-        let only = self.found.only(chosen);
-        let amplitudes = amplitudes_as(&self.found.fitted, self.folds, chosen, |beta| {
-            only.spread(beta)
-        })
-        .ok_or(CloseError::Singular)?;
-        Ok(self
-            .level
-            .residuals(self.folds, &only.candidates, &amplitudes))
+        self.found.left_out_of_fold(self.level, self.folds, chosen)
     }
 
     /// What the chosen effects leave in sample beside the description of it, where there is one, arcsec.
@@ -79,10 +72,7 @@ impl Finish<'_> {
     }
 
     fn power(&self, residual: &Residuals) -> f64 {
-        figures::star_rms(residual, self.data)
-            .iter()
-            .map(|v| v * v)
-            .sum()
+        figures::star_power(residual, self.data)
     }
 
     /// `model` is the declared one, or that with what was added.
