@@ -20,6 +20,7 @@ use effects::{Candidate, Surroundings};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use telemetry::report::ConsideredEffect;
 
+use crate::declared::OnCentroids;
 use crate::error::CloseError;
 use crate::figures;
 use crate::noise_effects;
@@ -71,8 +72,9 @@ pub(crate) struct Quest<'a> {
     pub(crate) ways: &'a [Way],
     /// What sizes are told in.
     pub(crate) surroundings: Surroundings<'a>,
-    /// Whether the light is to be followed to where it falls before anything is described.
-    pub(crate) lands: bool,
+    /// What the model declares of centroids, if the light is to be followed to where it falls before anything is
+    /// described.
+    pub(crate) lands: Option<&'a OnCentroids>,
 }
 
 /// What a quest ends with.
@@ -181,9 +183,9 @@ pub(crate) fn run<'a>(
             reinstated(&mut refused);
             continue;
         }
-        if quest.lands
+        if let Some(phase) = quest.lands
             && searched.found.chosen().any(|c| c.moves_light())
-            && let Some(elsewhere) = Elsewhere::of(level, folds, &searched.found)?
+            && let Some(elsewhere) = Elsewhere::of(level, folds, &searched.found, phase)?
         {
             return Ok(Outcome::Elsewhere(elsewhere));
         }

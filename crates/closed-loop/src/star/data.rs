@@ -61,7 +61,7 @@ pub(crate) struct Light {
 }
 
 impl Light {
-    fn beside(&self, from: &[Vec<f64>; 2]) -> [Vec<f64>; 2] {
+    pub(super) fn beside(&self, from: &[Vec<f64>; 2]) -> [Vec<f64>; 2] {
         std::array::from_fn(|axis| {
             let beside = self.beside_px[axis].iter();
             from[axis].iter().zip(beside).map(|(p, b)| p + b).collect()
@@ -487,30 +487,48 @@ impl StarData {
             true => self.light.beside(&modelled),
             false => modelled,
         };
-        let at = Points {
-            x: &self.landed[0],
-            y: &self.landed[1],
-        };
-        let [x, y] = &mut self.phase_error;
+        self.phase_error = self.centroid_error_px(&self.landed, phase);
+    }
+
+    /// What the declared model does to centroids of light that falls `at` these places, px.
+    pub(super) fn centroid_error_px(
+        &self,
+        at: &[Vec<f64>; 2],
+        phase: &OnCentroids,
+    ) -> [Vec<f64>; 2] {
+        let rows = self.t_s.len();
+        let mut error = [vec![0.0; rows], vec![0.0; rows]];
+        let [x, y] = &mut error;
         let variance = self.light.variance_px2.each_ref().map(Vec::as_slice);
         phase
             .error
             .scaled(self.camera.arcsec_per_px().map(|s| 1.0 / s))
-            .mean_error_into(at, variance, self.camera.pixel_centre(), PointsMut { x, y });
+            .mean_error_into(
+                Points {
+                    x: &at[0],
+                    y: &at[1],
+                },
+                variance,
+                self.camera.pixel_centre(),
+                PointsMut { x, y },
+            );
         if phase.has_effects() {
-            for row in 0..self.t_s.len() {
-                let [x, y] = self.landed().map(|p| p[row]);
+            for row in 0..rows {
                 let star = StarView {
-                    at: Pixel { x, y },
+                    at: Pixel {
+                        x: at[0][row],
+                        y: at[1][row],
+                    },
                     ..self.view(row)
                 };
                 let variance = self.light.variance_px2.each_ref().map(|v| v[row]);
                 let shift = phase.effects_px(&star, variance);
                 for axis in 0..2 {
-                    self.phase_error[axis][row] += shift[axis];
+                    error[axis][row] += shift[axis];
                 }
             }
         }
+        error
     }
 
     /// A row as effects with values see it, at its modelled position.

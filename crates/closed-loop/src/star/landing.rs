@@ -26,6 +26,9 @@ use crate::star::light;
 
 /// Light that falls this far off has another pixel phase: by a fifth of a radian.
 const ELSEWHERE_PX: f64 = 0.03;
+/// Sigmas by which stars seem to be shifted otherwise than they are, as the declared centroid error shifts along, that
+/// do not matter.
+const ALONG: f64 = 1.0;
 
 /// What was fitted shifts each row by, arcsec, x and y.
 pub(crate) struct Shifts {
@@ -63,9 +66,13 @@ impl Elsewhere {
         level: &StarEvidence<'_>,
         folds: &Folds,
         found: &Found,
+        phase: &OnCentroids,
     ) -> Result<Option<Box<Self>>, CloseError> {
         let [light] = modelled(level, folds, found, [|c: &dyn Candidate| c.moves_light()])?;
-        if !level.data.lands_elsewhere(&light) {
+        let chosen = &found.selection.chosen;
+        let variance = found.fitted.variance_beside(chosen);
+        let known = variance.map(|variance| (level.weight.as_slice(), variance));
+        if !level.data.lands_elsewhere(&light, phase, known) {
             return Ok(None);
         }
         Ok(Some(Box::new(Self {
@@ -205,19 +212,44 @@ impl StarData {
     }
 
     /// Whether `shift_arcsec`, with the effects that were found, takes the light off from where it was
-    /// taken to fall by enough for its pixel phase to be another one.
-    pub(crate) fn lands_elsewhere(&self, shift_arcsec: &[Vec<f64>]) -> bool {
-        let at = self.shifted(shift_arcsec);
-        let known = self.landed();
-        let (mut squares, mut count) = (0.0, 0.0);
-        for row in (0..self.t_s.len()).filter(|&r| !self.outlier[r]) {
-            for axis in 0..2 {
-                let at = at[axis][row] + self.light.beside_px[axis][row];
-                squares += (at - known[axis][row]).powi(2);
-            }
-            count += 2.0;
+    /// taken to fall by enough for its pixel phase to be another one, or by enough for the declared centroid error to
+    /// shift stars along, where rows are `known` by their weight and the variance of one of weight 1, arcsec^2.
+    pub(crate) fn lands_elsewhere(
+        &self,
+        shift_arcsec: &[Vec<f64>],
+        phase: &OnCentroids,
+        known: Option<(&[f64], f64)>,
+    ) -> bool {
+        let at = self.light.beside(&self.shifted(shift_arcsec));
+        let off = |axis: usize, row: usize| at[axis][row] - self.landed()[axis][row];
+        let rows = || (0..self.t_s.len()).filter(|&r| !self.outlier[r]);
+        let squares: f64 = (0..2)
+            .map(|axis| rows().map(|r| off(axis, r).powi(2)).sum::<f64>())
+            .sum();
+        let count = 2.0 * rows().count() as f64;
+        if squares > ELSEWHERE_PX * ELSEWHERE_PX * count {
+            return true;
         }
-        squares > ELSEWHERE_PX * ELSEWHERE_PX * count
+        let Some((weight, variance)) = known else {
+            return false;
+        };
+        // what of the change goes with the shift, star by star: as stars move on through the phases that is nothing
+        let change = self.centroid_error_px(&at, phase);
+        let scale = self.camera.arcsec_per_px();
+        let mut along = 0.0;
+        for axis in 0..2 {
+            let mut sums = vec![[0.0; 2]; self.stars.len()];
+            for r in rows() {
+                let (off, change) = (off(axis, r), change[axis][r] - self.phase_error[axis][r]);
+                let sum = &mut sums[self.star[r]];
+                sum[0] += weight[r] * off * change;
+                sum[1] += weight[r] * off * off;
+            }
+            let seen = sums.iter().filter(|s| s[1] > 0.0);
+            let of_stars: f64 = seen.map(|[both, own]| both * both / own).sum();
+            along += of_stars * scale[axis] * scale[axis] / variance;
+        }
+        along > ALONG * ALONG
     }
 
     /// Evaluates the declared centroid error where `shifts` take the light. Columns of what moves

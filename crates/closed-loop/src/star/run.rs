@@ -41,7 +41,7 @@ const MIN_FRAMES: usize = 2;
 /// How often rows that only the effects found make stand out are set aside.
 const OUTLIER_ROUNDS: usize = 2;
 /// Searches after which the light is taken to fall where what was found takes it.
-const LANDINGS: usize = 2;
+const LANDINGS: usize = 4;
 
 pub(crate) fn run(
     situation: &Situation<'_>,
@@ -105,11 +105,13 @@ fn trace(
     progress("residuals of the declared model");
     data.lands_as_modelled();
     let mut settled = settle(data, situation, phase, folds)?;
-    let mut landings = LANDINGS;
-    let mut known = Known::default();
+    let mut known = Known {
+        landings: LANDINGS,
+        ..Known::default()
+    };
     loop {
         let Elsewhere { shifts, forms } =
-            match explain(data, situation, folds, &settled, &known, landings, progress)? {
+            match explain(data, situation, phase, folds, &settled, &known, progress)? {
                 Explained::Closed(closed) => return Ok(*closed),
                 Explained::Steadier(path) => {
                     known.path = Some(path);
@@ -117,7 +119,7 @@ fn trace(
                 }
                 Explained::Elsewhere(elsewhere) => *elsewhere,
             };
-        landings -= 1;
+        known.landings -= 1;
         known.forms = forms;
         // the declared model knows nothing of where the light falls
         settled
@@ -134,6 +136,8 @@ struct Known {
     path: Option<AttitudeSeries>,
     /// What was chosen, in its polished form, and its place among the candidates.
     forms: Vec<(usize, Arc<dyn Candidate>)>,
+    /// How often the light may still be followed to where it falls.
+    landings: usize,
 }
 
 impl Known {
@@ -159,14 +163,14 @@ enum Explained {
     Steadier(AttitudeSeries),
 }
 
-/// From the declared model at its best to the report, or, while `landings` are left, to where the light falls.
+/// From the declared model at its best to the report, or, while landings are left, to where the light falls.
 fn explain(
     data: &mut StarData,
     situation: &Situation<'_>,
+    phase: &declared::OnCentroids,
     folds: &Folds,
     settled: &Settled,
     before: &Known,
-    landings: usize,
     progress: &dyn Fn(&str),
 ) -> Result<Explained, CloseError> {
     let own = match &situation.reference {
@@ -175,6 +179,7 @@ fn explain(
             .own_motion()
             .map(|own| with_rates(own, situation.bundle.rates.as_ref())),
     };
+    let landings = before.landings;
     let path = before.path.as_ref();
     let known = path.or(situation.reference.as_ref()).or(own.as_ref());
     let arm = motion::roll_arm(&data.camera);
@@ -263,7 +268,7 @@ fn explain(
             },
             ways: &ways,
             surroundings: situation.surroundings(),
-            lands,
+            lands: lands.then_some(phase),
         };
         causes::run(level, folds, &quest)
     };
@@ -273,8 +278,8 @@ fn explain(
         let series = Series::of(&leftover::star_tracks(data, &residual, &level.weight));
         Some((residual, series))
     };
-    // the first time before anything is described
-    let mut outcome = match named(&[], formed.is_none() && landings == LANDINGS)? {
+    // but for the last time before anything is described
+    let mut outcome = match named(&[], formed.is_none() && landings > 1)? {
         Outcome::Named(named) => *named,
         Outcome::Elsewhere(elsewhere) => return Ok(Explained::Elsewhere(elsewhere)),
     };
@@ -357,10 +362,11 @@ fn explain(
         image: image.as_ref().zip(formed.as_ref()),
     };
     let after = whole.residuals(&searched.found.selection.chosen)?;
+    let moves = || searched.found.chosen().any(|c| c.moves_light());
     if landings > 0
         && formed.is_none()
-        && data.lands_elsewhere(&after.modelled)
-        && let Some(elsewhere) = Elsewhere::of(whole.level, folds, whole.found)?
+        && (moves() || data.lands_elsewhere(&after.modelled, phase, None))
+        && let Some(elsewhere) = Elsewhere::of(whole.level, folds, whole.found, phase)?
     {
         return Ok(Explained::Elsewhere(elsewhere));
     }
