@@ -28,6 +28,8 @@ use super::squares::{Columns, Judged, MIN_ROWS, Table};
 const MIN_STARS: usize = 8;
 /// Fewest where it is known how they usually scatter.
 const MIN_USUAL_STARS: usize = 5;
+/// Fewest that may scatter by more than stars usually do.
+const FEWEST_STARS: usize = 3;
 /// A star with fewer rows than this part of the most is not compared.
 const SELDOM: usize = 20;
 /// Most odd stars.
@@ -121,18 +123,19 @@ impl Table {
         best
     }
 
-    /// Whether the levels scatter about a line in magnitude, or a parabola through enough of them, by more than
-    /// rows and stars usually do.
+    /// Whether the levels scatter about a line in magnitude, or a parabola through enough of them, or their mean where
+    /// there are too few for that, by more than rows and stars usually do.
     pub(super) fn scatter(&self) -> Option<Judged> {
         let stars = self.compared();
         let n = stars.len();
-        if n < MIN_USUAL_STARS {
+        if n < FEWEST_STARS {
             return None;
         }
-        let columns = match (told_by_magnitude(&stars), n >= MIN_STARS) {
-            (false, _) => 1,
-            (true, false) => 2,
-            (true, true) => 3,
+        // three or four stars lie on any line
+        let columns = match (told_by_magnitude(&stars), n) {
+            (true, MIN_STARS..) => 3,
+            (true, MIN_USUAL_STARS..) => 2,
+            _ => 1,
         };
         let spread = |s: &Level| Spread::of(s.of_rows, 0.0, 0.0);
         let root: Vec<f64> = stars.iter().map(|s| spread(s).variance.sqrt()).collect();
@@ -273,6 +276,17 @@ mod tests {
         };
         assert!(chance(0.05) > 0.1, "{}", chance(0.05));
         assert!(chance(0.15) < 1e-6, "{}", chance(0.15));
+    }
+
+    /// Three stars of 1000 rows, on whatever line: one that is half as noisy again is told, ones within 3 % are not.
+    #[test]
+    fn three_stars_are_held_against_their_mean() {
+        let chance = |level: f64| {
+            let stars = [(1.0, 1000, 3.0), (1.03, 1000, 4.0), (level, 1000, 5.0)];
+            table(stars.into_iter()).scatter().unwrap()[0]
+        };
+        assert!(chance(1.5) < 1e-4, "{}", chance(1.5));
+        assert!(chance(1.02) > 0.1, "{}", chance(1.02));
     }
 
     /// Twelve stars of 1000 rows across the field, noisier at both edges: no slope, and a parabola.

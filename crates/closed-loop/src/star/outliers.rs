@@ -14,6 +14,8 @@ use crate::star::data::StarData;
 /// A star with fewer rows has no scatter of its own: the median deviation of so many
 /// is uncertain by a quarter.
 const FEW_ROWS: usize = 10;
+/// Frames in a row of which most rows stand out that are no outliers: something turned the camera, or the reference.
+const HAPPENED: usize = 8;
 
 impl StarData {
     /// Rows that are no outliers.
@@ -27,7 +29,8 @@ impl StarData {
     /// A row is held against the rows of its star, or of all stars that have too few for
     /// a scatter of their own (snapshots of the sky hardly see a star twice). Where a
     /// frame's attitude comes from its own stars, one that was mistaken for another pulls
-    /// all others off as well: of such a frame only the worst goes at a time.
+    /// all others off as well: of such a frame only the worst goes at a time. Where most rows of many frames in a row
+    /// stand out, none does.
     pub(crate) fn mark_outliers(&mut self, residuals: &[&[Vec<f64>]]) -> usize {
         let mut rows = vec![0_usize; self.stars.len()];
         for &s in &self.star {
@@ -48,11 +51,30 @@ impl StarData {
             .collect();
         let stands_out = |r: usize| marked.iter().all(|marked| marked[r]);
         let size = |r: usize| residuals[0].iter().map(|a| a[r] * a[r]).sum::<f64>();
-        let mut added = 0;
-        for frame in 0..self.frames.frames() {
+        let of_frame = |frame: usize| -> Vec<usize> {
             let rows = self.frames.rows_of(frame);
-            let new = rows.filter(|&r| !self.outlier[r] && stands_out(r));
-            let mut new: Vec<usize> = new.collect();
+            rows.filter(|&r| !self.outlier[r] && stands_out(r))
+                .collect()
+        };
+        let mut each: Vec<Vec<usize>> = (0..self.frames.frames()).map(of_frame).collect();
+        if !self.free_attitude {
+            let most =
+                |frame: usize, new: &[usize]| 2 * new.len() > self.frames.rows_of(frame).len();
+            let most: Vec<bool> = each
+                .iter()
+                .enumerate()
+                .map(|(f, new)| most(f, new))
+                .collect();
+            let mut first = 0;
+            for run in most.chunk_by(|a, b| a == b) {
+                if run[0] && run.len() >= HAPPENED {
+                    each[first..first + run.len()].fill(Vec::new());
+                }
+                first += run.len();
+            }
+        }
+        let mut added = 0;
+        for mut new in each {
             if self.free_attitude {
                 let worst = new
                     .iter()

@@ -6,7 +6,7 @@
 
 use telemetry::report::{Report, Verdict};
 
-use crate::kit::{Case, Path, VELOCITY, closed, power, reported};
+use crate::kit::{Case, Path, VELOCITY, closed, named, power, reported};
 
 /// Closes the loop where `id` acts with `lines` (`{}`: its size) and checks what is said of `parameter`.
 fn finds(path: Path, id: &str, lines: &str, parameter: &str, size: f64) -> Report {
@@ -225,6 +225,21 @@ fn exposure_smear() {
 fn step() {
     let lines = "at_s = 211.3\nx_arcsec = {}\ny_arcsec = 0.0\nz_arcsec = 0.0";
     finds(Path::Drift, "step_misalignment", lines, "x_arcsec", 1.2);
+}
+
+/// A step of 100 arcsec, 19 sigma of a row, two thirds on: what stands out of most stars of frame after frame is no
+/// outlier. (Of 504 rows 8 sigma off none would be left to tell it by.)
+#[test]
+fn a_step_beyond_outliers() {
+    let lines = "at_s = 350.3\nx_arcsec = 100.0\ny_arcsec = -60.0\nz_arcsec = 0.0";
+    let case = Case::new(Path::Drift, 60).with("step_misalignment", lines);
+    let report = case.close().report;
+    assert_eq!(named(&report), ["step_misalignment"]);
+    let got = &report.effects[0].parameters["x_arcsec"];
+    assert!(
+        (got.value - 100.0).abs() < 4.0 * got.sigma.unwrap(),
+        "{got:?}"
+    );
 }
 
 /// A step of six and a half standard errors (x 5.3, y 3.8) in white noise is a step, not a reference that
