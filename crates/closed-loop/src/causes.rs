@@ -278,7 +278,8 @@ pub(crate) fn run<'a>(
         } = searched;
         let evidence = evidence.map(|e| e.keeping(&[]));
         let level = evidence.as_ref().unwrap_or(white);
-        let fitted = fit(level, folds, &borrowed(&found.candidates))?;
+        let all = borrowed(&found.candidates);
+        let fitted = fit(level, folds, &all)?.beside(folds, &all, &found.selection.chosen)?;
         let found = Found { fitted, ..found };
         let terms = (quest.terms)(wander.is_some());
         let described = Described::new(level, folds, &found, terms, quest.ways)?;

@@ -123,6 +123,9 @@ impl Debug for AttitudeRows<'_> {
     }
 }
 
+/// Largest misalignment that an effect has, arcsec.
+const MOST_ARCSEC: f64 = 1800.0;
+
 /// One linear coefficient of a candidate.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Coefficient {
@@ -149,6 +152,13 @@ impl Coefficient {
             lower: f64::NEG_INFINITY,
             upper: f64::INFINITY,
         }
+    }
+
+    /// The same of a misalignment, whatever is plausible up to half a degree: steps of mounts, and references in other
+    /// frames. Beyond that a rotation is no small angle.
+    #[must_use]
+    pub fn as_misalignment(self) -> Self {
+        self.at_least(-MOST_ARCSEC).at_most(MOST_ARCSEC)
     }
 
     /// The same, not below `lower`.

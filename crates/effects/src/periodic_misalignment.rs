@@ -128,7 +128,7 @@ impl Bending for Line {
     }
     fn coefficients(&self) -> Vec<Coefficient> {
         NAMES
-            .map(|name| Coefficient::new(name, "arcsec", 5.0))
+            .map(|name| Coefficient::new(name, "arcsec", 5.0).as_misalignment())
             .into()
     }
     fn functions(&self) -> usize {

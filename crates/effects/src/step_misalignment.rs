@@ -94,7 +94,7 @@ impl Bending for Step {
     }
     fn coefficients(&self) -> Vec<Coefficient> {
         ["x_arcsec", "y_arcsec", "z_arcsec"]
-            .map(|n| Coefficient::new(n, "arcsec", 10.0))
+            .map(|n| Coefficient::new(n, "arcsec", 10.0).as_misalignment())
             .into()
     }
     fn functions(&self) -> usize {

@@ -212,7 +212,7 @@ impl Bending for HeaterCycle {
     }
     fn coefficients(&self) -> Vec<Coefficient> {
         AMPLITUDE
-            .map(|name| Coefficient::new(name, "arcsec", PLAUSIBLE_ARCSEC))
+            .map(|name| Coefficient::new(name, "arcsec", PLAUSIBLE_ARCSEC).as_misalignment())
             .into()
     }
     fn functions(&self) -> usize {

@@ -111,8 +111,10 @@ impl Described {
         all.extend(terms.iter().map(|t| t as &dyn Candidate));
         // products of hundreds of columns a block: in long runs, of fewer blocks
         let coarse = evidence.coarser(folds);
-        let fitted = fit(evidence, coarse.as_ref().unwrap_or(folds), &all)?;
+        let folds = coarse.as_ref().unwrap_or(folds);
         let n = chosen.len();
+        let first: Vec<usize> = (0..n).collect();
+        let fitted = fit(evidence, folds, &all)?.beside(folds, &all, &first)?;
         let names = only.candidates.iter().map(|c| c.id()).collect();
         let turns = only.candidates.iter().map(|c| c.acts_on_attitude());
         let turns = turns.collect();

@@ -57,7 +57,10 @@ pub(crate) fn noise_follows(
     let data = level.data;
     let mut declared = declared_variance(situation, data)?;
     let rate = squared_rates(data);
+    // a rate adds to the level that there is, whatever is declared
+    let level = claimed.level.unwrap_or(1.0);
     for (v, rate) in declared.iter_mut().zip(&rate) {
+        *v *= level;
         let more = claimed.rate.powi(2) * rate;
         if more.is_finite() {
             *v += more;

@@ -14,8 +14,10 @@ use crate::star::data::StarData;
 /// A star with fewer rows has no scatter of its own: the median deviation of so many
 /// is uncertain by a quarter.
 const FEW_ROWS: usize = 10;
-/// Frames in a row of which most rows stand out that are no outliers: something turned the camera, or the reference.
-const HAPPENED: usize = 8;
+/// Frames in a row, and part of their rows: where more stand out than that they are no outliers. Something turned the
+/// camera, or the reference.
+const TOGETHER: usize = 16;
+const HAPPENED: usize = 3;
 
 impl StarData {
     /// Rows that are no outliers.
@@ -29,8 +31,8 @@ impl StarData {
     /// A row is held against the rows of its star, or of all stars that have too few for
     /// a scatter of their own (snapshots of the sky hardly see a star twice). Where a
     /// frame's attitude comes from its own stars, one that was mistaken for another pulls
-    /// all others off as well: of such a frame only the worst goes at a time. Where most rows of many frames in a row
-    /// stand out, none does.
+    /// all others off as well: of such a frame only the worst goes at a time. Where a third of the rows of frame after
+    /// frame stands out, none does.
     pub(crate) fn mark_outliers(&mut self, residuals: &[&[Vec<f64>]]) -> usize {
         let mut rows = vec![0_usize; self.stars.len()];
         for &s in &self.star {
@@ -58,19 +60,24 @@ impl StarData {
         };
         let mut each: Vec<Vec<usize>> = (0..self.frames.frames()).map(of_frame).collect();
         if !self.free_attitude {
-            let most =
-                |frame: usize, new: &[usize]| 2 * new.len() > self.frames.rows_of(frame).len();
-            let most: Vec<bool> = each
-                .iter()
-                .enumerate()
-                .map(|(f, new)| most(f, new))
+            let rows = |f: usize| self.frames.rows_of(f).len();
+            // new rows and all rows up to a frame
+            let sums: Vec<[usize; 2]> = (0..each.len())
+                .scan([0; 2], |[new, all], f| {
+                    (*new, *all) = (*new + each[f].len(), *all + rows(f));
+                    Some([*new, *all])
+                })
                 .collect();
-            let mut first = 0;
-            for run in most.chunk_by(|a, b| a == b) {
-                if run[0] && run.len() >= HAPPENED {
-                    each[first..first + run.len()].fill(Vec::new());
-                }
-                first += run.len();
+            let happened: Vec<bool> = (0..each.len())
+                .map(|f| {
+                    let last = (f + TOGETHER).min(each.len()) - 1;
+                    let before = if f == 0 { [0; 2] } else { sums[f - 1] };
+                    let [new, all] = [0, 1].map(|k| sums[last][k] - before[k]);
+                    last + 1 - f == TOGETHER && HAPPENED * new > all
+                })
+                .collect();
+            for first in (0..each.len()).filter(|&f| happened[f]) {
+                each[first..first + TOGETHER].fill(Vec::new());
             }
         }
         let mut added = 0;
