@@ -43,6 +43,7 @@ mod outcome;
 mod questions;
 mod search;
 mod situation;
+mod standing_out;
 mod star;
 mod unexplained;
 

@@ -32,6 +32,7 @@ use crate::search::refusal::{Refusal, Refused};
 use crate::search::selection::columns_of;
 use crate::search::{Found, amplitudes, borrowed, fit};
 use crate::situation::{Situation, channels_of_interest};
+use crate::standing_out::happened;
 use crate::unexplained::leftover::{self, Series};
 use nalgebra::{DVector, UnitQuaternion};
 use spectra::robust::{self, median_step};
@@ -227,11 +228,19 @@ fn settle(
         let amplitudes = amplitudes(&fitted, folds, &[], 0).ok_or(CloseError::Singular)?;
         let before = evidence.residuals(folds, &[], &amplitudes);
         let group = vec![0; data.t_s.len()];
-        let added: usize = (0..3)
-            .map(|axis| {
-                robust::mark_outliers(&before.axes[axis], &group, 1, &mut data.outlier[axis])
-            })
-            .sum();
+        let mut added = 0;
+        for axis in 0..3 {
+            let mut marked = data.outlier[axis].clone();
+            robust::mark_outliers(&before.axes[axis], &group, 1, &mut marked);
+            let out: Vec<usize> = marked.iter().map(|m| usize::from(*m)).collect();
+            let happened = happened(&out, &vec![1; out.len()]);
+            for (k, old) in data.outlier[axis].iter_mut().enumerate() {
+                if marked[k] && !*old && !happened[k] {
+                    *old = true;
+                    added += 1;
+                }
+            }
+        }
         if added == 0 {
             return Ok(before);
         }

@@ -9,15 +9,12 @@
 use rayon::prelude::*;
 use spectra::robust;
 
+use crate::standing_out::happened;
 use crate::star::data::StarData;
 
 /// A star with fewer rows has no scatter of its own: the median deviation of so many
 /// is uncertain by a quarter.
 const FEW_ROWS: usize = 10;
-/// Frames in a row, and part of their rows: where more stand out than that they are no outliers. Something turned the
-/// camera, or the reference.
-const TOGETHER: usize = 16;
-const HAPPENED: usize = 3;
 
 impl StarData {
     /// Rows that are no outliers.
@@ -60,24 +57,16 @@ impl StarData {
         };
         let mut each: Vec<Vec<usize>> = (0..self.frames.frames()).map(of_frame).collect();
         if !self.free_attitude {
-            let rows = |f: usize| self.frames.rows_of(f).len();
-            // new rows and all rows up to a frame
-            let sums: Vec<[usize; 2]> = (0..each.len())
-                .scan([0; 2], |[new, all], f| {
-                    (*new, *all) = (*new + each[f].len(), *all + rows(f));
-                    Some([*new, *all])
-                })
+            let rows = |f: usize| self.frames.rows_of(f);
+            let old = |f: usize| rows(f).filter(|&r| self.outlier[r]).count();
+            let out: Vec<usize> = (each.iter().zip(0..))
+                .map(|(new, f)| new.len() + old(f))
                 .collect();
-            let happened: Vec<bool> = (0..each.len())
-                .map(|f| {
-                    let last = (f + TOGETHER).min(each.len()) - 1;
-                    let before = if f == 0 { [0; 2] } else { sums[f - 1] };
-                    let [new, all] = [0, 1].map(|k| sums[last][k] - before[k]);
-                    last + 1 - f == TOGETHER && HAPPENED * new > all
-                })
-                .collect();
-            for first in (0..each.len()).filter(|&f| happened[f]) {
-                each[first..first + TOGETHER].fill(Vec::new());
+            let all: Vec<usize> = (0..each.len()).map(|f| rows(f).len()).collect();
+            for (new, happened) in each.iter_mut().zip(happened(&out, &all)) {
+                if happened {
+                    new.clear();
+                }
             }
         }
         let mut added = 0;

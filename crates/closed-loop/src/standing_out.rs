@@ -1,0 +1,47 @@
+//! What stands out of sample after sample is no outlier: something turned the camera, or the reference.
+//!
+//! Not physics: bookkeeping of rows.
+
+/// Samples in a row, and part of their rows: where more than that stands out something happened.
+const TOGETHER: usize = 16;
+const PART: usize = 3;
+
+/// Of each sample whether it lies among so many of which too large a part stands out; `out` of `all` of its rows do.
+pub(crate) fn happened(out: &[usize], all: &[usize]) -> Vec<bool> {
+    let mut happened = vec![false; out.len()];
+    let starts = out.windows(TOGETHER).zip(all.windows(TOGETHER)).enumerate();
+    for (first, (out, all)) in starts {
+        let (out, all): (usize, usize) = (out.iter().sum(), all.iter().sum());
+        if PART * out > all {
+            happened[first..first + TOGETHER].fill(true);
+        }
+    }
+    happened
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of 100 samples of four rows all stand out from the sixtieth on, and one row of every third before: only what
+    /// stands out throughout has happened, and what lies within 16 samples of it.
+    #[test]
+    fn what_stands_out_throughout_has_happened() {
+        let out: Vec<usize> = (0..100)
+            .map(|k| if k < 60 { usize::from(k % 3 == 0) } else { 4 })
+            .collect();
+        let happened = happened(&out, &[4; 100]);
+        assert!(happened[60..].iter().all(|h| *h));
+        assert!(happened[..44].iter().all(|h| !*h));
+    }
+
+    /// A burst of five samples is none of sixteen, and a run of fewer samples than that is not judged.
+    #[test]
+    fn a_burst_is_outliers() {
+        let out: Vec<usize> = (0..40)
+            .map(|k| usize::from((20..25).contains(&k)))
+            .collect();
+        assert!(happened(&out, &[1; 40]).iter().all(|h| !*h));
+        assert_eq!(happened(&[1; 9], &[1; 9]), [false; 9]);
+    }
+}
