@@ -2,6 +2,8 @@
 //!
 //! Not physics: bookkeeping of rows.
 
+use spectra::robust;
+
 /// Samples in a row, and part of their rows: where more than that stands out something happened.
 const TOGETHER: usize = 16;
 const PART: usize = 3;
@@ -17,6 +19,22 @@ pub(crate) fn happened(out: &[usize], all: &[usize]) -> Vec<bool> {
         }
     }
     happened
+}
+
+/// Marks the values of a series that stand out, but where something happened; returns how many.
+pub(crate) fn mark(value: &[f64], marked: &mut [bool]) -> usize {
+    let mut out = marked.to_vec();
+    robust::mark_outliers(value, &vec![0; value.len()], 1, &mut out);
+    let count: Vec<usize> = out.iter().map(|o| usize::from(*o)).collect();
+    let happened = happened(&count, &vec![1; count.len()]);
+    let mut added = 0;
+    for (k, marked) in marked.iter_mut().enumerate() {
+        if out[k] && !*marked && !happened[k] {
+            *marked = true;
+            added += 1;
+        }
+    }
+    added
 }
 
 #[cfg(test)]

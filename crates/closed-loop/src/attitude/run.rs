@@ -32,10 +32,10 @@ use crate::search::refusal::{Refusal, Refused};
 use crate::search::selection::columns_of;
 use crate::search::{Found, amplitudes, borrowed, fit};
 use crate::situation::{Situation, channels_of_interest};
-use crate::standing_out::happened;
+use crate::standing_out::mark;
 use crate::unexplained::leftover::{self, Series};
 use nalgebra::{DVector, UnitQuaternion};
-use spectra::robust::{self, median_step};
+use spectra::robust::median_step;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use telemetry::AttitudeResiduals;
 use telemetry::report::{Dependence, Errors, Report, Rows, Unattributed};
@@ -227,20 +227,8 @@ fn settle(
         let fitted = fit(&evidence, &data.bins.folds, &[])?;
         let amplitudes = amplitudes(&fitted, folds, &[], 0).ok_or(CloseError::Singular)?;
         let before = evidence.residuals(folds, &[], &amplitudes);
-        let group = vec![0; data.t_s.len()];
-        let mut added = 0;
-        for axis in 0..3 {
-            let mut marked = data.outlier[axis].clone();
-            robust::mark_outliers(&before.axes[axis], &group, 1, &mut marked);
-            let out: Vec<usize> = marked.iter().map(|m| usize::from(*m)).collect();
-            let happened = happened(&out, &vec![1; out.len()]);
-            for (k, old) in data.outlier[axis].iter_mut().enumerate() {
-                if marked[k] && !*old && !happened[k] {
-                    *old = true;
-                    added += 1;
-                }
-            }
-        }
+        let each = before.axes.iter().zip(&mut data.outlier);
+        let added: usize = each.map(|(axis, outlier)| mark(axis, outlier)).sum();
         if added == 0 {
             return Ok(before);
         }

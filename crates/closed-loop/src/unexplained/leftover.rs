@@ -18,11 +18,11 @@ use block_regression::Folds;
 use coloured_noise::Coloured;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3, Vector4};
 use rayon::prelude::*;
-use spectra::robust;
 use spectra::robust::median_step;
 
 use crate::attitude::spatial_errors::SpatialErrors;
 use crate::bins::{self, Bins};
+use crate::standing_out::mark;
 use crate::star::data::StarData;
 use crate::star::frame_rotation::rotation_row;
 use crate::unexplained::SEARCH_ALPHA;
@@ -239,7 +239,7 @@ impl Track {
         let folds = Folds::whole(self.t_s.len());
         let size = self.t_s.len().div_ceil(MOST_POINTS).max(1);
         let mut spike: Vec<bool> = self.weight.iter().map(|w| *w <= 0.0).collect();
-        robust::mark_outliers(&self.value, &vec![0; spike.len()], 1, &mut spike);
+        mark(&self.value, &mut spike);
         let mut rows: Vec<std::ops::Range<usize>> = Vec::new();
         if size == 1 {
             rows.extend((0..self.t_s.len()).map(|k| k..k + 1));
