@@ -7,6 +7,8 @@ use spectra::robust;
 /// Samples in a row, and part of their rows: where more than that stands out something happened.
 const TOGETHER: usize = 16;
 const PART: usize = 3;
+/// Part of all rows from which what happened matters: a tracker loses its stars for a minute now and then.
+const LASTS: usize = 20;
 
 /// Of each sample whether it lies among so many of which too large a part stands out; `out` of `all` of its rows do.
 pub(crate) fn happened(out: &[usize], all: &[usize]) -> Vec<bool> {
@@ -17,6 +19,11 @@ pub(crate) fn happened(out: &[usize], all: &[usize]) -> Vec<bool> {
         if PART * out > all {
             happened[first..first + TOGETHER].fill(true);
         }
+    }
+    let there = out.iter().zip(&happened).filter(|(_, happened)| **happened);
+    let there: usize = there.map(|(out, _)| out).sum();
+    if LASTS * there < all.iter().sum() {
+        happened.fill(false);
     }
     happened
 }
@@ -51,6 +58,15 @@ mod tests {
         let happened = happened(&out, &[4; 100]);
         assert!(happened[60..].iter().all(|h| *h));
         assert!(happened[..44].iter().all(|h| !*h));
+    }
+
+    /// Twenty samples of a thousand are lost: outliers, however many follow one another.
+    #[test]
+    fn what_does_not_last_is_outliers() {
+        let out: Vec<usize> = (0..1000)
+            .map(|k| usize::from((500..520).contains(&k)))
+            .collect();
+        assert!(happened(&out, &[1; 1000]).iter().all(|h| !*h));
     }
 
     /// A burst of five samples is none of sixteen, and a run of fewer samples than that is not judged.
