@@ -6,8 +6,8 @@
 //!
 //! over the rows near a pixel of middle H: what one coefficient would gain, in units of the noise. What is
 //! constant for a star may be the catalogue's or the lens', so that z is also taken with the mean of c and
-//! r over each star's own rows there taken off, and the larger counts. Where there is nothing but constants, of
-//! stars at rest, a pixel is not proposed. A warm pixel pulls toward itself: z is positive. The best are proposed, and stand for all that were looked at.
+//! r over each star's own rows there taken off, and the larger counts. A warm pixel pulls toward itself:
+//! z is positive. The best are proposed, and stand for all that were looked at.
 //!
 //! Source: the score of a linear coefficient at zero (Rao 1948).
 
@@ -24,9 +24,6 @@ const MOST_PIXELS: usize = 48;
 /// Rows within half-width of a pixel with which it is worth looking at: with fewer, the pixels of a slew are
 /// so many that all effects pay for them.
 const LEAST_ROWS: u32 = 8;
-/// Share of the square of a pull that is not the same all the time, below which it is a constant of a star at rest,
-/// and as such its catalogue's.
-const AT_REST: f64 = 0.05;
 /// Pixels within whose half-width a star may be: its own and those around.
 const NEAR: [[i64; 2]; 9] = [
     [-1, -1],
@@ -115,13 +112,11 @@ impl WarmPixels {
             whole[*p][0].join(own);
             whole[*p][1].join(&own.centred());
         }
-        let moves = |[plain, centred]: &[Sums; 2]| centred.cc > AT_REST * plain.cc;
         let mut ranked: Vec<(f64, usize)> = whole
             .iter()
+            .map(|both| both.each_ref().map(Sums::score))
+            .map(|[plain, centred]| plain.max(centred))
             .zip(0..)
-            .filter(|(both, _)| moves(both))
-            .map(|(both, k)| (both.each_ref().map(Sums::score), k))
-            .map(|([plain, centred], k)| (plain.max(centred), k))
             .collect();
         // ties go to the longer visit, then to the lower coordinates
         ranked.sort_by(|a, b| {
@@ -135,7 +130,7 @@ impl WarmPixels {
                 .take(MOST_PIXELS)
                 .map(|(_, k)| middle_of(camera, pixels[*k].0))
                 .collect(),
-            looked_at: ranked.len(),
+            looked_at: pixels.len(),
         }
     }
 }
@@ -313,38 +308,6 @@ mod tests {
         assert_eq!(found.middles[0], WARM, "{:?}", &found.middles[..4]);
         // a pixel that pushes is none
         assert!(!pushed.middles[..8].contains(&WARM));
-    }
-
-    /// Stars that move by a fiftieth of a pixel have a constant pull, which is no warm pixel's.
-    #[test]
-    fn a_constant_of_a_star_at_rest_is_no_warm_pixel() {
-        let camera = Camera::from_fov_deg([1024, 1024], [20.0, 20.0]).unwrap();
-        let n = 400;
-        let x: Vec<f64> = (0..n).map(|k| 30.0 + 0.02 * f64::from(k % 2)).collect();
-        let (y, none, slot) = (vec![21.9; 400], vec![0.0; 400], vec![0; 400]);
-        let (star, one) = (vec![7; 400], vec![1.0; 400]);
-        let rows = StarRows {
-            t_s: &none,
-            x_px: &x,
-            y_px: &y,
-            landed_px: [&x, &y],
-            landed_variance_px2: [&none, &none],
-            vx_px_s: &none,
-            vy_px_s: &none,
-            ax_px_s2: &none,
-            ay_px_s2: &none,
-            mag: &none,
-            bv: &none,
-            log_flux: &none,
-            window_px: [&none, &none],
-            slot: &slot,
-            star_id: &star,
-            waves: None,
-            attitude: None,
-        };
-        let left = [vec![0.05; 400], vec![-0.04; 400]];
-        let found = WarmPixels::look(&camera, &rows, [&left[0], &left[1]], &one);
-        assert_eq!(found, WarmPixels::default());
     }
 
     /// Four rows fall in each pixel, twelve within its half-width: enough for a pull of 0.06 of up to 1.5 px,
