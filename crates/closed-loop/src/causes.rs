@@ -28,7 +28,7 @@ use crate::search::empirical::Empirical;
 use crate::search::misplaced::{MISPLACED, piled};
 use crate::search::refusal::{Refusal, Refused};
 use crate::search::selection::{columns_of, costs};
-use crate::search::{Found, borrowed, family, first_column, fit, joined};
+use crate::search::{Found, borrowed, family, first_column, fit_beside, joined};
 use crate::star::evidence::StarEvidence;
 use crate::star::landing::Elsewhere;
 use crate::star::search::{Searched, attempt, declared_noise};
@@ -279,7 +279,7 @@ pub(crate) fn run<'a>(
         let evidence = evidence.map(|e| e.keeping(&[]));
         let level = evidence.as_ref().unwrap_or(white);
         let all = borrowed(&found.candidates);
-        let fitted = fit(level, folds, &all)?.beside(folds, &all, &found.selection.chosen)?;
+        let fitted = fit_beside(level, folds, &all, &found.selection.chosen)?;
         let found = Found { fitted, ..found };
         let terms = (quest.terms)(wander.is_some());
         let described = Described::new(level, folds, &found, terms, quest.ways)?;
@@ -431,12 +431,15 @@ fn worse(
     found: &Found,
 ) -> Result<Vec<String>, CloseError> {
     let chosen = &found.selection.chosen;
+    if chosen.is_empty() {
+        return Ok(Vec::new());
+    }
     let power = |set: &[usize]| -> Result<f64, CloseError> {
         let left = found.left_out_of_fold(level, folds, set)?;
         Ok(figures::star_power(&left, level.data))
     };
     let all = power(chosen)?;
-    if chosen.is_empty() || all < WORSE * power(&[])? {
+    if all < WORSE * power(&[])? {
         return Ok(Vec::new());
     }
     let mut families = Vec::new();

@@ -138,6 +138,16 @@ pub(crate) fn fit(
     )
 }
 
+/// As [`fit`], with priors weighed against the noise beside `chosen` ([`Fitted::beside`]).
+pub(crate) fn fit_beside(
+    evidence: &dyn Evidence,
+    folds: &Folds,
+    candidates: &[&dyn Candidate],
+    chosen: &[usize],
+) -> Result<Fitted, CloseError> {
+    fit(evidence, folds, candidates)?.beside(folds, candidates, chosen)
+}
+
 /// As [`fit`], on columns that are there already.
 pub(crate) fn fit_design(
     evidence: &dyn Evidence,
@@ -257,9 +267,8 @@ impl Found {
     ) -> Result<Self, CloseError> {
         let chosen = self.selection.chosen.iter();
         let candidates: Vec<_> = chosen.map(|&g| Arc::clone(&self.candidates[g])).collect();
-        let all = borrowed(&candidates);
         let chosen: Vec<usize> = (0..candidates.len()).collect();
-        let fitted = fit(evidence, folds, &all)?.beside(folds, &all, &chosen)?;
+        let fitted = fit_beside(evidence, folds, &borrowed(&candidates), &chosen)?;
         let selection = Selection {
             chosen,
             judged: Vec::new(),
@@ -402,8 +411,7 @@ pub(crate) fn joined(
     if chosen.len() == found.selection.chosen.len() {
         return Ok(found);
     }
-    let all = borrowed(&candidates);
-    let fitted = fit(evidence, folds, &all)?.beside(folds, &all, &chosen)?;
+    let fitted = fit_beside(evidence, folds, &borrowed(&candidates), &chosen)?;
     let cost = costs(&fitted.groups, may);
     let judged = fitted.trials(&cost).judged(&chosen);
     Ok(Found {
@@ -506,23 +514,23 @@ fn scan(
             fitted.fits.variance(&columns_of(&fitted.groups, &set))
         };
         let each: Vec<Option<f64>> = (0..variants).map(with).collect();
-        let known = each.iter().enumerate();
-        let best = known
-            .filter_map(|(v, variance)| Some((v, (*variance)?)))
+        let best = (0..variants)
+            .filter_map(|v| Some((v, each[v]?)))
             .min_by(|a, b| a.1.total_cmp(&b.1));
         let Some((v, least)) = best else {
             return Ok(());
         };
-        // twice what the nearer of the neighbours loses in log-likelihood
+        // twice what a neighbour loses in log-likelihood: the nearer one decides
         let lost = [v.checked_sub(1), Some(v + 1)]
             .into_iter()
             .flatten()
             .filter_map(|n| *each.get(n)?)
             .map(|variance| fitted.scalars * (variance / least).ln())
-            .fold(f64::INFINITY, f64::min);
+            .filter(|lost| lost.is_finite())
+            .min_by(f64::total_cmp);
         candidates[g] = trial.swap_remove(v);
         step *= 0.3;
-        if round >= SCAN_ROUNDS && !(lost > FINE && lost.is_finite()) {
+        if round >= SCAN_ROUNDS && lost.is_none_or(|lost| lost <= FINE) {
             break;
         }
     }

@@ -47,6 +47,12 @@ pub(crate) fn mark(value: &[f64], marked: &mut [bool]) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::ops::Range;
+
+    /// So many samples of one row, of which these stand out.
+    fn lost(these: Range<usize>, of: usize) -> Vec<usize> {
+        (0..of).map(|k| usize::from(these.contains(&k))).collect()
+    }
 
     /// Of 100 samples of four rows all stand out from the sixtieth on, and one row of every third before: only what
     /// stands out throughout has happened, and what lies within 16 samples of it.
@@ -63,19 +69,17 @@ mod tests {
     /// Twenty samples of a thousand are lost: outliers, however many follow one another.
     #[test]
     fn what_does_not_last_is_outliers() {
-        let out: Vec<usize> = (0..1000)
-            .map(|k| usize::from((500..520).contains(&k)))
-            .collect();
-        assert!(happened(&out, &[1; 1000]).iter().all(|h| !*h));
+        assert!(
+            happened(&lost(500..520, 1000), &[1; 1000])
+                .iter()
+                .all(|h| !*h)
+        );
     }
 
     /// A burst of five samples is none of sixteen, and a run of fewer samples than that is not judged.
     #[test]
     fn a_burst_is_outliers() {
-        let out: Vec<usize> = (0..40)
-            .map(|k| usize::from((20..25).contains(&k)))
-            .collect();
-        assert!(happened(&out, &[1; 40]).iter().all(|h| !*h));
+        assert!(happened(&lost(20..25, 40), &[1; 40]).iter().all(|h| !*h));
         assert_eq!(happened(&[1; 9], &[1; 9]), [false; 9]);
     }
 }

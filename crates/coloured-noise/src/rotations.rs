@@ -10,9 +10,10 @@
 //!
 //! ```text
 //! white^2 = mean ( (y_k+1 - y_k)^2 - sigma^2 (1/n_k + 1/n_k+1) ) / 2       n'_k = sigma^2 / (sigma^2 / n_k + white^2)
-//!
-//! weighed by the inverse square of what a change is expected to be: three stars in a row tell next to nothing
 //! ```
+//!
+//! The mean is weighed by the inverse square of what a change is expected to be: three stars in a row tell next to
+//! nothing.
 //!
 //! Source: maximum likelihood; moments of differences of white noise.
 
@@ -298,8 +299,8 @@ fn beside_white(centroid: f64, y: &[f64], count: &[f64], frames: &[usize]) -> Op
             [(y[k] - y[k - 1]).powi(2), known, share(k) + share(k - 1)]
         })
         .collect();
-    let mut white = 0.0;
-    for round in 0..ROUNDS {
+    // weighed as if the reference had this white variance
+    let beyond = |white: f64| {
         let (mut excess, mut parts, mut chance) = (0.0, 0.0, 0.0_f64);
         for [square, known, part] in &pairs {
             let law = known + part * white;
@@ -309,9 +310,15 @@ fn beside_white(centroid: f64, y: &[f64], count: &[f64], frames: &[usize]) -> Op
             // squares of neighbouring changes share a half of each
             chance += 3.0 * (weight * law).powi(2);
         }
-        if round == 0 && excess <= BEYOND_CHANCE * chance.sqrt() {
-            return None;
-        }
+        (excess, parts, chance)
+    };
+    let (excess, parts, chance) = beyond(0.0);
+    if excess <= BEYOND_CHANCE * chance.sqrt() {
+        return None;
+    }
+    let mut white = excess / parts;
+    for _ in 1..ROUNDS {
+        let (excess, parts, _) = beyond(white);
         white = (excess / parts).max(0.0);
     }
     let worth = |k: usize| {

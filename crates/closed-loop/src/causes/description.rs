@@ -19,7 +19,7 @@ use crate::figures::{self, Followed};
 use crate::gaps::longest_step;
 use crate::search::empirical::{Empirical, Variable, flux_of, range};
 use crate::search::selection::{FAMILY_ALPHA, Group, Judgement, columns_of, costs, each};
-use crate::search::{Fitted, Found, borrowed, fit};
+use crate::search::{Fitted, Found, borrowed, fit, fit_beside};
 use crate::situation::Situation;
 use crate::situation::channels_of_interest;
 use crate::star::columns::star_columns_of;
@@ -113,8 +113,8 @@ impl Described {
         let coarse = evidence.coarser(folds);
         let folds = coarse.as_ref().unwrap_or(folds);
         let n = chosen.len();
-        let first: Vec<usize> = (0..n).collect();
-        let fitted = fit(evidence, folds, &all)?.beside(folds, &all, &first)?;
+        let own: Vec<usize> = (0..n).collect();
+        let fitted = fit_beside(evidence, folds, &all, &own)?;
         let names = only.candidates.iter().map(|c| c.id()).collect();
         let turns = only.candidates.iter().map(|c| c.acts_on_attitude());
         let turns = turns.collect();
@@ -162,7 +162,7 @@ impl Described {
             .collect();
         Ok(Self {
             fitted,
-            chosen: (0..n).collect(),
+            chosen: own,
             terms,
             changes,
             names,

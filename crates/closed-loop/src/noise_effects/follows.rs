@@ -58,9 +58,9 @@ pub(crate) fn noise_follows(
     let mut declared = declared_variance(situation, data)?;
     let rate = squared_rates(data);
     // a rate adds to the level that there is, whatever is declared
-    let level = claimed.level.unwrap_or(1.0);
+    let there = claimed.level.unwrap_or(1.0);
     for (v, rate) in declared.iter_mut().zip(&rate) {
-        *v *= level;
+        *v *= there;
         let more = claimed.rate.powi(2) * rate;
         if more.is_finite() {
             *v += more;

@@ -426,15 +426,13 @@ impl Trials<'_> {
     /// Standing of a group with this `gain` beside `others`, and its p-value if the noise were white; `None` if it
     /// cannot be told from them.
     fn standing(&self, others: &[usize], g: usize, gain: f64) -> Option<(Judgement, f64)> {
-        let (set, which) = self.beside(others, g)?;
-        let which: Vec<usize> = which.collect();
+        let (set, own) = self.beside(others, g)?;
+        let which: Vec<usize> = own.clone().collect();
         let estimate = self.fits.estimate(&set)?;
-        let bounds = self.groups[g].bounds.iter().zip(&which);
+        let group = &self.groups[g];
         let judgement = Judgement {
             delta_loglik: gain,
-            credible: bounds
-                .into_iter()
-                .all(|([low, high], &i)| (*low..=*high).contains(&estimate.value[i])),
+            credible: group.believes(&group.columns, &estimate.value.as_slice()[own]),
             p_value: (estimate.p_value(&which) * self.cost[g]).min(1.0),
             observable: true,
         };

@@ -71,10 +71,6 @@ impl Finish<'_> {
         Ok(noise_effects::in_sample(&beside, &found))
     }
 
-    fn power(&self, residual: &Residuals) -> f64 {
-        figures::star_power(residual, self.data)
-    }
-
     /// `model` is the declared one, or that with what was added.
     fn errors(
         &self,
@@ -113,13 +109,14 @@ pub(crate) fn finish(
     inside: Option<(Vec<Vec<f64>>, Series)>,
 ) -> Result<Closed, CloseError> {
     let chosen = &f.found.selection.chosen;
-    let whole = f.power(&f.settled.before);
+    let power = |residual: &Residuals| figures::star_power(residual, f.data);
+    let whole = power(&f.settled.before);
     let mut explained = Vec::new();
     let power_of = |first: usize| -> Result<f64, CloseError> {
         if first == chosen.len() {
-            return Ok(f.power(&plain));
+            return Ok(power(&plain));
         }
-        Ok(f.power(&f.residuals(&chosen[..first])?))
+        Ok(power(&f.residuals(&chosen[..first])?))
     };
     let mut last = power_of(0)?;
     for k in 1..=chosen.len() {
@@ -139,7 +136,7 @@ pub(crate) fn finish(
     {
         added.push(g);
         let with_term = f.residuals(&added)?;
-        explained.push((last - f.power(&with_term)) / whole);
+        explained.push((last - power(&with_term)) / whole);
         after = Some(with_term);
     }
     let (mut effects, mut entries) =

@@ -69,10 +69,10 @@ impl Elsewhere {
         phase: &OnCentroids,
     ) -> Result<Option<Box<Self>>, CloseError> {
         let [light] = modelled(level, folds, found, [|c: &dyn Candidate| c.moves_light()])?;
-        let chosen = &found.selection.chosen;
-        let variance = found.fitted.variance_beside(chosen);
-        let known = variance.map(|variance| (level.weight.as_slice(), variance));
-        if !level.data.lands_elsewhere(&light, phase, known) {
+        let data = level.data;
+        let variance = found.fitted.variance_beside(&found.selection.chosen);
+        let along = |v: f64| data.is_shifted_along(&light, phase, &level.weight, v);
+        if !(data.lands_elsewhere(&light) || variance.is_some_and(along)) {
             return Ok(None);
         }
         Ok(Some(Box::new(Self {
@@ -212,38 +212,42 @@ impl StarData {
     }
 
     /// Whether `shift_arcsec`, with the effects that were found, takes the light off from where it was
-    /// taken to fall by enough for its pixel phase to be another one, or by enough for the declared centroid error to
-    /// shift stars along, where rows are `known` by their weight and the variance of one of weight 1, arcsec^2.
-    pub(crate) fn lands_elsewhere(
+    /// taken to fall by enough for its pixel phase to be another one.
+    pub(crate) fn lands_elsewhere(&self, shift_arcsec: &[Vec<f64>]) -> bool {
+        let at = self.light.beside(&self.shifted(shift_arcsec));
+        let known = self.landed();
+        let (mut squares, mut count) = (0.0, 0.0);
+        for row in (0..self.t_s.len()).filter(|&r| !self.outlier[r]) {
+            for axis in 0..2 {
+                squares += (at[axis][row] - known[axis][row]).powi(2);
+            }
+            count += 2.0;
+        }
+        squares > ELSEWHERE_PX * ELSEWHERE_PX * count
+    }
+
+    /// Whether the declared centroid error shifts stars along with that by enough to matter, for rows of this `weight`
+    /// and, at weight 1, this `variance`, arcsec^2: star by star, for as one moves on through the phases that is nothing.
+    fn is_shifted_along(
         &self,
         shift_arcsec: &[Vec<f64>],
         phase: &OnCentroids,
-        known: Option<(&[f64], f64)>,
+        weight: &[f64],
+        variance: f64,
     ) -> bool {
         let at = self.light.beside(&self.shifted(shift_arcsec));
-        let off = |axis: usize, row: usize| at[axis][row] - self.landed()[axis][row];
-        let rows = || (0..self.t_s.len()).filter(|&r| !self.outlier[r]);
-        let squares: f64 = (0..2)
-            .map(|axis| rows().map(|r| off(axis, r).powi(2)).sum::<f64>())
-            .sum();
-        let count = 2.0 * rows().count() as f64;
-        if squares > ELSEWHERE_PX * ELSEWHERE_PX * count {
-            return true;
-        }
-        let Some((weight, variance)) = known else {
-            return false;
-        };
-        // what of the change goes with the shift, star by star: as stars move on through the phases that is nothing
-        let change = self.centroid_error_px(&at, phase);
+        let known = self.landed();
+        let error = self.centroid_error_px(&at, phase);
         let scale = self.camera.arcsec_per_px();
         let mut along = 0.0;
         for axis in 0..2 {
             let mut sums = vec![[0.0; 2]; self.stars.len()];
-            for r in rows() {
-                let (off, change) = (off(axis, r), change[axis][r] - self.phase_error[axis][r]);
-                let sum = &mut sums[self.star[r]];
-                sum[0] += weight[r] * off * change;
-                sum[1] += weight[r] * off * off;
+            for row in (0..self.t_s.len()).filter(|&r| !self.outlier[r]) {
+                let off = at[axis][row] - known[axis][row];
+                let change = error[axis][row] - self.phase_error[axis][row];
+                let sum = &mut sums[self.star[row]];
+                sum[0] += weight[row] * off * change;
+                sum[1] += weight[row] * off * off;
             }
             let seen = sums.iter().filter(|s| s[1] > 0.0);
             let of_stars: f64 = seen.map(|[both, own]| both * both / own).sum();

@@ -365,7 +365,7 @@ fn explain(
     let moves = || searched.found.chosen().any(|c| c.moves_light());
     if landings > 0
         && formed.is_none()
-        && (moves() || data.lands_elsewhere(&after.modelled, phase, None))
+        && (moves() || data.lands_elsewhere(&after.modelled))
         && let Some(elsewhere) = Elsewhere::of(whole.level, folds, whole.found, phase)?
     {
         return Ok(Explained::Elsewhere(elsewhere));
