@@ -202,6 +202,17 @@ impl FoldSums {
         let others = self.fold.iter().enumerate().filter(|(f, _)| *f != fold);
         sum(self.all.0.nrows(), others.map(|(_, s)| s))
     }
+
+    /// All as one block, without what the log-likelihood of the scalars lacks.
+    pub fn as_one(&self) -> BlockGrams {
+        let (gram, scalars) = &self.all;
+        BlockGrams {
+            gram: vec![Gram::whole(gram.clone())],
+            scalars: vec![*scalars],
+            log_scale: 0.0,
+            known: None,
+        }
+    }
 }
 
 fn sum<'a>(

@@ -31,7 +31,7 @@ use crate::search::selection::{columns_of, costs};
 use crate::search::{Found, borrowed, family, first_column, fit_beside, joined};
 use crate::star::evidence::StarEvidence;
 use crate::star::landing::Elsewhere;
-use crate::star::search::{Searched, attempt, declared_noise};
+use crate::star::search::{Attempt, Searched, attempt, declared_noise};
 use changing_effect::{Changing, Inner, Way};
 use commonness::Slow;
 use description::{Described, Kept, Part};
@@ -75,6 +75,8 @@ pub(crate) struct Quest<'a> {
     /// What the model declares of centroids, if the light is to be followed to where it falls before anything is
     /// described.
     pub(crate) lands: Option<&'a OnCentroids>,
+    /// The same, if it is to be followed at first sight.
+    pub(crate) sight: Option<&'a OnCentroids>,
 }
 
 /// What a quest ends with.
@@ -142,11 +144,17 @@ pub(crate) fn run<'a>(
     let mut oversize = Vec::new();
     for round in 0.. {
         let beside = white.keeping(&kept);
-        let may: Vec<bool> = (quest.candidates)()
+        let candidates = (quest.candidates)();
+        let may: Vec<bool> = candidates
             .iter()
             .map(|c| !refused.contains_key(&family(c.as_ref())))
             .collect();
-        let (mut searched, wander) = attempt(&beside, folds, quest.candidates, &may, start)?;
+        let sight = quest.sight.filter(|_| round == 0);
+        let (mut searched, wander) = match attempt(&beside, folds, candidates, &may, start, sight)?
+        {
+            Attempt::Searched(searched, wander) => (*searched, wander),
+            Attempt::Elsewhere(elsewhere) => return Ok(Outcome::Elsewhere(elsewhere)),
+        };
         let level = searched.evidence.as_ref().unwrap_or(&beside);
         searched.found = joined(level, folds, searched.found, &may)?;
         if kept.is_empty() {
@@ -185,7 +193,7 @@ pub(crate) fn run<'a>(
         }
         if let Some(phase) = quest.lands
             && searched.found.chosen().any(|c| c.moves_light())
-            && let Some(elsewhere) = Elsewhere::of(level, folds, &searched.found, phase)?
+            && let Some(elsewhere) = Elsewhere::of(level, folds, searched.found.choice(), phase)?
         {
             return Ok(Outcome::Elsewhere(elsewhere));
         }
@@ -340,7 +348,11 @@ fn suffice(
     quest: &Quest<'_>,
     may: &[bool],
 ) -> Result<bool, CloseError> {
-    let (searched, _) = attempt(level, folds, quest.candidates, may, None)?;
+    let Attempt::Searched(searched, _) =
+        attempt(level, folds, (quest.candidates)(), may, None, None)?
+    else {
+        return Ok(false);
+    };
     let described = Described::new(level, folds, &searched.found, (quest.terms)(false), &[])?;
     Ok(!described.chosen.is_empty() && stand_ins(&described).is_none())
 }

@@ -11,7 +11,7 @@
 
 use std::sync::Arc;
 
-use block_regression::{BlockGrams, Design, Fits, Folds, Layout};
+use block_regression::{BlockGrams, Design, Fits, FoldSums, Folds, Layout};
 use effects::{Candidate, Coefficient};
 use nalgebra::DVector;
 
@@ -166,17 +166,8 @@ pub(crate) fn fit_grams(
     folds: &Folds,
     candidates: &[&dyn Candidate],
 ) -> Result<Fitted, CloseError> {
-    let layout = Layout {
-        nuisance_precision: evidence.precision(),
-        relative: evidence.relative(),
-        candidates: candidates.iter().map(|c| c.coefficients().len()).sum(),
-        residuals: evidence.residual_columns(),
-    };
-    let guess = evidence.variance_guess();
     let sums = grams.by_fold(folds);
-    let variance = Fits::noise_alone(&sums, &layout, guess)
-        .unwrap_or(guess)
-        .max(f64::MIN_POSITIVE);
+    let (layout, variance) = prepared(evidence, &sums, candidates);
     let fits = Fits::of(grams, &sums, folds, &layout, variance).ok_or(CloseError::Singular)?;
     let (_, scalars) = sums.all;
     Ok(Fitted {
@@ -186,6 +177,43 @@ pub(crate) fn fit_grams(
         variance,
         log_scale: grams.log_scale,
     })
+}
+
+/// As [`fit`], for what asks nothing of folds and blocks ([`Fits::whole`]).
+pub(crate) fn fit_whole(
+    evidence: &dyn Evidence,
+    folds: &Folds,
+    candidates: &[&dyn Candidate],
+) -> Result<Fitted, CloseError> {
+    let grams = evidence.grams(folds, candidates);
+    let sums = grams.by_fold(folds);
+    let (layout, variance) = prepared(evidence, &sums, candidates);
+    let fits = Fits::whole(&sums.as_one(), &layout, variance).ok_or(CloseError::Singular)?;
+    let (_, scalars) = sums.all;
+    Ok(Fitted {
+        groups: grouped(&fits, candidates),
+        fits,
+        scalars,
+        variance,
+        log_scale: grams.log_scale,
+    })
+}
+
+/// What columns there are, and the variance that priors are weighed against.
+fn prepared(
+    evidence: &dyn Evidence,
+    sums: &FoldSums,
+    candidates: &[&dyn Candidate],
+) -> (Layout, f64) {
+    let layout = Layout {
+        nuisance_precision: evidence.precision(),
+        relative: evidence.relative(),
+        candidates: candidates.iter().map(|c| c.coefficients().len()).sum(),
+        residuals: evidence.residual_columns(),
+    };
+    let guess = evidence.variance_guess();
+    let variance = Fits::noise_alone(sums, &layout, guess).unwrap_or(guess);
+    (layout, variance.max(f64::MIN_POSITIVE))
 }
 
 /// The columns that the data shows, candidate by candidate.
@@ -252,13 +280,6 @@ impl Found {
         chosen.map(|&g| self.candidates[g].as_ref())
     }
 
-    /// The same with their places among the candidates.
-    pub(crate) fn chosen_forms(&self) -> Vec<(usize, Arc<dyn Candidate>)> {
-        let chosen = self.selection.chosen.iter();
-        let forms = chosen.map(|&g| (g, Arc::clone(&self.candidates[g])));
-        forms.collect()
-    }
-
     /// What was chosen alone, fitted to `evidence`.
     pub(crate) fn refitted(
         &self,
@@ -302,20 +323,42 @@ impl Found {
     /// Some of the candidates, and where their amplitudes stand among theirs alone:
     /// one place for each of [`columns_of`] them.
     pub(crate) fn only(&self, chosen: &[usize]) -> Only<'_> {
-        let mut only = Only {
-            candidates: Vec::new(),
-            places: Vec::new(),
-            columns: 0,
-        };
-        for &g in chosen {
-            let first = first_column(&self.candidates, g);
-            let columns = &self.fitted.groups[g].columns;
-            only.places
-                .extend(columns.iter().map(|c| only.columns + c - first));
-            only.columns += self.candidates[g].coefficients().len();
-            only.candidates.push(self.candidates[g].as_ref());
+        Only::of(&self.candidates, &self.fitted.groups, chosen)
+    }
+
+    pub(crate) fn choice(&self) -> Choice<'_> {
+        Choice {
+            candidates: &self.candidates,
+            fitted: &self.fitted,
+            chosen: &self.selection.chosen,
         }
-        only
+    }
+}
+
+/// What was chosen of some candidates, by fits of exactly these.
+#[derive(Clone, Copy)]
+pub(crate) struct Choice<'a> {
+    pub(crate) candidates: &'a [Arc<dyn Candidate>],
+    pub(crate) fitted: &'a Fitted,
+    pub(crate) chosen: &'a [usize],
+}
+
+impl<'a> Choice<'a> {
+    /// What was chosen.
+    pub(crate) fn each(&self) -> impl Iterator<Item = &'a dyn Candidate> {
+        let candidates = self.candidates;
+        self.chosen.iter().map(|&g| candidates[g].as_ref())
+    }
+
+    pub(crate) fn only(&self) -> Only<'a> {
+        Only::of(self.candidates, &self.fitted.groups, self.chosen)
+    }
+
+    /// What was chosen, with its places among the candidates.
+    pub(crate) fn forms(&self) -> Vec<(usize, Arc<dyn Candidate>)> {
+        let chosen = self.chosen.iter();
+        let forms = chosen.map(|&g| (g, Arc::clone(&self.candidates[g])));
+        forms.collect()
     }
 }
 
@@ -330,7 +373,24 @@ pub(crate) struct Only<'a> {
     columns: usize,
 }
 
-impl Only<'_> {
+impl<'a> Only<'a> {
+    fn of(candidates: &'a [Arc<dyn Candidate>], groups: &[Group], chosen: &[usize]) -> Self {
+        let mut only = Self {
+            candidates: Vec::new(),
+            places: Vec::new(),
+            columns: 0,
+        };
+        for &g in chosen {
+            let first = first_column(candidates, g);
+            let columns = &groups[g].columns;
+            only.places
+                .extend(columns.iter().map(|c| only.columns + c - first));
+            only.columns += candidates[g].coefficients().len();
+            only.candidates.push(candidates[g].as_ref());
+        }
+        only
+    }
+
     /// `beta` of the observable columns among all columns of the candidates.
     pub(crate) fn spread(&self, beta: &DVector<f64>) -> DVector<f64> {
         let mut all = DVector::zeros(self.columns);
@@ -506,7 +566,7 @@ fn scan(
                 .filter(|&&c| c != g)
                 .map(|&c| candidates[c].as_ref()),
         );
-        let fitted = fit(evidence, folds, &tried)?;
+        let fitted = fit_whole(evidence, folds, &tried)?;
         let with = |v: usize| {
             let set: Vec<usize> = std::iter::once(v)
                 .chain(variants..fitted.groups.len())

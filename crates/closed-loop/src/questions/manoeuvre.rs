@@ -46,7 +46,7 @@ const DURATIONS_S: [f64; 2] = [60.0, 300.0];
 /// Share of a one-way slew in which the rate rises, and falls.
 const RAMP: f64 = 0.2;
 /// Most frames of a manoeuvre that are worked out.
-const MOST_FRAMES: usize = 120;
+const MOST_FRAMES: usize = 60;
 /// Manoeuvres worked out at once.
 const BATCH: usize = 8;
 

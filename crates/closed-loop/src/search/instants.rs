@@ -36,7 +36,7 @@ use telemetry::report::FoundEffect;
 use crate::error::CloseError;
 use crate::evidence::Evidence;
 use crate::search::selection::{Group, columns_of};
-use crate::search::{Found, first_column, fit};
+use crate::search::{Found, first_column, fit, fit_whole};
 
 /// Parameters that are instants.
 const INSTANT: &str = "at_s";
@@ -175,7 +175,7 @@ fn instant(
     let mut list: Vec<&dyn Candidate> = variants.iter().map(|v| v.1.as_ref()).collect();
     let others = found.selection.chosen.iter().filter(|&&c| c != g);
     list.extend(others.map(|&c| found.candidates[c].as_ref()));
-    let fitted = fit(evidence, folds, &list)?;
+    let fitted = fit_whole(evidence, folds, &list)?;
     let errors: Vec<(f64, f64)> = (0..count)
         .filter_map(|v| {
             let set: Vec<usize> = std::iter::once(v).chain(count..list.len()).collect();

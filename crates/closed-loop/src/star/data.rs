@@ -25,6 +25,7 @@ use std::sync::Arc;
 use effects::{Effect, PixelWaves, StarRows};
 use focal_plane::{AttitudeSeries, AttitudeSource, Camera, Pixel, Points, PointsMut, StarFrames};
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+use rayon::prelude::*;
 use star_tracker::StarView;
 use telemetry::WindowTable;
 
@@ -41,6 +42,8 @@ const NEAR_SHARE: f64 = 1.0 / 16.0;
 const RESTS: f64 = 100.0;
 /// Frames with a smaller share of stars that stayed are unrelated.
 const SAME_SHARE: f64 = 0.1;
+/// Rows whose centroid errors one thread evaluates.
+const TOGETHER: usize = 4096;
 
 /// What is known of one star.
 #[derive(Clone, Debug)]
@@ -499,35 +502,38 @@ impl StarData {
         let rows = self.t_s.len();
         let mut error = [vec![0.0; rows], vec![0.0; rows]];
         let [x, y] = &mut error;
-        let variance = self.light.variance_px2.each_ref().map(Vec::as_slice);
-        phase
+        let own = phase
             .error
-            .scaled(self.camera.arcsec_per_px().map(|s| 1.0 / s))
-            .mean_error_into(
-                Points {
-                    x: &at[0],
-                    y: &at[1],
-                },
-                variance,
-                self.camera.pixel_centre(),
-                PointsMut { x, y },
-            );
-        if phase.has_effects() {
-            for row in 0..rows {
+            .scaled(self.camera.arcsec_per_px().map(|s| 1.0 / s));
+        let centre = self.camera.pixel_centre();
+        let parts = x.par_chunks_mut(TOGETHER).zip(y.par_chunks_mut(TOGETHER));
+        parts.enumerate().for_each(|(part, (x, y))| {
+            let first = part * TOGETHER;
+            let some = first..first + x.len();
+            let variance = self.light.variance_px2.each_ref();
+            let variance = variance.map(|v| &v[some.clone()]);
+            let [at_x, at_y] = at.each_ref().map(|at| &at[some.clone()]);
+            let out = PointsMut {
+                x: &mut *x,
+                y: &mut *y,
+            };
+            own.mean_error_into(Points { x: at_x, y: at_y }, variance, centre, out);
+            if !phase.has_effects() {
+                return;
+            }
+            for (k, row) in some.enumerate() {
                 let star = StarView {
                     at: Pixel {
-                        x: at[0][row],
-                        y: at[1][row],
+                        x: at_x[k],
+                        y: at_y[k],
                     },
                     ..self.view(row)
                 };
-                let variance = self.light.variance_px2.each_ref().map(|v| v[row]);
-                let shift = phase.effects_px(&star, variance);
-                for axis in 0..2 {
-                    error[axis][row] += shift[axis];
-                }
+                let shift = phase.effects_px(&star, variance.map(|v| v[k]));
+                x[k] += shift[0];
+                y[k] += shift[1];
             }
-        }
+        });
         error
     }
 

@@ -17,7 +17,7 @@ use rayon::prelude::*;
 use crate::declared::OnCentroids;
 use crate::error::CloseError;
 use crate::evidence::{Amplitudes, Residuals};
-use crate::search::Found;
+use crate::search::Choice;
 use crate::search::selection::columns_of;
 use crate::star::data::{Light, StarData};
 use crate::star::evidence::StarEvidence;
@@ -42,9 +42,9 @@ pub(crate) struct Shifts {
 
 impl Shifts {
     /// What the chosen effects and the nuisance beside them shift each row by, as all data have them.
-    fn of(level: &StarEvidence<'_>, folds: &Folds, found: &Found) -> Result<Self, CloseError> {
+    fn of(level: &StarEvidence<'_>, folds: &Folds, choice: Choice<'_>) -> Result<Self, CloseError> {
         let acts: [fn(&dyn Candidate) -> bool; 3] = [|_| false, |c| c.moves_light(), |_| true];
-        let [fitted, light, whole] = modelled(level, folds, found, acts)?;
+        let [fitted, light, whole] = modelled(level, folds, choice, acts)?;
         Ok(Self {
             fitted,
             light,
@@ -65,33 +65,43 @@ impl Elsewhere {
     pub(crate) fn of(
         level: &StarEvidence<'_>,
         folds: &Folds,
-        found: &Found,
+        choice: Choice<'_>,
         phase: &OnCentroids,
     ) -> Result<Option<Box<Self>>, CloseError> {
-        let [light] = modelled(level, folds, found, [|c: &dyn Candidate| c.moves_light()])?;
-        let data = level.data;
-        let variance = found.fitted.variance_beside(&found.selection.chosen);
-        let along = |v: f64| data.is_shifted_along(&light, phase, &level.weight, v);
-        if !(data.lands_elsewhere(&light) || variance.is_some_and(along)) {
+        if !takes_light_along(level, folds, choice, phase)? {
             return Ok(None);
         }
         Ok(Some(Box::new(Self {
-            shifts: Shifts::of(level, folds, found)?,
-            forms: found.chosen_forms(),
+            shifts: Shifts::of(level, folds, choice)?,
+            forms: choice.forms(),
         })))
     }
+}
+
+/// Whether what was chosen takes the light off from where it was taken to fall by enough to matter.
+pub(crate) fn takes_light_along(
+    level: &StarEvidence<'_>,
+    folds: &Folds,
+    choice: Choice<'_>,
+    phase: &OnCentroids,
+) -> Result<bool, CloseError> {
+    let [light] = modelled(level, folds, choice, [|c: &dyn Candidate| c.moves_light()])?;
+    let data = level.data;
+    let along = |v: f64| data.is_shifted_along(&light, phase, &level.weight, v);
+    let variance = choice.fitted.variance_beside(choice.chosen);
+    Ok(data.lands_elsewhere(&light) || variance.is_some_and(along))
 }
 
 /// What the nuisance and those of the chosen effects that are asked for shift each row by, arcsec.
 fn modelled<const N: usize>(
     level: &StarEvidence<'_>,
     folds: &Folds,
-    found: &Found,
+    choice: Choice<'_>,
     acts: [fn(&dyn Candidate) -> bool; N],
 ) -> Result<[Vec<Vec<f64>>; N], CloseError> {
-    let fits = &found.fitted.fits;
-    let set = columns_of(&found.fitted.groups, &found.selection.chosen);
-    let only = found.only(&found.selection.chosen);
+    let fits = &choice.fitted.fits;
+    let set = columns_of(&choice.fitted.groups, choice.chosen);
+    let only = choice.only();
     let beta = match set.is_empty() {
         true => DVector::zeros(0),
         false => fits.estimate(&set).ok_or(CloseError::Singular)?.value,

@@ -269,6 +269,7 @@ fn explain(
             ways: &ways,
             surroundings: situation.surroundings(),
             lands: lands.then_some(phase),
+            sight: (lands && landings == LANDINGS).then_some(phase),
         };
         causes::run(level, folds, &quest)
     };
@@ -366,7 +367,7 @@ fn explain(
     if landings > 0
         && formed.is_none()
         && (moves() || data.lands_elsewhere(&after.modelled))
-        && let Some(elsewhere) = Elsewhere::of(whole.level, folds, whole.found, phase)?
+        && let Some(elsewhere) = Elsewhere::of(whole.level, folds, whole.found.choice(), phase)?
     {
         return Ok(Explained::Elsewhere(elsewhere));
     }

@@ -37,16 +37,19 @@ use effects::Candidate;
 use rayon::prelude::*;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
+use crate::declared::OnCentroids;
 use crate::error::CloseError;
 use crate::evidence::Evidence;
 use crate::search::selection::{FAMILY_ALPHA, SLOW_PRICE, Selection, WIDENING, costs, price};
-use crate::search::{Fitted, Found, borrowed, fit_grams, polish, search};
+use crate::search::{Choice, Fitted, Found, borrowed, fit, fit_grams, polish, search};
 use crate::star::evidence::StarEvidence;
+use crate::star::landing::Elsewhere;
 use crate::star::moments::StarMoments;
 use alone::{Begun, Outcome};
 use trial::Trial;
 
 mod alone;
+mod first_sight;
 mod trial;
 
 /// Candidates of each list that are scored.
@@ -77,19 +80,43 @@ pub(crate) struct Searched<'a> {
     pub(crate) wander: Option<Wander>,
 }
 
-/// One search on `white` evidence, and what of its outcome a slow error of the reference explains
-/// better. Candidates that may not be chosen are judged.
+/// What a search ends with.
+pub(crate) enum Attempt<'a> {
+    /// And what of it a slow error of the reference explains better.
+    Searched(Box<Searched<'a>>, Vec<usize>),
+    /// What shows first takes the light elsewhere.
+    Elsewhere(Box<Elsewhere>),
+}
+
+/// One search on `white` evidence. Candidates that may not be chosen are judged. `sight`: what the model declares of
+/// centroids, if the light is to be followed to where it falls at first sight.
 pub(crate) fn attempt<'a>(
     white: &StarEvidence<'a>,
     folds: &Folds,
-    candidates: &dyn Fn() -> Vec<Arc<dyn Candidate>>,
+    candidates: Vec<Arc<dyn Candidate>>,
     may: &[bool],
     start: Option<CommonNoise>,
-) -> Result<(Searched<'a>, Vec<usize>), CloseError> {
-    let candidates = prepared(white, folds, candidates(), may, start);
+    sight: Option<&OnCentroids>,
+) -> Result<Attempt<'a>, CloseError> {
+    let candidates = match prepared(white, folds, candidates, may, start, sight)? {
+        Prepared::Candidates(candidates) => candidates,
+        Prepared::Elsewhere(to) => return Ok(Attempt::Elsewhere(to)),
+    };
+    let plain = |found| Attempt::Searched(Box::new(Searched::plain(found)), Vec::new());
     let Some(start) = start else {
-        let found = search(white, folds, candidates, may, None)?;
-        return Ok((Searched::plain(found), Vec::new()));
+        let fitted = fit(white, folds, &borrowed(&candidates))?;
+        if let Some(phase) = sight {
+            let (selection, quieter) = fitted.selected(folds, &candidates, may)?;
+            let choice = Choice {
+                candidates: &candidates,
+                fitted: quieter.as_ref().unwrap_or(&fitted),
+                chosen: &selection.chosen,
+            };
+            if let Some(to) = first_sight::of_choice(white, folds, choice, phase)? {
+                return Ok(Attempt::Elsewhere(to));
+            }
+        }
+        return Ok(plain(search(white, folds, candidates, may, Some(fitted))?));
     };
     let Coloured {
         searched,
@@ -97,8 +124,9 @@ pub(crate) fn attempt<'a>(
         white: begun,
         moments,
         worth,
-    } = match explored(white, folds, candidates, may, start)? {
-        Explored::White(found) => return Ok((Searched::plain(*found), Vec::new())),
+    } = match explored(white, folds, candidates, may, start, sight)? {
+        Explored::White(found) => return Ok(plain(*found)),
+        Explored::Elsewhere(to) => return Ok(Attempt::Elsewhere(to)),
         Explored::Coloured(coloured) => *coloured,
     };
     // from the forms that were polished beside the slow error: nearly those that suit white noise
@@ -118,9 +146,9 @@ pub(crate) fn attempt<'a>(
                 wander: Some(Wander { behind, ..wander }),
                 ..searched
             };
-            return Ok((searched, Vec::new()));
+            return Ok(Attempt::Searched(Box::new(searched), Vec::new()));
         }
-        return Ok((Searched::plain(found), Vec::new()));
+        return Ok(plain(found));
     }
     // forms of one cause (steps at other instants) are no better
     let family = |g: usize| found.fitted.groups[g].family.as_str();
@@ -131,7 +159,13 @@ pub(crate) fn attempt<'a>(
     let refused = (0..found.candidates.len())
         .filter(|&g| causes.contains(&family(g)))
         .collect();
-    Ok((Searched::plain(found), refused))
+    Ok(Attempt::Searched(Box::new(Searched::plain(found)), refused))
+}
+
+/// What a search of a part leads to.
+enum Prepared {
+    Candidates(Vec<Arc<dyn Candidate>>),
+    Elsewhere(Box<Elsewhere>),
 }
 
 /// The candidates in the forms that a part of a long run gives them: of the whole, each other form costs a
@@ -142,21 +176,32 @@ fn prepared(
     candidates: Vec<Arc<dyn Candidate>>,
     may: &[bool],
     start: Option<CommonNoise>,
-) -> Vec<Arc<dyn Candidate>> {
+    sight: Option<&OnCentroids>,
+) -> Result<Prepared, CloseError> {
     let Some(coarse) = white.coarser(folds) else {
-        return candidates;
+        return Ok(Prepared::Candidates(candidates));
     };
     let part = coarse.thinned(PARTS);
     let found = match start {
         Some(start) => {
-            explored(white, &part, candidates.clone(), may, start).map(|explored| match explored {
-                Explored::White(found) => *found,
-                Explored::Coloured(coloured) => coloured.searched.found,
+            let explored = explored(white, &part, candidates.clone(), may, start, None);
+            explored.map(|explored| match explored {
+                Explored::White(found) => Some(*found),
+                Explored::Coloured(coloured) => Some(coloured.searched.found),
+                Explored::Elsewhere(_) => None,
             })
         }
-        None => search(white, &part, candidates.clone(), may, None),
+        None => search(white, &part, candidates.clone(), may, None).map(Some),
     };
-    found.map_or(candidates, |found| found.candidates)
+    let Ok(Some(found)) = found else {
+        return Ok(Prepared::Candidates(candidates));
+    };
+    if let Some(phase) = sight
+        && let Some(to) = first_sight::of_part(white, folds, &found, phase)?
+    {
+        return Ok(Prepared::Elsewhere(to));
+    }
+    Ok(Prepared::Candidates(found.candidates))
 }
 
 impl Searched<'_> {
@@ -273,6 +318,7 @@ enum Explored<'a> {
     /// There is none beside what white evidence finds.
     White(Box<Found>),
     Coloured(Box<Coloured<'a>>),
+    Elsewhere(Box<Elsewhere>),
 }
 
 /// The search beside a slow error, unless white evidence makes it needless ([`alone::without_slow`]).
@@ -282,11 +328,13 @@ fn explored<'a>(
     candidates: Vec<Arc<dyn Candidate>>,
     may: &[bool],
     start: CommonNoise,
+    sight: Option<&OnCentroids>,
 ) -> Result<Explored<'a>, CloseError> {
     let begun = Begun::on(white, folds, candidates)?;
     Ok(
-        match alone::without_slow(white, folds, begun, may, start)? {
+        match alone::without_slow(white, folds, begun, may, start, sight)? {
             Outcome::Settled(found) => Explored::White(found),
+            Outcome::Elsewhere(to) => Explored::Elsewhere(to),
             Outcome::Open(begun) => {
                 Explored::Coloured(Box::new(coloured(white, folds, *begun, may, start)?))
             }

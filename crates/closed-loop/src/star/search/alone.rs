@@ -17,13 +17,15 @@ use block_regression::Folds;
 use coloured_noise::CommonNoise;
 use effects::Candidate;
 
-use super::Wander;
 use super::trial::{Scored, Trial, paid_by_slow};
+use super::{Wander, first_sight};
+use crate::declared::OnCentroids;
 use crate::error::CloseError;
 use crate::evidence::Evidence;
 use crate::search::selection::{SLOW_PRICE, costs};
-use crate::search::{Fitted, Found, borrowed, fit_grams, polish};
+use crate::search::{Choice, Fitted, Found, borrowed, fit_grams, polish};
 use crate::star::evidence::StarEvidence;
+use crate::star::landing::Elsewhere;
 use crate::star::moments::StarMoments;
 
 /// Nats by which effects have to be worth more than a slow error in their place, for it not to be gone into; and the
@@ -47,6 +49,8 @@ pub(super) enum Outcome {
     Settled(Box<Found>),
     /// A slow error may be in it.
     Open(Box<Begun>),
+    /// What was chosen first takes the light elsewhere.
+    Elsewhere(Box<Elsewhere>),
 }
 
 impl Begun {
@@ -84,12 +88,15 @@ pub(super) fn without_slow(
     mut begun: Begun,
     may: &[bool],
     start: CommonNoise,
+    mut sight: Option<&OnCentroids>,
 ) -> Result<Outcome, CloseError> {
     if white.drawn.is_some() {
         // white evidence is another one then
         return Ok(Outcome::Open(Box::new(begun)));
     }
     let mut before: Vec<usize> = Vec::new();
+    // what was chosen before, in the forms that it has now, by itself
+    let mut known: Option<Scored> = None;
     for _ in 0..ROUNDS {
         let (selection, quieter) = begun.plain.selected(folds, &begun.candidates, may)?;
         let fitted = quieter.as_ref().unwrap_or(&begun.plain);
@@ -99,10 +106,21 @@ pub(super) fn without_slow(
             break;
         }
         let cost = costs(&fitted.groups, may);
+        if let Some(phase) = sight.take() {
+            let choice = Choice {
+                candidates: &begun.candidates,
+                fitted,
+                chosen,
+            };
+            if let Some(to) = first_sight::of_choice(white, folds, choice, phase)? {
+                return Ok(Outcome::Elsewhere(to));
+            }
+        }
         let mut polished = begun.candidates.clone();
         if *chosen == before || !polish(white, folds, &mut polished, fitted, chosen)? {
             let alone = Alone::new(white, folds, &begun, fitted, chosen, cost);
-            let whole = alone.likely(&start);
+            let known = known.filter(|_| *chosen == before);
+            let whole = known.or_else(|| alone.likely(&start));
             if !whole.is_some_and(|whole| alone.stands(&whole, &start)) {
                 break;
             }
@@ -118,7 +136,8 @@ pub(super) fn without_slow(
         let all: Vec<usize> = (0..chosen.len()).collect();
         let cost = chosen.iter().map(|&g| cost[g]).collect();
         let alone = Alone::new(white, folds, &own, &own.plain, &all, cost);
-        if alone.likely(&start).is_none() {
+        known = alone.likely(&start);
+        if known.is_none() {
             break;
         }
         before.clone_from(chosen);
