@@ -11,11 +11,11 @@ use std::collections::BTreeMap;
 use block_regression::Folds;
 use focal_plane::rotation_vector;
 use rayon::prelude::*;
-use spectra::robust;
 use telemetry::AttitudeResiduals;
 
 use crate::evidence::Residuals;
 use crate::situation::Situation;
+use crate::standing_out;
 use crate::star::data::StarData;
 use crate::star::frame_rotation::rotation_of;
 use crate::star::settling::Settled;
@@ -78,9 +78,8 @@ pub(crate) fn residuals(
         out.fold.push(fold[k]);
     }
     out.outlier = vec![false; out.t_s.len()];
-    let group = vec![0; out.t_s.len()];
-    for axis in 0..3 {
-        robust::mark_outliers(&out.before_arcsec[axis], &group, 1, &mut out.outlier);
+    for before in &out.before_arcsec {
+        standing_out::mark(before, &mut out.outlier);
     }
     (!out.t_s.is_empty()).then_some(out)
 }
