@@ -87,10 +87,7 @@ pub(crate) fn effects_found(
         }
         effects.push(FoundEffect {
             id: candidate.id().to_owned(),
-            selectors: selectors
-                .iter()
-                .map(|(k, v)| (k.clone(), Selector::from(v.as_str())))
-                .collect(),
+            selectors: told(&selectors),
             parameters,
             delta_loglik: judged.delta_loglik,
             p_value: judged.p_value,
@@ -131,37 +128,62 @@ pub(crate) fn amplitudes_of(
     (values, covariance)
 }
 
-/// Other catalogue effects whose columns resemble those of `g`, or that were asked about.
+/// Other catalogue effects whose columns resemble those of `g`, or that were asked about, and the same on
+/// another channel or star.
 fn confusable(found: &Found, g: usize, questions: &Questions) -> Vec<Confusable> {
-    let mut best: BTreeMap<&str, f64> = BTreeMap::new();
-    for (other, group) in found.fitted.groups.iter().enumerate() {
-        let id = found.candidates[other].id();
-        if other == g || id == EMPIRICAL || id == found.candidates[g].id() {
-            continue;
-        }
-        for &a in &found.fitted.groups[g].columns {
-            for &b in &group.columns {
-                let likeness = found.fitted.fits.likeness(a, b);
-                let known = best.entry(id).or_insert(0.0);
-                if likeness.abs() > known.abs() {
-                    *known = likeness;
-                }
-            }
-        }
-    }
-    let mut list: Vec<Confusable> = best
-        .into_iter()
-        .filter(|(id, c)| c.abs() >= CONFUSABLE || questions.include(id))
-        .map(|(id, correlation)| Confusable {
-            id: id.to_owned(),
-            correlation,
-            delta_loglik: None,
-            separation_sigma: None,
-            manoeuvre: None,
+    let own = found.candidates[g].id();
+    let mut list: Vec<Confusable> = effects::catalogue()
+        .iter()
+        .map(|kind| kind.id())
+        .filter_map(|id| {
+            let (other, correlation) = most_alike(found, g, id)?;
+            let asked = id != own && questions.include(id);
+            (correlation.abs() >= CONFUSABLE || asked).then(|| Confusable {
+                id: id.to_owned(),
+                selectors: told(&found.candidates[other].selectors()),
+                correlation,
+                delta_loglik: None,
+                separation_sigma: None,
+                manoeuvre: None,
+            })
         })
         .collect();
     list.sort_by(|a, b| b.correlation.abs().total_cmp(&a.correlation.abs()));
     list
+}
+
+/// The form of effect `id`, of another cause than candidate `g` is, with the column most like one of that; and
+/// their correlation.
+pub(crate) fn most_alike(found: &Found, g: usize, id: &str) -> Option<(usize, f64)> {
+    let fits = &found.fitted.fits;
+    let cause = family(found.candidates[g].as_ref());
+    let likeness = |other: usize| {
+        let mut most = 0.0_f64;
+        for &a in &found.fitted.groups[g].columns {
+            for &b in &found.fitted.groups[other].columns {
+                let likeness = fits.likeness(a, b);
+                if likeness.abs() > most.abs() {
+                    most = likeness;
+                }
+            }
+        }
+        most
+    };
+    (0..found.candidates.len())
+        .filter(|&other| {
+            let candidate = found.candidates[other].as_ref();
+            candidate.id() == id && family(candidate) != cause
+        })
+        .map(|other| (other, likeness(other)))
+        .max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))
+}
+
+/// Selectors as they are told.
+fn told(selectors: &BTreeMap<String, String>) -> BTreeMap<String, Selector> {
+    let selectors = selectors.iter();
+    selectors
+        .map(|(k, v)| (k.clone(), Selector::from(v.as_str())))
+        .collect()
 }
 
 /// Every effect of the catalogue that was not added.

@@ -1,9 +1,10 @@
 //! A summary that a flight analyst can read, and paste into a report.
 
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use closed_loop::Closed;
-use telemetry::report::{Dependence, Errors, FoundEffect, RefusedSize, Report, Selector, Verdict};
+use telemetry::report::{Dependence, Errors, RefusedSize, Report, Selector, Verdict};
 
 use crate::number::number;
 use crate::set_aside;
@@ -127,7 +128,12 @@ fn figure(out: &mut String, name: &str, before: f64, after: f64) {
 
 fn effects(out: &mut String, report: &Report) {
     for effect in &report.effects {
-        line!(out, "Added     {}{}", effect.id, selectors(effect));
+        line!(
+            out,
+            "Added     {}{}",
+            effect.id,
+            selectors(&effect.selectors)
+        );
         for (name, estimate) in &effect.parameters {
             let unit = if estimate.unit.is_empty() {
                 String::new()
@@ -168,14 +174,18 @@ fn effects(out: &mut String, report: &Report) {
             .confusable_with
             .iter()
             .take(3)
-            .map(|c| format!("{} ({:+.2})", c.id, c.correlation))
+            .map(|c| {
+                let on = selectors(&c.selectors);
+                format!("{}{on} ({:+.2})", c.id, c.correlation)
+            })
             .collect();
         if !alike.is_empty() {
             line!(out, "            looks like {}", alike.join(", "));
         }
         for c in effect.confusable_with.iter().take(3) {
             if let Some(here) = c.separation_sigma {
-                let here = format!("this data tells it from {} at {here:.1} sigma", c.id);
+                let on = selectors(&c.selectors);
+                let here = format!("this data tells it from {}{on} at {here:.1} sigma", c.id);
                 wrapped(out, "            ", &here);
             }
             if let Some(manoeuvre) = &c.manoeuvre {
@@ -216,17 +226,13 @@ fn wrapped(out: &mut String, indent: &str, text: &str) {
     line!(out, "{row}");
 }
 
-pub(crate) fn selectors(effect: &FoundEffect) -> String {
-    if effect.selectors.is_empty() {
+pub(crate) fn selectors(of: &BTreeMap<String, Selector>) -> String {
+    if of.is_empty() {
         return String::new();
     }
-    let list: Vec<String> = effect
-        .selectors
+    let list: Vec<String> = of
         .iter()
-        .map(|(key, value)| match value {
-            Selector::Integer(i) => format!("{key} = {i}"),
-            Selector::Text(t) => format!("{key} = {t}"),
-        })
+        .map(|(key, value)| format!("{key} = {value}"))
         .collect();
     format!(" ({})", list.join(", "))
 }

@@ -107,6 +107,7 @@ fn findings(stars: bool, attitude: bool) -> Report {
         variance_explained: Some(0.0415),
         confusable_with: vec![Confusable {
             id: HOSTILE.to_owned(),
+            selectors: BTreeMap::from([("channel".to_owned(), Selector::Text(HOSTILE.to_owned()))]),
             correlation: -0.31,
             delta_loglik: Some(12.5),
             separation_sigma: Some(4.25),

@@ -8,6 +8,7 @@ mod axes;
 mod compare;
 
 use std::collections::BTreeMap;
+use std::fmt;
 use std::io::Write as _;
 
 use serde::{Deserialize, Deserializer, Serialize};
@@ -142,6 +143,15 @@ pub enum Selector {
     Text(String),
 }
 
+impl fmt::Display for Selector {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Integer(i) => i.fmt(f),
+            Self::Text(t) => t.fmt(f),
+        }
+    }
+}
+
 impl From<&str> for Selector {
     /// Whole numbers become numbers.
     fn from(text: &str) -> Self {
@@ -150,11 +160,14 @@ impl From<&str> for Selector {
     }
 }
 
-/// An effect that looks alike in this data.
+/// An effect that looks alike in this data: another one, or the same on another channel or star.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Confusable {
     /// Name in the catalogue.
     pub id: String,
+    /// What it acts on, where it acts on one of several.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub selectors: BTreeMap<String, Selector>,
     /// Largest correlation of the two estimates.
     #[serde(deserialize_with = "nan")]
     pub correlation: f64,

@@ -9,11 +9,13 @@
 //!
 //! Source: Fisher 1925 (information).
 
+use std::collections::BTreeMap;
+
 use effects::Candidate;
 use nalgebra::{DMatrix, UnitQuaternion};
-use telemetry::report::FoundEffect;
+use telemetry::report::{FoundEffect, Selector};
 
-use crate::figures::amplitudes_of;
+use crate::figures::{amplitudes_of, most_alike};
 use crate::questions::manoeuvre::{Flown, Pair, recommend};
 use crate::search::Found;
 use crate::search::selection::columns_of;
@@ -51,7 +53,7 @@ pub(crate) fn compare<'a>(found: &'a Found, effects: &mut [FoundEffect]) -> Conf
         let base = fits.out_of_fold(&without).map(|o| o.total_loglik());
         let (amplitudes, _) = amplitudes_of(found, g, &set, &estimate);
         for (i, confusable) in effect.confusable_with.iter_mut().enumerate() {
-            let Some(other) = most_alike(found, g, &confusable.id) else {
+            let Some((other, _)) = most_alike(found, g, &confusable.id) else {
                 continue;
             };
             let mut instead = without.clone();
@@ -74,7 +76,10 @@ pub(crate) fn compare<'a>(found: &'a Found, effects: &mut [FoundEffect]) -> Conf
                 columns: columns(g),
                 amplitudes: amplitudes.clone(),
                 other: columns(other),
-                names: [effect.id.clone(), confusable.id.clone()],
+                names: [
+                    effect.id.clone(),
+                    called(&confusable.id, &confusable.selectors, &effect.id),
+                ],
             };
             out.at.push([k, i]);
             out.pairs.push(pair);
@@ -120,6 +125,18 @@ impl Confusion<'_> {
     }
 }
 
+/// What `id` is called beside an effect called `own`: the same of another channel or star with what it acts on.
+fn called(id: &str, selectors: &BTreeMap<String, Selector>, own: &str) -> String {
+    if id != own {
+        return id.to_owned();
+    }
+    let acts_on: Vec<String> = selectors
+        .iter()
+        .map(|(k, v)| format!("{k} = {v}"))
+        .collect();
+    format!("{id} of {}", acts_on.join(", "))
+}
+
 /// First column of each candidate.
 fn starts(found: &Found) -> Vec<usize> {
     found
@@ -131,21 +148,4 @@ fn starts(found: &Found) -> Vec<usize> {
             Some(first)
         })
         .collect()
-}
-
-/// The form of effect `id` with the column most like one of candidate `g`.
-fn most_alike(found: &Found, g: usize, id: &str) -> Option<usize> {
-    let fits = &found.fitted.fits;
-    let likeness = |other: usize| {
-        let mut most = 0.0_f64;
-        for &a in &found.fitted.groups[g].columns {
-            for &b in &found.fitted.groups[other].columns {
-                most = most.max(fits.likeness(a, b).abs());
-            }
-        }
-        most
-    };
-    (0..found.candidates.len())
-        .filter(|&other| other != g && found.candidates[other].id() == id)
-        .max_by(|&a, &b| likeness(a).total_cmp(&likeness(b)))
 }

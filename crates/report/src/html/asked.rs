@@ -6,6 +6,7 @@ use telemetry::report::{Hypothesis, HypothesisSize, Report};
 
 use super::write::{Cell, Page, datum, escaped};
 use crate::number::percent;
+use crate::text::selectors;
 
 /// Numbers that the words beside them tell already.
 fn for_machines(at: &str, numbers: &[(&str, Option<f64>)]) -> String {
@@ -34,7 +35,7 @@ pub(super) fn apart(page: &mut Page, report: &Report) {
             ];
             rows.push(vec![
                 Cell::text(&effect.id),
-                Cell::text(&c.id),
+                Cell::text(&format!("{}{}", c.id, selectors(&c.selectors))),
                 Cell::maybe(&key("delta_loglik"), c.delta_loglik),
                 Cell::maybe(&key("separation_sigma"), c.separation_sigma),
                 Cell::words(format!(

@@ -26,7 +26,7 @@ pub(super) fn in_a_line_each(page: &mut Page, report: &Report) {
         page.raw(&format!(
             "<li><strong>{}{}</strong>, {}: {}; p = {}{}</li>",
             escaped(&effect.id),
-            escaped(&selectors(effect)),
+            escaped(&selectors(&effect.selectors)),
             escaped(meaning(&effect.id)),
             escaped(&sizes.join(", ")),
             probability(effect.p_value),
@@ -200,8 +200,9 @@ fn row_of(k: usize, effect: &FoundEffect) -> Vec<Cell> {
             let shown = format!("{:+.2}", c.correlation).replace('-', "−");
             let key = format!("/effects/{k}/confusable_with/{i}/correlation");
             format!(
-                "{} ({})",
+                "{}{} ({})",
                 escaped(&c.id),
+                escaped(&selectors(&c.selectors)),
                 datum(&key, c.correlation, &shown)
             )
         })
@@ -215,7 +216,7 @@ fn row_of(k: usize, effect: &FoundEffect) -> Vec<Cell> {
         Cell::words(format!(
             "<strong>{}</strong>{}<br/><small>{}</small>",
             escaped(&effect.id),
-            escaped(&selectors(effect)),
+            escaped(&selectors(&effect.selectors)),
             escaped(meaning(&effect.id))
         )),
         Cell::words(or_dash(&parameters, "<br/>")),
