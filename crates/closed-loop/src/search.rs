@@ -166,17 +166,8 @@ pub(crate) fn fit_grams(
     folds: &Folds,
     candidates: &[&dyn Candidate],
 ) -> Result<Fitted, CloseError> {
-    let sums = grams.by_fold(folds);
-    let (layout, variance) = prepared(evidence, &sums, candidates);
-    let fits = Fits::of(grams, &sums, folds, &layout, variance).ok_or(CloseError::Singular)?;
-    let (_, scalars) = sums.all;
-    Ok(Fitted {
-        groups: grouped(&fits, candidates),
-        fits,
-        scalars,
-        variance,
-        log_scale: grams.log_scale,
-    })
+    let of = |sums: &FoldSums, layout: &Layout, v| Fits::of(grams, sums, folds, layout, v);
+    fitted(evidence, grams, folds, candidates, of)
 }
 
 /// As [`fit`], for what asks nothing of folds and blocks ([`Fits::whole`]).
@@ -185,10 +176,31 @@ pub(crate) fn fit_whole(
     folds: &Folds,
     candidates: &[&dyn Candidate],
 ) -> Result<Fitted, CloseError> {
+    let of = |sums: &FoldSums, layout: &Layout, v| Fits::whole(&sums.as_one(), layout, v);
     let grams = evidence.grams(folds, candidates);
+    fitted(evidence, &grams, folds, candidates, of)
+}
+
+/// The fits that `of` makes of the sums, the columns, and the variance that priors are weighed against.
+fn fitted(
+    evidence: &dyn Evidence,
+    grams: &BlockGrams,
+    folds: &Folds,
+    candidates: &[&dyn Candidate],
+    of: impl FnOnce(&FoldSums, &Layout, f64) -> Option<Fits>,
+) -> Result<Fitted, CloseError> {
+    let layout = Layout {
+        nuisance_precision: evidence.precision(),
+        relative: evidence.relative(),
+        candidates: candidates.iter().map(|c| c.coefficients().len()).sum(),
+        residuals: evidence.residual_columns(),
+    };
+    let guess = evidence.variance_guess();
     let sums = grams.by_fold(folds);
-    let (layout, variance) = prepared(evidence, &sums, candidates);
-    let fits = Fits::whole(&sums.as_one(), &layout, variance).ok_or(CloseError::Singular)?;
+    let variance = Fits::noise_alone(&sums, &layout, guess)
+        .unwrap_or(guess)
+        .max(f64::MIN_POSITIVE);
+    let fits = of(&sums, &layout, variance).ok_or(CloseError::Singular)?;
     let (_, scalars) = sums.all;
     Ok(Fitted {
         groups: grouped(&fits, candidates),
@@ -197,23 +209,6 @@ pub(crate) fn fit_whole(
         variance,
         log_scale: grams.log_scale,
     })
-}
-
-/// What columns there are, and the variance that priors are weighed against.
-fn prepared(
-    evidence: &dyn Evidence,
-    sums: &FoldSums,
-    candidates: &[&dyn Candidate],
-) -> (Layout, f64) {
-    let layout = Layout {
-        nuisance_precision: evidence.precision(),
-        relative: evidence.relative(),
-        candidates: candidates.iter().map(|c| c.coefficients().len()).sum(),
-        residuals: evidence.residual_columns(),
-    };
-    let guess = evidence.variance_guess();
-    let variance = Fits::noise_alone(sums, &layout, guess).unwrap_or(guess);
-    (layout, variance.max(f64::MIN_POSITIVE))
 }
 
 /// The columns that the data shows, candidate by candidate.
