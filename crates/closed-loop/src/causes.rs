@@ -192,7 +192,7 @@ pub(crate) fn run<'a>(
             continue;
         }
         if let Some(phase) = quest.lands
-            && searched.found.chosen().any(|c| c.moves_light())
+            && searched.found.choice().moves_light()
             && let Some(elsewhere) = Elsewhere::of(level, folds, searched.found.choice(), phase)?
         {
             return Ok(Outcome::Elsewhere(elsewhere));

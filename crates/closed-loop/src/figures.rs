@@ -179,7 +179,7 @@ pub(crate) fn most_alike(found: &Found, g: usize, id: &str) -> Option<(usize, f6
 }
 
 /// Selectors as they are told.
-fn told(selectors: &BTreeMap<String, String>) -> BTreeMap<String, Selector> {
+pub(crate) fn told(selectors: &BTreeMap<String, String>) -> BTreeMap<String, Selector> {
     let selectors = selectors.iter();
     selectors
         .map(|(k, v)| (k.clone(), Selector::from(v.as_str())))

@@ -281,8 +281,17 @@ impl Found {
         evidence: &dyn Evidence,
         folds: &Folds,
     ) -> Result<Self, CloseError> {
-        let chosen = self.selection.chosen.iter();
-        let candidates: Vec<_> = chosen.map(|&g| Arc::clone(&self.candidates[g])).collect();
+        Self::of_chosen(evidence, folds, &self.candidates, &self.selection.chosen)
+    }
+
+    /// The chosen of `candidates` alone, fitted to `evidence`.
+    pub(crate) fn of_chosen(
+        evidence: &dyn Evidence,
+        folds: &Folds,
+        candidates: &[Arc<dyn Candidate>],
+        chosen: &[usize],
+    ) -> Result<Self, CloseError> {
+        let candidates: Vec<_> = chosen.iter().map(|&g| Arc::clone(&candidates[g])).collect();
         let chosen: Vec<usize> = (0..candidates.len()).collect();
         let fitted = fit_beside(evidence, folds, &borrowed(&candidates), &chosen)?;
         let selection = Selection {
@@ -339,10 +348,10 @@ pub(crate) struct Choice<'a> {
 }
 
 impl<'a> Choice<'a> {
-    /// What was chosen.
-    pub(crate) fn each(&self) -> impl Iterator<Item = &'a dyn Candidate> {
-        let candidates = self.candidates;
-        self.chosen.iter().map(|&g| candidates[g].as_ref())
+    pub(crate) fn moves_light(&self) -> bool {
+        self.chosen
+            .iter()
+            .any(|&g| self.candidates[g].moves_light())
     }
 
     pub(crate) fn only(&self) -> Only<'a> {

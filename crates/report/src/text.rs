@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use closed_loop::Closed;
-use telemetry::report::{Dependence, Errors, RefusedSize, Report, Selector, Verdict};
+use telemetry::report::{Dependence, Errors, RefusedSize, Report, Selector, Verdict, listed};
 
 use crate::number::number;
 use crate::set_aside;
@@ -230,11 +230,7 @@ pub(crate) fn selectors(of: &BTreeMap<String, Selector>) -> String {
     if of.is_empty() {
         return String::new();
     }
-    let list: Vec<String> = of
-        .iter()
-        .map(|(key, value)| format!("{key} = {value}"))
-        .collect();
-    format!(" ({})", list.join(", "))
+    format!(" ({})", listed(of))
 }
 
 fn rivals(out: &mut String, closed: &Closed) {

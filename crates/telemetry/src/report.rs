@@ -152,6 +152,12 @@ impl fmt::Display for Selector {
     }
 }
 
+/// `selectors` in a row: `channel = bracket_c`.
+pub fn listed(selectors: &BTreeMap<String, Selector>) -> String {
+    let each = selectors.iter().map(|(k, v)| format!("{k} = {v}"));
+    each.collect::<Vec<_>>().join(", ")
+}
+
 impl From<&str> for Selector {
     /// Whole numbers become numbers.
     fn from(text: &str) -> Self {

@@ -13,7 +13,7 @@ use std::collections::BTreeMap;
 
 use effects::Candidate;
 use nalgebra::{DMatrix, UnitQuaternion};
-use telemetry::report::{FoundEffect, Selector};
+use telemetry::report::{FoundEffect, Selector, listed};
 
 use crate::figures::{amplitudes_of, most_alike};
 use crate::questions::manoeuvre::{Flown, Pair, recommend};
@@ -130,11 +130,7 @@ fn called(id: &str, selectors: &BTreeMap<String, Selector>, own: &str) -> String
     if id != own {
         return id.to_owned();
     }
-    let acts_on: Vec<String> = selectors
-        .iter()
-        .map(|(k, v)| format!("{k} = {v}"))
-        .collect();
-    format!("{id} of {}", acts_on.join(", "))
+    format!("{id} of {}", listed(selectors))
 }
 
 /// First column of each candidate.

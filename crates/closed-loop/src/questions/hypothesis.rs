@@ -18,11 +18,10 @@
 use block_regression::Estimate;
 use effects::{Candidate, EffectKind, Surroundings};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
-use telemetry::report::{
-    ConsideredEffect, FoundEffect, Hypothesis, HypothesisSize, RefusedSize, Selector,
-};
+use telemetry::report::{ConsideredEffect, FoundEffect, Hypothesis, HypothesisSize, RefusedSize};
 
 use crate::error::CloseError;
+use crate::figures::told;
 use crate::search::selection::{FAMILY_ALPHA, columns_of};
 use crate::search::{Found, first_column};
 
@@ -165,11 +164,7 @@ impl Grounds<'_> {
         let judged = &found.selection.judged[g];
         let chosen = found.selection.chosen.contains(&g);
         let mut answer = Hypothesis {
-            selectors: candidate
-                .selectors()
-                .iter()
-                .map(|(k, v)| (k.clone(), Selector::from(v.as_str())))
-                .collect(),
+            selectors: told(&candidate.selectors()),
             significant: judged.stands(),
             observable: true,
             delta_loglik: Some(judged.delta_loglik),

@@ -363,10 +363,9 @@ fn explain(
         image: image.as_ref().zip(formed.as_ref()),
     };
     let after = whole.residuals(&searched.found.selection.chosen)?;
-    let moves = || searched.found.chosen().any(|c| c.moves_light());
     if landings > 0
         && formed.is_none()
-        && (moves() || data.lands_elsewhere(&after.modelled))
+        && (searched.found.choice().moves_light() || data.lands_elsewhere(&after.modelled))
         && let Some(elsewhere) = Elsewhere::of(whole.level, folds, whole.found.choice(), phase)?
     {
         return Ok(Explained::Elsewhere(elsewhere));

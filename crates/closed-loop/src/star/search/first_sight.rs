@@ -13,8 +13,7 @@ use effects::Candidate;
 
 use crate::declared::OnCentroids;
 use crate::error::CloseError;
-use crate::search::selection::Selection;
-use crate::search::{Choice, Found, borrowed, fit_beside, polish};
+use crate::search::{Choice, Found, polish};
 use crate::star::evidence::StarEvidence;
 use crate::star::landing::{Elsewhere, takes_light_along};
 
@@ -53,8 +52,7 @@ fn seems_to_move_it(
     choice: Choice<'_>,
     phase: &OnCentroids,
 ) -> Result<bool, CloseError> {
-    let moves = choice.each().any(|c| c.moves_light());
-    Ok(moves && takes_light_along(white, folds, choice, phase)?)
+    Ok(choice.moves_light() && takes_light_along(white, folds, choice, phase)?)
 }
 
 /// Where the chosen of `candidates` take the light, fitted as they are.
@@ -65,16 +63,7 @@ fn of_forms(
     chosen: &[usize],
     phase: &OnCentroids,
 ) -> Result<Option<Box<Elsewhere>>, CloseError> {
-    let own: Vec<_> = chosen.iter().map(|&g| Arc::clone(&candidates[g])).collect();
-    let all: Vec<usize> = (0..own.len()).collect();
-    let found = Found {
-        fitted: fit_beside(white, folds, &borrowed(&own), &all)?,
-        candidates: own,
-        selection: Selection {
-            chosen: all,
-            judged: Vec::new(),
-        },
-    };
+    let found = Found::of_chosen(white, folds, candidates, chosen)?;
     let mut elsewhere = Elsewhere::of(white, folds, found.choice(), phase)?;
     if let Some(elsewhere) = &mut elsewhere {
         // their places among all
