@@ -395,6 +395,16 @@ impl<'a> Only<'a> {
         only
     }
 
+    /// The `groups` of the `chosen`, their columns among those of the chosen alone.
+    pub(crate) fn groups(&self, groups: &[Group], chosen: &[usize]) -> Vec<Group> {
+        let mut places = self.places.iter().copied();
+        let of = |&g: &usize| Group {
+            columns: places.by_ref().take(groups[g].columns.len()).collect(),
+            ..groups[g].clone()
+        };
+        chosen.iter().map(of).collect()
+    }
+
     /// `beta` of the observable columns among all columns of the candidates.
     pub(crate) fn spread(&self, beta: &DVector<f64>) -> DVector<f64> {
         let mut all = DVector::zeros(self.columns);

@@ -115,6 +115,11 @@ impl<'a> StarEvidence<'a> {
         }
     }
 
+    /// What a variance of 1 of its scalars is, arcsec^2 of rows of weight 1.
+    pub(crate) fn unit_arcsec2(&self) -> f64 {
+        self.noise.map_or(1.0, |n| n.centroid * n.centroid)
+    }
+
     /// The same evidence with `kept` in every fit.
     pub(crate) fn keeping(&self, kept: &[Arc<dyn Candidate>]) -> Self {
         Self {
@@ -282,7 +287,7 @@ impl Evidence for StarEvidence<'_> {
             residuals: &[],
             ..self.columns(&both)
         };
-        columns.distance(values) / self.noise.map_or(1.0, |n| n.centroid * n.centroid)
+        columns.distance(values) / self.unit_arcsec2()
     }
 }
 

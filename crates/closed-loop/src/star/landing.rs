@@ -87,7 +87,8 @@ pub(crate) fn takes_light_along(
 ) -> Result<bool, CloseError> {
     let [light] = modelled(level, folds, choice, [|c: &dyn Candidate| c.moves_light()])?;
     let data = level.data;
-    let along = |v: f64| data.is_shifted_along(&light, phase, &level.weight, v);
+    let along =
+        |v: f64| data.is_shifted_along(&light, phase, &level.weight, v * level.unit_arcsec2());
     let variance = choice.fitted.variance_beside(choice.chosen);
     Ok(data.lands_elsewhere(&light) || variance.is_some_and(along))
 }

@@ -31,7 +31,7 @@ use crate::star::evidence::StarEvidence;
 use crate::star::finish::{Finish, finish};
 use crate::star::landing::Elsewhere;
 use crate::star::pointed::Pointed;
-use crate::star::search::{Searched, Wander};
+use crate::star::search::{Searched, Wander, in_vain};
 use crate::star::settling::{Settled, settle};
 use crate::star::steadied::steadied;
 use crate::unexplained::leftover::{self, Series};
@@ -304,7 +304,13 @@ fn explain(
     if scene.has_reference {
         put_forward.extend(orbit(level, folds, &scene, &outcome.searched, look)?);
     }
-    if !put_forward.is_empty() {
+    let in_vain = match &outcome.searched.wander {
+        Some(wander) if !put_forward.is_empty() => {
+            in_vain(level, folds, &outcome.searched, wander, &put_forward)?
+        }
+        _ => put_forward.is_empty(),
+    };
+    if !in_vain {
         progress("searching again with the line, jump or orbit that is left");
         // what was put forward in vain changes nothing
         if let Outcome::Named(mut again) = named(&put_forward, false)?

@@ -44,12 +44,13 @@ use crate::search::selection::{FAMILY_ALPHA, SLOW_PRICE, Selection, WIDENING, co
 use crate::search::{Choice, Fitted, Found, borrowed, fit, fit_grams, polish, search};
 use crate::star::evidence::StarEvidence;
 use crate::star::landing::Elsewhere;
-use crate::star::moments::StarMoments;
 use alone::{Begun, Outcome};
+pub(crate) use in_vain::in_vain;
 use trial::Trial;
 
 mod alone;
 mod first_sight;
+mod in_vain;
 mod trial;
 
 /// Candidates of each list that are scored.
@@ -68,7 +69,7 @@ pub(crate) struct Wander {
     pub(crate) ratio: [f64; 3],
     /// The same of X and Y together with one size and time.
     pub(crate) alike: f64,
-    /// Nats by which effects in its place are less likely, where there are any.
+    /// Nats by which effects in its place are less likely, where there are any that come near.
     pub(crate) behind: Option<f64>,
 }
 
@@ -121,32 +122,43 @@ pub(crate) fn attempt<'a>(
     let Coloured {
         searched,
         wander,
-        white: begun,
-        moments,
+        begun,
         worth,
     } = match explored(white, folds, candidates, may, start, sight)? {
         Explored::White(found) => return Ok(plain(*found)),
         Explored::Elsewhere(to) => return Ok(Attempt::Elsewhere(to)),
         Explored::Coloured(coloured) => *coloured,
     };
+    let beside = |searched: Searched<'a>, wander| {
+        let wander = Some(wander);
+        Attempt::Searched(Box::new(Searched { wander, ..searched }), Vec::new())
+    };
+    let certain = wander.axes().contains(&true);
+    if certain
+        && let Some(phase) = sight
+        && searched.found.choice().moves_light()
+        && let level = searched.evidence.as_ref().unwrap_or(white)
+        && let Some(to) = Elsewhere::of(level, folds, searched.found.choice(), phase)?
+    {
+        return Ok(Attempt::Elsewhere(to));
+    }
+    // white evidence is another one where rotations have a prior
+    let begun = white.drawn.is_none().then_some(begun);
+    if let Some(begun) = begun.as_ref().filter(|_| certain)
+        && alone::is_hopeless(white, folds, begun, may, &wander.noise)?
+    {
+        return Ok(beside(searched, wander));
+    }
     // from the forms that were polished beside the slow error: nearly those that suit white noise
     let candidates = searched.found.candidates.clone();
-    let found = search(white, folds, candidates, may, begun)?;
-    let polished = &searched.found.candidates;
-    let same = |(a, b): (&Arc<dyn Candidate>, &Arc<dyn Candidate>)| Arc::ptr_eq(a, b);
-    let known = polished.iter().zip(&found.candidates).all(same);
-    let known = known.then_some(moments);
-    let instead = Instead::of(white, folds, &found, may, &wander.noise, known)?;
+    let found = search(white, folds, candidates, may, begun.map(|b| b.plain))?;
+    let instead = Instead::of(white, folds, &found, may, &wander.noise)?;
     // Less than that imitates no effect, and would only hide one.
-    if wander.axes().contains(&true) {
+    if certain {
         let better = |i: &Instead| i.refused.is_empty() && i.worth > worth;
         if !instead.as_ref().is_some_and(better) {
             let behind = instead.map(|i| worth - i.worth);
-            let searched = Searched {
-                wander: Some(Wander { behind, ..wander }),
-                ..searched
-            };
-            return Ok(Attempt::Searched(Box::new(searched), Vec::new()));
+            return Ok(beside(searched, Wander { behind, ..wander }));
         }
         return Ok(plain(found));
     }
@@ -224,56 +236,61 @@ struct Instead {
 }
 
 impl Instead {
-    /// `None`: nothing that a slow error could imitate. `known`: the products of the candidates, where they
-    /// are there already.
+    /// `None`: nothing that a slow error could imitate.
     fn of(
         white: &StarEvidence<'_>,
         folds: &Folds,
         found: &Found,
         may: &[bool],
         noise: &CommonNoise,
-        known: Option<StarMoments>,
     ) -> Result<Option<Self>, CloseError> {
         let chosen = &found.selection.chosen;
         let turns = |g: &usize| found.candidates[*g].acts_on_attitude();
         if !chosen.iter().any(turns) {
             return Ok(None);
         }
-        let moments = known.unwrap_or_else(|| white.moments(folds, &borrowed(&found.candidates)));
+        let only = found.only(chosen);
+        let moments = white.moments(folds, &only.candidates);
+        // what threads would wait for each other with
+        moments.sum_up();
+        let groups = only.groups(&found.fitted.groups, chosen);
+        let cost = costs(&found.fitted.groups, may);
         let trial = Trial {
             moments: &moments,
             folds,
             precision: white.precision(),
             variance: found.fitted.variance_beside(chosen).unwrap_or(1.0),
-            groups: &found.fitted.groups,
-            cost: costs(&found.fitted.groups, may),
+            groups: &groups,
+            cost: chosen.iter().map(|&g| cost[g]).collect(),
             all: None,
             single: false,
         };
-        let score = |set: &[usize]| trial.score(set, noise).ok_or(CloseError::Singular);
-        let whole = score(chosen)?;
-        let worth = trial.worth(&whole, f64::INFINITY);
-        let mut sets: Vec<Vec<usize>> = chosen
-            .iter()
-            .copied()
-            .filter(turns)
-            .map(|g| vec![g])
+        let all: Vec<usize> = (0..chosen.len()).collect();
+        let turns = all.iter().copied().filter(|&at| turns(&chosen[at]));
+        // the first without nothing
+        let mut out = vec![Vec::new()];
+        out.extend(turns.map(|at| vec![at]));
+        if out.len() > 2 {
+            out.push(out.concat());
+        }
+        let scored = out.par_iter().map(|out| {
+            let rest = all.iter().copied().filter(|at| !out.contains(at));
+            let rest: Vec<usize> = rest.collect();
+            let rest = trial.score(&rest, noise).ok_or(CloseError::Singular)?;
+            let slow_price = if out.is_empty() {
+                f64::INFINITY
+            } else {
+                SLOW_PRICE
+            };
+            Ok(trial.worth(&rest, slow_price))
+        });
+        let scored: Vec<f64> = scored.collect::<Result<_, CloseError>>()?;
+        let worth = scored[0];
+        let better = out.into_iter().zip(&scored).skip(1);
+        let mut refused: Vec<usize> = better
+            .filter(|(_, instead)| **instead > worth)
+            .flat_map(|(set, _)| set.into_iter().map(|at| chosen[at]))
             .collect();
-        if sets.len() > 1 {
-            sets.push(sets.concat());
-        }
-        let mut refused = Vec::new();
-        for set in sets {
-            let rest: Vec<usize> = chosen
-                .iter()
-                .copied()
-                .filter(|g| !set.contains(g))
-                .collect();
-            let rest = score(&rest)?;
-            if trial.worth(&rest, SLOW_PRICE) > worth {
-                refused.extend(set);
-            }
-        }
         refused.sort_unstable();
         refused.dedup();
         Ok(Some(Self { worth, refused }))
@@ -306,10 +323,8 @@ pub(crate) fn declared_noise(
 struct Coloured<'a> {
     searched: Searched<'a>,
     wander: Wander,
-    /// The same candidates under white noise, but where rotations have a prior.
-    white: Option<Fitted>,
-    /// The products of the candidates.
-    moments: StarMoments,
+    /// The same candidates under white noise.
+    begun: Begun,
     worth: f64,
 }
 
@@ -442,6 +457,12 @@ fn coloured<'a>(
             }
             let worth = trial.worth(&base, SLOW_PRICE);
             return Ok(Coloured {
+                wander: Wander::of(base.rotations, noise),
+                begun: Begun {
+                    candidates: candidates.clone(),
+                    moments,
+                    plain,
+                },
                 searched: Searched {
                     found: Found {
                         candidates,
@@ -451,9 +472,6 @@ fn coloured<'a>(
                     evidence: Some(white.with_noise(&noise)),
                     wander: None,
                 },
-                wander: Wander::of(base.rotations, noise),
-                white: white.drawn.is_none().then_some(plain),
-                moments,
                 worth,
             });
         };

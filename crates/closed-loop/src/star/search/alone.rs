@@ -22,7 +22,7 @@ use super::{Wander, first_sight};
 use crate::declared::OnCentroids;
 use crate::error::CloseError;
 use crate::evidence::Evidence;
-use crate::search::selection::{SLOW_PRICE, costs};
+use crate::search::selection::{SLOW_PRICE, columns_of, costs};
 use crate::search::{Choice, Fitted, Found, borrowed, fit_grams, polish};
 use crate::star::evidence::StarEvidence;
 use crate::star::landing::Elsewhere;
@@ -32,6 +32,8 @@ use crate::star::moments::StarMoments;
 /// chance of what is slow beside them.
 const BY_FAR: f64 = 10.0;
 const TRACE: f64 = 0.05;
+/// A slow error gains this many times as much, and more, where no polish brings effects in its place up to it.
+const HOPELESS: f64 = 1.5;
 /// Effects that turn frames of which every set is held against a slow error: of more there are too many.
 const MOST_SETS_OF: usize = 3;
 /// Rounds of selection and polish; the choice settles in two.
@@ -106,6 +108,12 @@ pub(super) fn without_slow(
             break;
         }
         let cost = costs(&fitted.groups, may);
+        if before.is_empty()
+            && Alone::new(white, folds, &begun, fitted, chosen, cost.clone())
+                .is_hopeless(fitted, &start)
+        {
+            break;
+        }
         if let Some(phase) = sight.take() {
             let choice = Choice {
                 candidates: &begun.candidates,
@@ -146,6 +154,22 @@ pub(super) fn without_slow(
         begun = Begun::on(white, folds, polished)?;
     }
     Ok(Outcome::Open(Box::new(begun)))
+}
+
+/// Whether what white evidence chooses of candidates in the forms that they have, and would polish, is far behind a
+/// slow error like `noise`.
+pub(super) fn is_hopeless(
+    white: &StarEvidence<'_>,
+    folds: &Folds,
+    begun: &Begun,
+    may: &[bool],
+    noise: &CommonNoise,
+) -> Result<bool, CloseError> {
+    let (selection, quieter) = begun.plain.selected(folds, &begun.candidates, may)?;
+    let fitted = quieter.as_ref().unwrap_or(&begun.plain);
+    let cost = costs(&fitted.groups, may);
+    let alone = Alone::new(white, folds, begun, fitted, &selection.chosen, cost);
+    Ok(alone.is_hopeless(fitted, noise))
 }
 
 /// What white evidence chose, held against slow errors in its place.
@@ -194,6 +218,23 @@ impl<'a> Alone<'a> {
             || self.instead_of(self.most(), start),
         );
         whole.filter(|whole| self.is_by_far(whole, rest))
+    }
+
+    /// Whether those that turn frames, as they are, explain so much less than a slow error in their place that no
+    /// polish makes up for it. `fitted`: the fits that chose.
+    fn is_hopeless(&self, fitted: &Fitted, start: &CommonNoise) -> bool {
+        let rest = self.chosen.iter().copied();
+        let rest: Vec<usize> = rest.filter(|g| !self.turns.contains(g)).collect();
+        let error = |set: &[usize]| fitted.fits.error(&columns_of(&fitted.groups, set));
+        let Some((without, with)) = error(&rest).zip(error(self.chosen)) else {
+            return false;
+        };
+        let gain = 0.5 * fitted.scalars * (without / with).ln();
+        let slow = self.trial.climb(&self.trial.columns(&rest), start);
+        let slow = slow.map_or(0.0, |(noise, rotations, _)| {
+            0.5 * rotations.slow_ratio(&noise).iter().sum::<f64>()
+        });
+        slow > HOPELESS * gain + BY_FAR
     }
 
     /// All that a slow error could be in the place of.

@@ -1,0 +1,91 @@
+//! Whether what is put forward beside a slow error has no chance, so that another search is needless.
+//!
+//! Each is held against the data beside what was found, in the place of each of those that turn frames, and in the
+//! place of all of them. A search weighs the same, at length.
+//!
+//! Not physics: a comparison of hypotheses ([`super`]).
+
+use std::sync::Arc;
+
+use block_regression::Folds;
+use effects::Candidate;
+use rayon::prelude::*;
+
+use super::alone::Begun;
+use super::trial::Trial;
+use super::{Searched, Wander};
+use crate::error::CloseError;
+use crate::evidence::Evidence;
+use crate::search::selection::{SLOW_PRICE, costs};
+use crate::star::evidence::StarEvidence;
+
+/// Nats that another polish may bring: what is put forward is at its best already.
+const POLISH: f64 = 3.0;
+
+/// Whether with none of `put_forward` the data is worth as much as with what was found.
+pub(crate) fn in_vain(
+    white: &StarEvidence<'_>,
+    folds: &Folds,
+    searched: &Searched<'_>,
+    wander: &Wander,
+    put_forward: &[Arc<dyn Candidate>],
+) -> Result<bool, CloseError> {
+    let found = &searched.found;
+    let chosen = &found.selection.chosen;
+    let own = chosen.iter().map(|&g| &found.candidates[g]);
+    let own: Vec<_> = own.chain(put_forward).cloned().collect();
+    let own = Begun::on(white, folds, own)?;
+    own.moments.sum_up();
+    let known: Vec<usize> = (0..chosen.len()).collect();
+    let new: Vec<usize> = (chosen.len()..own.candidates.len()).collect();
+
+    let groups = &own.plain.groups;
+    // what all that was tried makes each pay
+    let mut all = found.fitted.groups.clone();
+    let first = all.len();
+    all.extend_from_slice(&groups[chosen.len()..]);
+    let cost = costs(&all, &vec![true; all.len()]);
+    let places = chosen.iter().copied().chain(first..all.len());
+    let every: Vec<usize> = (0..groups.len()).collect();
+    let trial = Trial {
+        moments: &own.moments,
+        folds,
+        precision: white.precision(),
+        variance: own.plain.variance_beside(&every).unwrap_or(1.0),
+        groups,
+        cost: places.map(|g| cost[g]).collect(),
+        all: None,
+        single: false,
+    };
+    let worth = |set: &[usize]| {
+        let scored = trial.score(set, &wander.noise);
+        let scored = scored.ok_or(CloseError::Singular)?;
+        Ok(trial.worth(&scored, SLOW_PRICE))
+    };
+
+    let turns = known.iter().copied();
+    let turns: Vec<usize> = turns
+        .filter(|&at| own.candidates[at].acts_on_attitude())
+        .collect();
+    let mut out = vec![Vec::new()];
+    out.extend(turns.iter().map(|&at| vec![at]));
+    if turns.len() > 1 {
+        out.push(turns);
+    }
+    let with = |out: &[usize], at: usize| {
+        let rest = known.iter().copied().filter(|known| !out.contains(known));
+        rest.chain([at]).collect::<Vec<usize>>()
+    };
+    let mut sets = vec![known.clone()];
+    sets.extend(
+        new.iter()
+            .flat_map(|&at| out.iter().map(move |out| (out, at)))
+            .map(|(out, at)| with(out, at)),
+    );
+    let worths: Vec<f64> = sets
+        .par_iter()
+        .map(|set| worth(set))
+        .collect::<Result<_, CloseError>>()?;
+    let (before, with) = worths.split_first().ok_or(CloseError::Singular)?;
+    Ok(with.iter().all(|with| with + POLISH < *before))
+}
