@@ -304,13 +304,7 @@ fn explain(
     if scene.has_reference {
         put_forward.extend(orbit(level, folds, &scene, &outcome.searched, look)?);
     }
-    let in_vain = match &outcome.searched.wander {
-        Some(wander) if !put_forward.is_empty() => {
-            in_vain(level, folds, &outcome.searched, wander, &put_forward)?
-        }
-        _ => put_forward.is_empty(),
-    };
-    if !in_vain {
+    if !put_forward.is_empty() && !in_vain(level, folds, &outcome.searched, &put_forward)? {
         progress("searching again with the line, jump or orbit that is left");
         // what was put forward in vain changes nothing
         if let Outcome::Named(mut again) = named(&put_forward, false)?

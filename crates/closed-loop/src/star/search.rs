@@ -46,7 +46,7 @@ use crate::star::evidence::StarEvidence;
 use crate::star::landing::Elsewhere;
 use alone::{Begun, Outcome};
 pub(crate) use in_vain::in_vain;
-use trial::Trial;
+use trial::{Trial, taken_out_in_turn, without};
 
 mod alone;
 mod first_sight;
@@ -267,16 +267,11 @@ impl Instead {
         };
         let all: Vec<usize> = (0..chosen.len()).collect();
         let turns = all.iter().copied().filter(|&at| turns(&chosen[at]));
-        // the first without nothing
-        let mut out = vec![Vec::new()];
-        out.extend(turns.map(|at| vec![at]));
-        if out.len() > 2 {
-            out.push(out.concat());
-        }
+        // the first is the choice as it is
+        let out = taken_out_in_turn(turns.collect());
         let scored = out.par_iter().map(|out| {
-            let rest = all.iter().copied().filter(|at| !out.contains(at));
-            let rest: Vec<usize> = rest.collect();
-            let rest = trial.score(&rest, noise).ok_or(CloseError::Singular)?;
+            let rest = trial.score(&without(&all, out), noise);
+            let rest = rest.ok_or(CloseError::Singular)?;
             let slow_price = if out.is_empty() {
                 f64::INFINITY
             } else {
@@ -409,9 +404,9 @@ fn coloured<'a>(
         let mut stands = Vec::new();
         let mut fallen = None;
         for (at, &g) in chosen.iter().enumerate() {
-            let others: Vec<usize> = chosen.iter().copied().filter(|&c| c != g).collect();
-            let without = trial.score(&others, &noise).ok_or(CloseError::Singular)?;
-            let judgement = trial.judge(&base, at, &without, plain.groups[g].choices);
+            let others = trial.score(&without(&chosen, &[g]), &noise);
+            let others = others.ok_or(CloseError::Singular)?;
+            let judgement = trial.judge(&base, at, &others, plain.groups[g].choices);
             if !judgement.stands() {
                 fallen = Some(g);
             }

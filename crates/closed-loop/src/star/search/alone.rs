@@ -17,7 +17,7 @@ use block_regression::Folds;
 use coloured_noise::CommonNoise;
 use effects::Candidate;
 
-use super::trial::{Scored, Trial, paid_by_slow};
+use super::trial::{Scored, Trial, paid_by_slow, without};
 use super::{Wander, first_sight};
 use crate::declared::OnCentroids;
 use crate::error::CloseError;
@@ -223,13 +223,12 @@ impl<'a> Alone<'a> {
     /// Whether those that turn frames, as they are, explain so much less than a slow error in their place that no
     /// polish makes up for it. `fitted`: the fits that chose.
     fn is_hopeless(&self, fitted: &Fitted, start: &CommonNoise) -> bool {
-        let rest = self.chosen.iter().copied();
-        let rest: Vec<usize> = rest.filter(|g| !self.turns.contains(g)).collect();
+        let rest = without(self.chosen, &self.turns);
         let error = |set: &[usize]| fitted.fits.error(&columns_of(&fitted.groups, set));
-        let Some((without, with)) = error(&rest).zip(error(self.chosen)) else {
+        let Some((before, with)) = error(&rest).zip(error(self.chosen)) else {
             return false;
         };
-        let gain = 0.5 * fitted.scalars * (without / with).ln();
+        let gain = 0.5 * fitted.scalars * (before / with).ln();
         let slow = self.trial.climb(&self.trial.columns(&rest), start);
         let slow = slow.map_or(0.0, |(noise, rotations, _)| {
             0.5 * rotations.slow_ratio(&noise).iter().sum::<f64>()
@@ -266,8 +265,7 @@ impl<'a> Alone<'a> {
 
     /// What the rest is worth with a slow error in the place of `out`, nats.
     fn instead_of(&self, out: &[usize], start: &CommonNoise) -> Option<f64> {
-        let rest = self.chosen.iter().copied();
-        let rest: Vec<usize> = rest.filter(|g| !out.contains(g)).collect();
+        let rest = without(self.chosen, out);
         if !rest.is_empty() {
             let rest = self.trial.score(&rest, start)?;
             return Some(self.trial.worth(&rest, SLOW_PRICE));

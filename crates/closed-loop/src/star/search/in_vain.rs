@@ -11,9 +11,9 @@ use block_regression::Folds;
 use effects::Candidate;
 use rayon::prelude::*;
 
+use super::Searched;
 use super::alone::Begun;
-use super::trial::Trial;
-use super::{Searched, Wander};
+use super::trial::{Trial, taken_out_in_turn, without};
 use crate::error::CloseError;
 use crate::evidence::Evidence;
 use crate::search::selection::{SLOW_PRICE, costs};
@@ -22,14 +22,17 @@ use crate::star::evidence::StarEvidence;
 /// Nats that another polish may bring: what is put forward is at its best already.
 const POLISH: f64 = 3.0;
 
-/// Whether with none of `put_forward` the data is worth as much as with what was found.
+/// Whether with none of `put_forward` the data is worth as much as with what was found. Without a slow error that is
+/// left to the search, which is cheap then.
 pub(crate) fn in_vain(
     white: &StarEvidence<'_>,
     folds: &Folds,
     searched: &Searched<'_>,
-    wander: &Wander,
     put_forward: &[Arc<dyn Candidate>],
 ) -> Result<bool, CloseError> {
+    let Some(wander) = &searched.wander else {
+        return Ok(false);
+    };
     let found = &searched.found;
     let chosen = &found.selection.chosen;
     let own = chosen.iter().map(|&g| &found.candidates[g]);
@@ -64,24 +67,12 @@ pub(crate) fn in_vain(
     };
 
     let turns = known.iter().copied();
-    let turns: Vec<usize> = turns
-        .filter(|&at| own.candidates[at].acts_on_attitude())
-        .collect();
-    let mut out = vec![Vec::new()];
-    out.extend(turns.iter().map(|&at| vec![at]));
-    if turns.len() > 1 {
-        out.push(turns);
-    }
-    let with = |out: &[usize], at: usize| {
-        let rest = known.iter().copied().filter(|known| !out.contains(known));
-        rest.chain([at]).collect::<Vec<usize>>()
-    };
+    let turns = turns.filter(|&at| own.candidates[at].acts_on_attitude());
     let mut sets = vec![known.clone()];
-    sets.extend(
-        new.iter()
-            .flat_map(|&at| out.iter().map(move |out| (out, at)))
-            .map(|(out, at)| with(out, at)),
-    );
+    for out in taken_out_in_turn(turns.collect()) {
+        let rest = without(&known, &out);
+        sets.extend(new.iter().map(|&at| [&rest[..], &[at]].concat()));
+    }
     let worths: Vec<f64> = sets
         .par_iter()
         .map(|set| worth(set))

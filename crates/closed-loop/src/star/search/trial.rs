@@ -216,6 +216,22 @@ impl Trial<'_> {
     }
 }
 
+/// What of `chosen` is not taken `out`.
+pub(super) fn without(chosen: &[usize], out: &[usize]) -> Vec<usize> {
+    let kept = chosen.iter().copied();
+    kept.filter(|g| !out.contains(g)).collect()
+}
+
+/// What is taken out of a choice for another hypothesis: nothing, then each of `some`, then all of them.
+pub(super) fn taken_out_in_turn(some: Vec<usize>) -> Vec<Vec<usize>> {
+    let mut out = vec![Vec::new()];
+    out.extend(some.iter().map(|&g| vec![g]));
+    if some.len() > 1 {
+        out.push(some);
+    }
+    out
+}
+
 /// What slow errors pay of what they gain, `price` each, or all of it where that costs less: none across the
 /// boresight, one that is the same about X and Y, or one about each that has one; and that about Z.
 pub(super) fn paid_by_slow(slow: &SlowGains, price: f64) -> f64 {
