@@ -4,6 +4,7 @@
 //!
 //! - a description by variables explains the same and more ([`crate::causes::stand_ins`]),
 //! - or an effect is not the same wherever it acts ([`crate::causes::invariance`]),
+//! - or stars that rest do not agree on it ([`crate::causes::star_constants`]),
 //! - or more stars are misplaced than a catalogue has: something moves them all,
 //! - or it is next to nothing beside what no effect explains.
 //!
@@ -37,6 +38,7 @@ use commonness::Slow;
 use description::{Described, Kept, Part};
 use invariance::{Change, changing};
 use stand_ins::{BY_FAR, describe, stand_ins};
+use star_constants::Constants;
 
 mod changing_effect;
 pub(crate) mod commonness;
@@ -44,6 +46,7 @@ pub(crate) mod description;
 pub(crate) mod invariance;
 mod recurrence;
 mod stand_ins;
+pub(crate) mod star_constants;
 
 /// Nats by which a slow error of the reference is no likelier than effects in its place: a description that
 /// beats it speaks for them.
@@ -191,6 +194,14 @@ pub(crate) fn run<'a>(
             reinstated(&mut refused);
             continue;
         }
+        let constants = Constants::of(level, &searched.found, inside.as_deref());
+        if !last
+            && let Some(constants) = &constants
+            && let disputed = disputed(constants, &searched.found, &may)
+            && refuse(&mut refused, disputed, Refusal::StarConstants)
+        {
+            continue;
+        }
         if let Some(phase) = quest.lands
             && searched.found.choice().moves_light()
             && let Some(elsewhere) = Elsewhere::of(level, folds, searched.found.choice(), phase)?
@@ -199,6 +210,9 @@ pub(crate) fn run<'a>(
         }
         let terms = (quest.terms)(searched.wander.is_some());
         let described = Described::new(level, folds, &searched.found, terms, quest.ways)?;
+        let agreed = |set: &[usize], instead: &[Part]| {
+            constants.is_some_and(|constants| constants.agree(&described, set, instead))
+        };
         if let Some(wander) = searched.wander.as_ref().filter(|_| !last) {
             let plain = Described::new(&beside, folds, &searched.found, (quest.terms)(false), &[])?;
             let axes = wander.axes().iter().filter(|a| **a).count();
@@ -228,7 +242,7 @@ pub(crate) fn run<'a>(
             }
         }
         if !last {
-            if let Some((set, instead)) = stand_ins(&described) {
+            if let Some((set, instead)) = stand_ins(&described, &agreed) {
                 let chosen = &searched.found.selection.chosen;
                 let families = set
                     .iter()
@@ -249,19 +263,29 @@ pub(crate) fn run<'a>(
             // what is named has to stand beside what is left, and may stand there alone
             let named = !described.chosen.is_empty() || searched.wander.is_some();
             if (named || kept.is_empty())
-                && let Some(left) = described.left()
+                && let Some(mut left) = described.left()
             {
-                kept.extend(whole(&described, left));
-                continue;
+                if let Some(constants) = constants {
+                    left = constants.beyond(&described, left);
+                }
+                if !left.is_empty() {
+                    kept.extend(whole(&described, left));
+                    continue;
+                }
             }
         }
         if last {
             // nothing that is still spoken against is named
             let chosen = searched.found.selection.chosen.clone();
-            let spoken = stand_ins(&described).map(|(set, _)| (set, Refusal::StandIn));
+            let spoken = stand_ins(&described, &agreed).map(|(set, _)| (set, Refusal::StandIn));
             let beside = best_beside(&searched.found, &may);
             let changes = changing(&described, beside).map(|c| (vec![c.chosen], Refusal::Change));
-            let (spoken, why) = spoken.or(changes).unwrap_or((Vec::new(), Refusal::StandIn));
+            let disputed = constants.map(|constants| {
+                let paid = paid(&searched.found, &may);
+                (constants.disputed(&paid), Refusal::StarConstants)
+            });
+            let spoken = spoken.or(changes).or(disputed);
+            let (spoken, why) = spoken.unwrap_or((Vec::new(), Refusal::StandIn));
             for k in spoken {
                 let g = chosen[k];
                 refused.insert(family(searched.found.candidates[g].as_ref()), why);
@@ -354,7 +378,7 @@ fn suffice(
         return Ok(false);
     };
     let described = Described::new(level, folds, &searched.found, (quest.terms)(false), &[])?;
-    Ok(!described.chosen.is_empty() && stand_ins(&described).is_none())
+    Ok(!described.chosen.is_empty() && stand_ins(&described, &|_, _| false).is_none())
 }
 
 /// Families of the chosen effects that see the acceleration, where it comes from the samples of a reference
@@ -432,6 +456,28 @@ fn pile(found: &Found, stars: usize) -> Vec<String> {
         return Vec::new();
     }
     let all = (0..groups.len()).filter(|&g| groups[g].kind == MISPLACED);
+    all.map(|g| family(found.candidates[g].as_ref())).collect()
+}
+
+/// What having looked for each chosen effect costs, nats.
+fn paid(found: &Found, may: &[bool]) -> Vec<f64> {
+    let cost = costs(&found.fitted.groups, may);
+    let chosen = found.selection.chosen.iter();
+    chosen.map(|&g| cost[g].ln()).collect()
+}
+
+/// Families of effects on which resting stars do not agree; of stars and pixels all of a kind, where none of it stands.
+fn disputed(constants: &Constants<'_>, found: &Found, may: &[bool]) -> Vec<String> {
+    let groups = &found.fitted.groups;
+    let chosen = &found.selection.chosen;
+    let disputed = constants.disputed(&paid(found, may));
+    let disputed: Vec<usize> = disputed.into_iter().map(|k| chosen[k]).collect();
+    let standing = || chosen.iter().filter(|g| !disputed.contains(g));
+    let fallen = |kind: &str| {
+        disputed.iter().any(|&d| groups[d].kind == kind)
+            && standing().all(|&g| groups[g].kind != kind)
+    };
+    let all = (0..groups.len()).filter(|g| disputed.contains(g) || fallen(groups[*g].kind));
     all.map(|g| family(found.candidates[g].as_ref())).collect()
 }
 

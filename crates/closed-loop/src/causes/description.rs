@@ -200,6 +200,20 @@ impl Described {
         part.iter().map(|c| first + c).collect()
     }
 
+    /// The parts of the terms of that name.
+    pub(crate) fn parts_of(&self, name: &str) -> Vec<Part> {
+        let named = self
+            .terms
+            .iter()
+            .enumerate()
+            .filter(|(_, t)| t.term.name() == name);
+        let parts = |(k, term): (usize, &Term)| -> Vec<Part> {
+            let own = |part: &Vec<usize>| (k, part.iter().map(|c| c - term.first).collect());
+            term.parts.iter().map(own).collect()
+        };
+        named.flat_map(parts).collect()
+    }
+
     /// Parts that a description may be made of.
     pub(crate) fn tried(&self) -> usize {
         self.terms.iter().map(|t| t.parts.len()).sum()

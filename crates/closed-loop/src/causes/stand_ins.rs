@@ -51,8 +51,11 @@ const WORTH: f64 = 3.0;
 const APART: f64 = 1.0 - REMAINDER;
 
 /// The chosen set (positions among the chosen) that a description beats by most, if one
-/// does, and that description.
-pub(crate) fn stand_ins(described: &Described) -> Option<(Vec<usize>, Vec<Part>)> {
+/// does, and that description; what `agreed` holds of counts for the set.
+pub(crate) fn stand_ins(
+    described: &Described,
+    agreed: &dyn Fn(&[usize], &[Part]) -> bool,
+) -> Option<(Vec<usize>, Vec<Part>)> {
     let groups = &described.fitted.groups;
     let looked = described.looked();
     let mut most = None;
@@ -83,7 +86,7 @@ pub(crate) fn stand_ins(described: &Described) -> Option<(Vec<usize>, Vec<Part>)
             BY_FAR
         };
         let beyond = worth - parts.len() as f64 * looked - own - least;
-        if beyond > by {
+        if beyond > by && !agreed(&set, &parts) {
             by = beyond;
             most = Some((set, parts));
         }

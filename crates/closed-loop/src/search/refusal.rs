@@ -11,6 +11,7 @@ pub(crate) enum Refusal {
     OwnPath,
     Pile,
     SlowStars,
+    StarConstants,
     StandIn,
     Change,
     Remainder,
@@ -32,6 +33,7 @@ impl Refusal {
                 "more stars would be misplaced than a catalogue has: something moves them all"
             }
             Self::SlowStars => "slow noise of the stars makes as much",
+            Self::StarConstants => "stars err by constants of their own, of which it is a part",
             Self::StandIn => "what the residual follows explains the same and more",
             Self::Change => {
                 "it is not the same at all times, on all stars and all over the detector"

@@ -11,6 +11,7 @@ use telemetry::{DarkMap, Model, StarResiduals};
 
 use crate::causes::commonness::Slow;
 use crate::causes::description::{self, Described};
+use crate::causes::star_constants::Constants;
 use crate::error::CloseError;
 use crate::evidence::Residuals;
 use crate::figures;
@@ -228,6 +229,9 @@ pub(crate) fn finish(
         slow.tell(&mut unattributed, last / whole);
     }
     own.tell(&mut unattributed, last / whole);
+    if let Some(constants) = Constants::of(f.level, f.found, inside.as_deref()) {
+        constants.tell(f.described, last / whole, &mut unattributed);
+    }
     noise_left.tell(&mut unattributed);
     let excess = excess(f, last);
     let mut considered = figures::considered(f.found, excess, f.refused, &surroundings);

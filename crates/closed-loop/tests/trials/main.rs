@@ -15,4 +15,5 @@ mod patterns;
 mod power;
 mod restless;
 mod snapshots;
+mod star_constants;
 mod unknown;

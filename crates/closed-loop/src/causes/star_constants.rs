@@ -1,0 +1,247 @@
+//! Whether stars that hardly move agree on an effect, or each errs by a constant of its own.
+//!
+//! Every star of a real camera errs by something of its own: what stands beside it, its spectrum, its place in the
+//! catalogue. Where stars rest, that is known to a hundredth of a row's noise after some thousand frames, and whatever
+//! gives each star a constant takes a part of it. No noise of rows speaks against that; the other stars do. So of the
+//! mean errors of the stars, in units of what white noise leaves of them,
+//!
+//! ```text
+//! h(Q, v) = v (1 + ln(Q/v)),  Q > v        -2 ln likelihood of v numbers of squares Q
+//!           Q,                otherwise    if they scatter as is likeliest, by noise or more
+//! gain    = (h(Q + q, v + k) - h(Q, v) - h(q, k) + W) / 2
+//! ```
+//!
+//! of an effect of k columns that takes q of the squares and leaves Q of v numbers: by how much it is likelier that k of
+//! them are an effect of any size than that all are draws of one law. W are the squares that it takes, with the size
+//! that it has, from each star's rows beside their mean, where white noise counts. Effects that explain as many numbers
+//! as there are gain nothing.
+//!
+//! Source: empirical Bayes by the largest likelihood of a variance (Efron and Morris 1973).
+
+use telemetry::report::{Dependence, Unattributed};
+
+use crate::causes::commonness::IN_TIME;
+use crate::causes::description::{Described, Part};
+use crate::causes::stand_ins::BY_FAR;
+use crate::search::selection::columns_of;
+use crate::search::{Found, first_column};
+use crate::star::data::StarData;
+use crate::star::evidence::StarEvidence;
+use means::{Means, Shift};
+
+mod means;
+
+/// Rows of a star from which its mean is known better than a row.
+const LEAST_ROWS: usize = 5;
+/// What each column pays for having been chosen, nats: it is there or not.
+const CHOSEN: f64 = std::f64::consts::LN_2;
+/// What constants pay that do not show in as many numbers as were explained, nats: as any kind of effect does.
+const UNSEEN: f64 = 3.0;
+/// Share of what an effect takes of the means of stars from which it shows beside them.
+const BESIDE: f64 = 0.1;
+/// Name in the report.
+const STAR: &str = "star";
+
+/// What was chosen, and what it leaves of resting stars.
+#[derive(Clone, Copy)]
+pub(crate) struct Constants<'a> {
+    level: &'a StarEvidence<'a>,
+    found: &'a Found,
+    inside: &'a [Vec<f64>],
+}
+
+impl<'a> Constants<'a> {
+    /// `inside`: what is left in sample, arcsec. `None` where stars were not seen often enough for their means to say
+    /// more than rows do, or their places are unknown.
+    pub(crate) fn of(
+        level: &'a StarEvidence<'a>,
+        found: &'a Found,
+        inside: Option<&'a [Vec<f64>]>,
+    ) -> Option<Self> {
+        let data: &StarData = level.data;
+        let told = !data.free_directions && data.t_s.len() >= LEAST_ROWS * data.stars.len();
+        let inside = inside.filter(|_| told)?;
+        Some(Self {
+            level,
+            found,
+            inside,
+        })
+    }
+
+    /// Places among the chosen of those that give stars constants, and what they do: what turns the camera does not, and
+    /// of what acts on attitudes nothing is seen where the reference's noise turns every frame.
+    fn shifting(&self) -> (Vec<usize>, Vec<Shift<'a>>) {
+        let groups = &self.found.fitted.groups;
+        let chosen = &self.found.selection.chosen;
+        let (mut places, mut shifts) = (Vec::new(), Vec::new());
+        let Some(estimate) = self.found.fitted.fits.estimate(&columns_of(groups, chosen)) else {
+            return (places, shifts);
+        };
+        let restless = !self.level.data.free_attitude && means::turns_freely(self.level);
+        let mut values = estimate.value.iter().copied();
+        for (place, &group) in chosen.iter().enumerate() {
+            let candidate = self.found.candidates[group].as_ref();
+            let first = first_column(&self.found.candidates, group);
+            let columns: Vec<usize> = groups[group].columns.iter().map(|c| c - first).collect();
+            let values = values.by_ref().take(columns.len()).collect();
+            let turns = candidate.turns_camera() || restless && candidate.acts_on_attitude();
+            if !turns {
+                places.push(place);
+                shifts.push(Shift {
+                    candidate,
+                    columns,
+                    values,
+                });
+            }
+        }
+        (places, shifts)
+    }
+
+    /// Which of the chosen, by their places, the stars do not agree on; each pays so many nats.
+    pub(crate) fn disputed(&self, paid: &[f64]) -> Vec<usize> {
+        let (places, shifts) = self.shifting();
+        if shifts.is_empty() {
+            return Vec::new();
+        }
+        let means = Means::of(self.level, &shifts, self.inside);
+        let mut standing: Vec<usize> = (0..shifts.len()).collect();
+        let mut disputed = Vec::new();
+        while !standing.is_empty() {
+            let spared = if means.are_noise(&standing) {
+                UNSEEN
+            } else {
+                0.0
+            };
+            let margin = |of: &[usize]| {
+                let each = of.iter();
+                let paid = each.map(|&e| paid[places[e]] + price(&shifts[e].columns));
+                means.gain(&standing, of) + spared - paid.sum::<f64>()
+            };
+            let margins: Vec<f64> = standing.iter().map(|&e| margin(&[e])).collect();
+            // of those alike the one that was added last
+            let least = (0..standing.len()).rev();
+            let Some(least) = least.min_by(|&a, &b| margins[a].total_cmp(&margins[b])) else {
+                break;
+            };
+            if margins[least] >= 0.0 && margin(&standing) >= 0.0 {
+                break;
+            }
+            disputed.push(places[standing.remove(least)]);
+        }
+        disputed
+    }
+
+    /// Whether stars that rest agree on `set`, places among the chosen, as much as on the description that explains more:
+    /// a dozen columns describe the constants of half a dozen stars, whatever these are.
+    pub(crate) fn agree(&self, described: &Described, set: &[usize], instead: &[Part]) -> bool {
+        let (places, mut shifts) = self.shifting();
+        let own: Vec<usize> = (0..places.len())
+            .filter(|&e| set.contains(&places[e]))
+            .collect();
+        if own.len() < set.len() {
+            return false;
+        }
+        let chosen: Vec<usize> = (0..shifts.len()).collect();
+        shifts.extend(instead.iter().map(|part| term_of(described, part)));
+        let means = Means::of(self.level, &shifts, self.inside);
+        let terms: Vec<usize> = (chosen.len()..shifts.len()).collect();
+        let price_of = |of: &[usize]| of.iter().map(|&e| price(&shifts[e].columns)).sum::<f64>();
+        let paid: f64 = set.iter().map(|&k| described.paid[k]).sum();
+        let gain = means.between(&chosen, &own) - paid - price_of(&own);
+        let others: Vec<usize> = chosen
+            .iter()
+            .copied()
+            .filter(|e| !own.contains(e))
+            .collect();
+        let with = [others, terms.clone()].concat();
+        let looked = described.looked() * instead.len() as f64;
+        let described = means.between(&with, &terms) - looked - price_of(&terms);
+        let rests = means.beside(&own) < BESIDE * means.taken(&chosen, &own);
+        rests && gain > 0.0 && gain + BY_FAR > described
+    }
+
+    /// Those of `parts` that say more of the stars than that each has a constant of its own.
+    pub(crate) fn beyond(&self, described: &Described, parts: Vec<Part>) -> Vec<Part> {
+        let (_, mut shifts) = self.shifting();
+        let chosen = shifts.len();
+        shifts.extend(parts.iter().map(|part| term_of(described, part)));
+        let means = Means::of(self.level, &shifts, self.inside);
+        let standing: Vec<usize> = (0..chosen).collect();
+        if means.scatter(&standing).is_none() {
+            return parts;
+        }
+        let says = |at: usize| {
+            let with = [standing.clone(), vec![chosen + at]].concat();
+            let paid = described.looked() + price(&shifts[chosen + at].columns);
+            means.gain(&with, &[chosen + at]) > paid
+        };
+        let says: Vec<bool> = (0..parts.len()).map(says).collect();
+        let each = parts.into_iter().zip(says);
+        each.filter(|(_, says)| *says)
+            .map(|(part, _)| part)
+            .collect()
+    }
+
+    /// Puts `star` where it belongs among what the leftover follows: before what gives the stars constants of which
+    /// these hold no more than chance, if they have any. `left` is the share of the before variance that is left.
+    pub(crate) fn tell(&self, described: &Described, left: f64, unattributed: &mut Unattributed) {
+        let beside = |more: Option<&Part>| {
+            let (_, mut shifts) = self.shifting();
+            shifts.extend(more.map(|part| term_of(described, part)));
+            let standing: Vec<usize> = (0..shifts.len()).collect();
+            (Means::of(self.level, &shifts, self.inside), standing)
+        };
+        if !unattributed.present {
+            return;
+        }
+        let (means, standing) = beside(None);
+        let Some((mut share, p_value)) = means.scatter(&standing) else {
+            return;
+        };
+        let paid = described.looked() + BY_FAR;
+        let (mut before, mut behind) = (Vec::new(), Vec::new());
+        for entry in std::mem::take(&mut unattributed.depends_on) {
+            if entry.variable == STAR || entry.variable == IN_TIME {
+                continue;
+            }
+            let parts = described.parts_of(&entry.variable);
+            let gains = parts.iter().filter_map(|part| {
+                let (means, standing) = beside(Some(part));
+                let own = *standing.last()?;
+                let share = means.scatter(&standing).map_or(0.0, |(share, _)| share);
+                Some((means.gain(&standing, &[own]), share))
+            });
+            let best = gains.max_by(|a, b| a.0.total_cmp(&b.0));
+            let (stands, own) = best.map_or((true, share), |(gain, own)| (gain > paid, own));
+            if stands && entry.variance_explained > own {
+                share = own;
+                before.push(entry);
+            } else {
+                behind.push(entry);
+            }
+        }
+        before.push(Dependence {
+            variable: STAR.to_owned(),
+            variance_explained: share,
+            p_value,
+        });
+        before.extend(behind);
+        let most = before.iter().map(|d| d.variance_explained);
+        unattributed.variance_fraction = Some(left * most.fold(0.0, f64::max));
+        unattributed.depends_on = before;
+    }
+}
+
+/// What columns pay for having been chosen, nats.
+fn price(columns: &[usize]) -> f64 {
+    columns.len() as f64 * CHOSEN
+}
+
+/// A part of a description, of which nothing is in the fit.
+fn term_of<'a>(described: &'a Described, (term, columns): &Part) -> Shift<'a> {
+    Shift {
+        candidate: &described.terms[*term].term,
+        columns: columns.clone(),
+        values: vec![0.0; columns.len()],
+    }
+}
