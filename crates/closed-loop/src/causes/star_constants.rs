@@ -209,10 +209,13 @@ impl<'a> Constants<'a> {
                 let (means, standing) = beside(Some(part));
                 let own = *standing.last()?;
                 let share = means.scatter(&standing).map_or(0.0, |(share, _)| share);
-                Some((means.gain(&standing, &[own]), share))
+                let gain = means.gain(&standing, &[own]);
+                // one slope that explains the same is before many stars
+                let stands = gain > paid || gain > 0.0 && means.are_noise(&standing);
+                Some((stands, gain, share))
             });
-            let best = gains.max_by(|a, b| a.0.total_cmp(&b.0));
-            let (stands, own) = best.map_or((true, share), |(gain, own)| (gain > paid, own));
+            let best = gains.max_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
+            let (stands, own) = best.map_or((true, share), |(stands, _, own)| (stands, own));
             if stands && entry.variance_explained > own {
                 share = own;
                 before.push(entry);

@@ -1,5 +1,7 @@
 //! Stars that hardly move, and each errs by a constant of its own.
 
+use std::collections::BTreeMap;
+
 use rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -11,31 +13,40 @@ use crate::kit::{Case, Path, closed, named};
 /// Noise of a centroid, circular, arcsec.
 const NOISE: f64 = 0.5;
 
-/// Stars alone that a camera at rest looks at for seven minutes, each off by a constant of `sigmas` of a row's noise
-/// along each axis; what else acts is in `case`.
-fn seen(case: &Case, sigmas: f64) -> Report {
+/// Stars alone that a camera at rest looks at for seven minutes, each off along both axes by so many of a row's sigmas as
+/// its magnitude has it (`of`); what else acts is in `case`.
+fn seen(case: &Case, mut of: impl FnMut(f64) -> [f64; 2]) -> Report {
     let scenario = case.clone().reference("none").quiet(NOISE);
     let mut bundle = simulate(&scenario).expect("a bundle");
-    let mut rng = Xoshiro256PlusPlus::seed_from_u64(case.seed);
     let camera = scenario.model.camera().expect("a camera");
     let camera = camera.expect("a focal length");
-    let px = sigmas * NOISE / 2.0_f64.sqrt() / camera.arcsec_per_px()[0];
-    let stars = bundle.stars.as_mut().expect("stars");
-    let mut ids = stars.star_id.clone();
-    ids.sort_unstable();
-    ids.dedup();
-    let normal = |rng: &mut Xoshiro256PlusPlus| -> f64 { StandardNormal.sample(rng) };
-    let off: Vec<[f64; 2]> = ids
-        .iter()
-        .map(|_| [0, 1].map(|_| px * normal(&mut rng)))
+    let sigma_px = NOISE / 2.0_f64.sqrt() / camera.arcsec_per_px()[0];
+    let catalog = bundle.catalog.as_ref().expect("a catalogue");
+    let ids = catalog.stars().iter().map(|star| star.id);
+    let off: BTreeMap<i64, [f64; 2]> = ids
+        .zip(catalog.stars().iter().map(|star| of(star.mag)))
         .collect();
-    for row in 0..stars.star_id.len() {
-        let own = ids.binary_search(&stars.star_id[row]).expect("a star");
-        stars.x_px[row] += off[own][0];
-        stars.y_px[row] += off[own][1];
+    let stars = bundle.stars.as_mut().expect("stars");
+    for (row, id) in stars.star_id.iter().enumerate() {
+        stars.x_px[row] += sigma_px * off[id][0];
+        stars.y_px[row] += sigma_px * off[id][1];
     }
     let model = scenario.model_without_effects();
     closed(&model, &bundle).expect("the loop closes").report
+}
+
+/// The same off by constants that know of nothing.
+fn scattered(case: &Case, sigmas: f64) -> Report {
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(case.seed);
+    let mut normal = move || -> f64 { StandardNormal.sample(&mut rng) };
+    seen(case, |_| [sigmas * normal(), sigmas * normal()])
+}
+
+/// What is left follows first.
+fn first(report: &Report) -> Option<&str> {
+    let left = report.unattributed.depends_on.first();
+    let left = left.filter(|_| report.unattributed.present);
+    left.map(|d| d.variable.as_str())
 }
 
 /// Of eight stars there are thirteen numbers, which nine parameters of a lens and eight waves of a pixel phase explain
@@ -51,12 +62,11 @@ fn constants_of_stars_are_no_effect() {
         for seed in seeds {
             let mut case = Case::new(Path::Rest, 8100 + seed);
             case.stars = stars;
-            let report = seen(&case, sigmas);
+            let report = scattered(&case, sigmas);
             let what = format!("{stars} stars of {sigmas} sigma, seed {seed}");
             assert_eq!(named(&report), Vec::<&str>::new(), "{what}");
             assert_eq!(report.verdict, Verdict::Unexplained, "{what}");
-            let first = report.unattributed.depends_on.first();
-            assert_eq!(first.map(|d| d.variable.as_str()), Some("star"), "{what}");
+            assert_eq!(first(&report), Some("star"), "{what}");
         }
     }
 }
@@ -67,11 +77,21 @@ fn what_stars_at_rest_agree_on_is_named() {
     for sigmas in [0.0, 0.5] {
         let mut case = Case::new(Path::Rest, 8200).with("optical_distortion", "k1 = 2e-3");
         case.stars = 14;
-        let report = seen(&case, sigmas);
+        let report = scattered(&case, sigmas);
         assert_eq!(named(&report), ["optical_distortion"], "{sigmas}");
-        let left = report.unattributed.depends_on.first();
-        let left = left.filter(|_| report.unattributed.present);
         let own = (sigmas > 0.0).then_some("star");
-        assert_eq!(left.map(|d| d.variable.as_str()), own, "{sigmas}");
+        assert_eq!(first(&report), own, "{sigmas}");
+    }
+}
+
+/// A slope in magnitude of half a sigma a row is one number where constants are thirteen.
+#[test]
+fn a_slope_of_resting_stars_is_before_their_constants() {
+    for seed in 0..3 {
+        let mut case = Case::new(Path::Rest, 8300 + seed);
+        case.stars = 8;
+        let report = seen(&case, |mag| [0.5 * (mag - 4.0), 0.0]);
+        assert_eq!(named(&report), Vec::<&str>::new(), "{seed}");
+        assert_eq!(first(&report), Some("mag"), "{seed}");
     }
 }
