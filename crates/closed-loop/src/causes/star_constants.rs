@@ -23,6 +23,7 @@ use telemetry::report::{Dependence, Unattributed};
 use crate::causes::commonness::IN_TIME;
 use crate::causes::description::{Described, Part};
 use crate::causes::stand_ins::BY_FAR;
+use crate::search::misplaced::MISPLACED;
 use crate::search::selection::columns_of;
 use crate::search::{Found, first_column};
 use crate::star::data::StarData;
@@ -131,14 +132,16 @@ impl<'a> Constants<'a> {
         disputed
     }
 
-    /// Whether stars that rest agree on `set`, places among the chosen, as much as on the description that explains more:
-    /// a dozen columns describe the constants of half a dozen stars, whatever these are.
+    /// Whether stars that rest agree on `set`, places among the chosen, and not on the description that explains more: a
+    /// dozen columns describe the constants of half a dozen stars, whatever these are.
     pub(crate) fn agree(&self, described: &Described, set: &[usize], instead: &[Part]) -> bool {
         let (places, mut shifts) = self.shifting();
         let own: Vec<usize> = (0..places.len())
             .filter(|&e| set.contains(&places[e]))
             .collect();
-        if own.len() < set.len() {
+        // one star never wins against a slope
+        let one = |&e: &usize| shifts[e].candidate.id() == MISPLACED;
+        if own.len() < set.len() || own.iter().any(one) {
             return false;
         }
         let chosen: Vec<usize> = (0..shifts.len()).collect();
@@ -157,7 +160,7 @@ impl<'a> Constants<'a> {
         let looked = described.looked() * instead.len() as f64;
         let described = means.between(&with, &terms) - looked - price_of(&terms);
         let rests = means.beside(&own) < BESIDE * means.taken(&chosen, &own);
-        rests && gain > 0.0 && gain + BY_FAR > described
+        rests && gain > 0.0 && described < 0.0
     }
 
     /// Those of `parts` that say more of the stars than that each has a constant of its own.
