@@ -265,7 +265,9 @@ pub(crate) fn run<'a>(
             if (named || kept.is_empty())
                 && let Some(mut left) = described.left()
             {
-                if let Some(constants) = constants {
+                // single stars and pixels have to stand beside constants, too
+                let single = |name: &&str| [MISPLACED, "hot_pixel"].contains(name);
+                if let Some(constants) = constants.filter(|_| !described.names.iter().any(single)) {
                     left = constants.beyond(&described, left);
                 }
                 if !left.is_empty() {

@@ -194,7 +194,9 @@ impl<'a> Constants<'a> {
             let standing: Vec<usize> = (0..shifts.len()).collect();
             (Means::of(self.level, &shifts, self.inside), standing)
         };
-        if !unattributed.present {
+        // what jumps or swings is no constant
+        let lasts = unattributed.jumps_s.is_empty() && unattributed.lines_hz.is_empty();
+        if !unattributed.present || !lasts {
             return;
         }
         let (means, standing) = beside(None);
