@@ -195,13 +195,6 @@ pub(crate) fn run<'a>(
             continue;
         }
         let constants = Constants::of(level, &searched.found, inside.as_deref());
-        if !last
-            && let Some(constants) = &constants
-            && let disputed = disputed(constants, &searched.found, &may)
-            && refuse(&mut refused, disputed, Refusal::StarConstants)
-        {
-            continue;
-        }
         if let Some(phase) = quest.lands
             && searched.found.choice().moves_light()
             && let Some(elsewhere) = Elsewhere::of(level, folds, searched.found.choice(), phase)?
@@ -258,6 +251,12 @@ pub(crate) fn run<'a>(
                     Refusal::Change,
                 );
                 kept.extend(keep(&searched.found, g, change));
+                continue;
+            }
+            if let Some(constants) = &constants
+                && let disputed = disputed(constants, &searched.found, &may)
+                && refuse(&mut refused, disputed, Refusal::StarConstants)
+            {
                 continue;
             }
             // what is named has to stand beside what is left, and may stand there alone
