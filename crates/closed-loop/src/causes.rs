@@ -29,7 +29,7 @@ use crate::search::empirical::Empirical;
 use crate::search::misplaced::{MISPLACED, piled};
 use crate::search::refusal::{Refusal, Refused};
 use crate::search::selection::{columns_of, costs};
-use crate::search::{Found, borrowed, family, first_column, fit_beside, joined};
+use crate::search::{Found, borrowed, family, fit_beside, joined};
 use crate::star::evidence::StarEvidence;
 use crate::star::landing::Elsewhere;
 use crate::star::search::{Attempt, Searched, attempt, declared_noise};
@@ -264,9 +264,7 @@ pub(crate) fn run<'a>(
             if (named || kept.is_empty())
                 && let Some(mut left) = described.left()
             {
-                // single stars and pixels have to stand beside constants, too
-                let single = |name: &&str| [MISPLACED, "hot_pixel"].contains(name);
-                if let Some(constants) = constants.filter(|_| !described.names.iter().any(single)) {
+                if let Some(constants) = constants {
                     left = constants.beyond(&described, left);
                 }
                 if !left.is_empty() {
@@ -598,12 +596,7 @@ fn doubtful(described: &Described, found: &Found, inflation: f64, may: &[bool]) 
 
 /// The effect and its change, for every fit from now on.
 fn keep(found: &Found, g: usize, change: Change) -> Vec<Arc<dyn Candidate>> {
-    let first = first_column(&found.candidates, g);
-    let columns: Vec<usize> = found.fitted.groups[g]
-        .columns
-        .iter()
-        .map(|c| c - first)
-        .collect();
+    let columns = found.own_columns(g);
     let effect = Arc::clone(&found.candidates[g]);
     let mut values = vec![0.0; effect.coefficients().len()];
     for (&column, value) in columns.iter().zip(&change.values) {

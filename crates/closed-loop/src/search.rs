@@ -305,6 +305,13 @@ impl Found {
         })
     }
 
+    /// The columns of candidate `g` that the data show, counted from its own first.
+    pub(crate) fn own_columns(&self, g: usize) -> Vec<usize> {
+        let first = first_column(&self.candidates, g);
+        let columns = self.fitted.groups[g].columns.iter();
+        columns.map(|c| c - first).collect()
+    }
+
     /// What `chosen` leave out of fold.
     pub(crate) fn left_out_of_fold(
         &self,
@@ -498,6 +505,12 @@ pub(crate) fn joined(
 /// The place of the first column of candidate `g` among those of all.
 pub(crate) fn first_column(candidates: &[Arc<dyn Candidate>], g: usize) -> usize {
     candidates[..g].iter().map(|c| c.coefficients().len()).sum()
+}
+
+/// What of `chosen` is not taken `out`.
+pub(crate) fn without(chosen: &[usize], out: &[usize]) -> Vec<usize> {
+    let kept = chosen.iter().copied();
+    kept.filter(|g| !out.contains(g)).collect()
 }
 
 /// The candidates as the pipeline borrows them.

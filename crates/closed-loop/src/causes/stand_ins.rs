@@ -37,6 +37,7 @@ use crate::causes::REMAINDER;
 use crate::causes::description::{Described, Part};
 use crate::search::orbits::OWN_SHAPE;
 use crate::search::selection::{FAMILY_ALPHA, columns_of, each};
+use crate::search::without;
 
 /// Nats by which a description must be worth more.
 pub(crate) const BY_FAR: f64 = 4.0;
@@ -61,9 +62,7 @@ pub(crate) fn stand_ins(
     let mut most = None;
     let mut by = 0.0;
     for set in sets(described) {
-        let chosen = described.chosen.iter().copied();
-        let rest: Vec<usize> = chosen.filter(|g| !set.contains(g)).collect();
-        let rest = columns_of(groups, &rest);
+        let rest = columns_of(groups, &without(&described.chosen, &set));
         let Some(times) = too_large(described, &set, &rest) else {
             continue;
         };

@@ -25,7 +25,7 @@ use crate::causes::description::{Described, Part};
 use crate::causes::stand_ins::BY_FAR;
 use crate::search::misplaced::MISPLACED;
 use crate::search::selection::columns_of;
-use crate::search::{Found, first_column};
+use crate::search::{Found, without};
 use crate::star::data::StarData;
 use crate::star::evidence::StarEvidence;
 use means::{Means, Shift};
@@ -40,6 +40,8 @@ const CHOSEN: f64 = std::f64::consts::LN_2;
 const UNSEEN: f64 = 3.0;
 /// Share of what an effect takes of the means of stars from which it shows beside them.
 const BESIDE: f64 = 0.1;
+/// Parts of a variable whose columns are held at once.
+const TOGETHER: usize = 8;
 /// Name in the report.
 const STAR: &str = "star";
 
@@ -82,8 +84,7 @@ impl<'a> Constants<'a> {
         let mut values = estimate.value.iter().copied();
         for (place, &group) in chosen.iter().enumerate() {
             let candidate = self.found.candidates[group].as_ref();
-            let first = first_column(&self.found.candidates, group);
-            let columns: Vec<usize> = groups[group].columns.iter().map(|c| c - first).collect();
+            let columns = self.found.own_columns(group);
             let values = values.by_ref().take(columns.len()).collect();
             let turns = candidate.turns_camera() || restless && candidate.acts_on_attitude();
             if !turns {
@@ -151,12 +152,7 @@ impl<'a> Constants<'a> {
         let price_of = |of: &[usize]| of.iter().map(|&e| price(&shifts[e].columns)).sum::<f64>();
         let paid: f64 = set.iter().map(|&k| described.paid[k]).sum();
         let gain = means.between(&chosen, &own) - paid - price_of(&own);
-        let others: Vec<usize> = chosen
-            .iter()
-            .copied()
-            .filter(|e| !own.contains(e))
-            .collect();
-        let with = [others, terms.clone()].concat();
+        let with = [without(&chosen, &own), terms.clone()].concat();
         let looked = described.looked() * instead.len() as f64;
         let described = means.between(&with, &terms) - looked - price_of(&terms);
         let rests = means.beside(&own) < BESIDE * means.taken(&chosen, &own);
@@ -188,18 +184,12 @@ impl<'a> Constants<'a> {
     /// Puts `star` where it belongs among what the leftover follows: before what gives the stars constants of which
     /// these hold no more than chance, if they have any. `left` is the share of the before variance that is left.
     pub(crate) fn tell(&self, described: &Described, left: f64, unattributed: &mut Unattributed) {
-        let beside = |more: Option<&Part>| {
-            let (_, mut shifts) = self.shifting();
-            shifts.extend(more.map(|part| term_of(described, part)));
-            let standing: Vec<usize> = (0..shifts.len()).collect();
-            (Means::of(self.level, &shifts, self.inside), standing)
-        };
-        // what jumps or swings is no constant
-        let lasts = unattributed.jumps_s.is_empty() && unattributed.lines_hz.is_empty();
-        if !unattributed.present || !lasts {
+        if !unattributed.present {
             return;
         }
-        let (means, standing) = beside(None);
+        let (_, chosen) = self.shifting();
+        let standing: Vec<usize> = (0..chosen.len()).collect();
+        let means = Means::of(self.level, &chosen, self.inside);
         let Some((mut share, p_value)) = means.scatter(&standing) else {
             return;
         };
@@ -210,15 +200,22 @@ impl<'a> Constants<'a> {
                 continue;
             }
             let parts = described.parts_of(&entry.variable);
-            let gains = parts.iter().filter_map(|part| {
-                let (means, standing) = beside(Some(part));
-                let own = *standing.last()?;
-                let share = means.scatter(&standing).map_or(0.0, |(share, _)| share);
-                let gain = means.gain(&standing, &[own]);
-                // one slope that explains the same is before many stars
-                let stands = gain > paid || gain > 0.0 && means.are_noise(&standing);
-                Some((stands, gain, share))
-            });
+            let of = |parts: &[Part]| {
+                let (_, mut shifts) = self.shifting();
+                shifts.extend(parts.iter().map(|part| term_of(described, part)));
+                let means = Means::of(self.level, &shifts, self.inside);
+                let each = standing.len()..shifts.len();
+                let judged = each.map(|own| {
+                    let with = [standing.as_slice(), &[own]].concat();
+                    let share = means.scatter(&with).map_or(0.0, |(share, _)| share);
+                    let gain = means.gain(&with, &[own]);
+                    // one slope that explains the same is before many stars
+                    let stands = gain > paid || gain > 0.0 && means.are_noise(&with);
+                    (stands, gain, share)
+                });
+                judged.collect::<Vec<_>>()
+            };
+            let gains = parts.chunks(TOGETHER).flat_map(of);
             let best = gains.max_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
             let (stands, own) = best.map_or((true, share), |(stands, _, own)| (stands, own));
             if stands && entry.variance_explained > own {

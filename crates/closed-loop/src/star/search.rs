@@ -41,12 +41,12 @@ use crate::declared::OnCentroids;
 use crate::error::CloseError;
 use crate::evidence::Evidence;
 use crate::search::selection::{FAMILY_ALPHA, SLOW_PRICE, Selection, WIDENING, costs, price};
-use crate::search::{Choice, Fitted, Found, borrowed, fit, fit_grams, polish, search};
+use crate::search::{Choice, Fitted, Found, borrowed, fit, fit_grams, polish, search, without};
 use crate::star::evidence::StarEvidence;
 use crate::star::landing::Elsewhere;
 use alone::{Begun, Outcome};
 pub(crate) use in_vain::in_vain;
-use trial::{Trial, taken_out_in_turn, without};
+use trial::{Trial, taken_out_in_turn};
 
 mod alone;
 mod first_sight;

@@ -12,6 +12,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, Matrix3xX, Vector3};
 use rayon::prelude::*;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
+use crate::search::without;
 use crate::star::columns::star_columns_of;
 use crate::star::data::StarData;
 use crate::star::evidence::StarEvidence;
@@ -218,12 +219,7 @@ impl Means {
 
     /// Squares that some of the `standing` shifts take beside the others.
     pub(super) fn taken(&self, standing: &[usize], some: &[usize]) -> f64 {
-        let others: Vec<usize> = standing
-            .iter()
-            .copied()
-            .filter(|e| !some.contains(e))
-            .collect();
-        (self.left(&others).0 - self.left(standing).0).max(0.0)
+        (self.left(&without(standing, some)).0 - self.left(standing).0).max(0.0)
     }
 
     /// Squares that these shifts take beside the means.
@@ -257,14 +253,9 @@ impl Means {
     /// The same by the means alone.
     pub(super) fn between(&self, standing: &[usize], some: &[usize]) -> f64 {
         let (left, numbers) = self.left(standing);
-        let others: Vec<usize> = standing
-            .iter()
-            .copied()
-            .filter(|e| !some.contains(e))
-            .collect();
-        let (without, more) = self.left(&others);
-        let taken = minus_two_ln((without - left).max(0.0), more - numbers);
-        let between = minus_two_ln(without, more) - minus_two_ln(left, numbers) - taken;
+        let (before, more) = self.left(&without(standing, some));
+        let taken = minus_two_ln((before - left).max(0.0), more - numbers);
+        let between = minus_two_ln(before, more) - minus_two_ln(left, numbers) - taken;
         0.5 * between
     }
 }

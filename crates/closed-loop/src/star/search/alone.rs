@@ -17,13 +17,13 @@ use block_regression::Folds;
 use coloured_noise::CommonNoise;
 use effects::Candidate;
 
-use super::trial::{Scored, Trial, paid_by_slow, without};
+use super::trial::{Scored, Trial, paid_by_slow};
 use super::{Wander, first_sight};
 use crate::declared::OnCentroids;
 use crate::error::CloseError;
 use crate::evidence::Evidence;
 use crate::search::selection::{SLOW_PRICE, columns_of, costs};
-use crate::search::{Choice, Fitted, Found, borrowed, fit_grams, polish};
+use crate::search::{Choice, Fitted, Found, borrowed, fit_grams, polish, without};
 use crate::star::evidence::StarEvidence;
 use crate::star::landing::Elsewhere;
 use crate::star::moments::StarMoments;

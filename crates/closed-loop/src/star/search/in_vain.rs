@@ -13,10 +13,11 @@ use rayon::prelude::*;
 
 use super::Searched;
 use super::alone::Begun;
-use super::trial::{Trial, taken_out_in_turn, without};
+use super::trial::{Trial, taken_out_in_turn};
 use crate::error::CloseError;
 use crate::evidence::Evidence;
 use crate::search::selection::{SLOW_PRICE, costs};
+use crate::search::without;
 use crate::star::evidence::StarEvidence;
 
 /// Nats that another polish may bring: what is put forward is at its best already.

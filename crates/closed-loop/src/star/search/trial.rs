@@ -216,12 +216,6 @@ impl Trial<'_> {
     }
 }
 
-/// What of `chosen` is not taken `out`.
-pub(super) fn without(chosen: &[usize], out: &[usize]) -> Vec<usize> {
-    let kept = chosen.iter().copied();
-    kept.filter(|g| !out.contains(g)).collect()
-}
-
 /// What is taken out of a choice for another hypothesis: nothing, then each of `some`, then all of them.
 pub(super) fn taken_out_in_turn(some: Vec<usize>) -> Vec<Vec<usize>> {
     let mut out = vec![Vec::new()];
