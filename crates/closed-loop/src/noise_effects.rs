@@ -29,6 +29,8 @@ mod within_stars;
 use std::collections::BTreeMap;
 
 use block_regression::Folds;
+use effects::longest_exposure_s;
+use spectra::robust::median_step;
 use telemetry::report::{ConsideredEffect, Estimate, FoundEffect};
 use telemetry::{EffectEntry, EffectValue, Model};
 
@@ -203,6 +205,14 @@ fn declared_outliers(situation: &Situation<'_>) -> Result<Option<[f64; 2]>, Clos
     Ok(found)
 }
 
+/// Largest noise of a rate that nature makes, arcsec/(deg/s): of a spot that is smeared over the longest exposure any
+/// point, a uniform spread.
+fn most_rate(situation: &Situation<'_>, data: &StarData) -> f64 {
+    let step_s = median_step(&data.frames.t_s).unwrap_or(f64::INFINITY);
+    let longest_s = longest_exposure_s(step_s, situation.exposure_s());
+    3600.0 * longest_s / 12.0_f64.sqrt()
+}
+
 /// Looks for effects on the noise in the `residual` that the stars leave at `level`.
 pub(crate) fn claim(
     situation: &Situation<'_>,
@@ -230,6 +240,7 @@ pub(crate) fn claim(
         } else {
             SLOPE_OF_NONE
         },
+        most_rate: most_rate(situation, data),
         outliers: declared_outliers(situation)?,
     };
     let Some(mut verdicts) = judge(&make, folds, known) else {

@@ -30,8 +30,15 @@ const ID: &str = "exposure_smear";
 
 /// Exposure about which the columns are first taken, when none is declared, s.
 const TYPICAL_S: f64 = 0.1;
-/// Longest exposure that is looked for, s; or that between frames, where these are further apart.
+/// Longest exposure of frames that are close to each other, s.
 const LONGEST_S: f64 = 2.0;
+
+/// Longest exposure that a tracker may have whose frames are `step_s` apart (infinite for one frame): 2 s, the
+/// step, or what is declared, s.
+pub fn longest_exposure_s(step_s: f64, declared_s: Option<f64>) -> f64 {
+    let step_s = if step_s.is_finite() { step_s } else { 0.0 };
+    step_s.max(LONGEST_S).max(declared_s.unwrap_or(0.0))
+}
 
 /// The kind.
 #[derive(Debug)]
@@ -67,8 +74,7 @@ impl EffectKind for Kind {
             return Vec::new();
         }
         let about_s = scene.exposure_s.unwrap_or(TYPICAL_S);
-        let between_s = Some(scene.step_s).filter(|s| s.is_finite());
-        let longest_s = between_s.unwrap_or(0.0).max(LONGEST_S).max(about_s);
+        let longest_s = longest_exposure_s(scene.step_s, scene.exposure_s);
         vec![Box::new(SmearCandidate::about(about_s, longest_s))]
     }
 }

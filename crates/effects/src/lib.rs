@@ -52,6 +52,7 @@ pub use catalogue::{build, catalogue, kind};
 pub use effect::{ActsOn, Effect, EffectKind, ReferenceWander};
 pub use empirical::empirical_parameters;
 pub use error::EffectError;
+pub use exposure_smear::longest_exposure_s;
 pub use hot_pixel::hot_pixel_at;
 pub use parameters::{Parameter, ParameterValue, Parameters};
 pub use path::mean_turn;

@@ -23,6 +23,11 @@ use crate::{
 
 const ID: &str = "rolling_shutter";
 
+/// Largest line time that is declared, and that is believed where frames follow each other too fast for it, s;
+/// between the two one read-out from frame to frame.
+const LARGEST_S: f64 = 0.1;
+const MOST_S: f64 = 2e-3;
+
 /// The kind.
 #[derive(Debug)]
 pub(crate) struct Kind;
@@ -51,7 +56,7 @@ impl EffectKind for Kind {
         let reader = Reader::new(ID, parameters, &["line_time_s"])?;
         let line_time_s = reader.within(
             "line_time_s",
-            [-0.1, 0.1],
+            [-LARGEST_S, LARGEST_S],
             "between -0.1 s and 0.1 s per row",
         )?;
         Ok(Box::new(RollingShutter { line_time_s }))
@@ -60,7 +65,13 @@ impl EffectKind for Kind {
         if !scene.has_stars {
             return Vec::new();
         }
-        vec![Box::new(ShutterCandidate::about(0.0))]
+        let frame_s = if scene.step_s.is_finite() {
+            scene.step_s / f64::from(scene.surroundings.camera.pixels()[1])
+        } else {
+            0.0
+        };
+        let most_s = frame_s.clamp(MOST_S, LARGEST_S);
+        vec![Box::new(ShutterCandidate::about(0.0, most_s))]
     }
 }
 
@@ -93,14 +104,19 @@ impl Effect for RollingShutter {
 #[derive(Clone, Debug)]
 struct ShutterCandidate {
     about_s: f64,
+    most_s: f64,
     coefficients: [Coefficient; 1],
 }
 
 impl ShutterCandidate {
-    fn about(about_s: f64) -> Self {
+    fn about(about_s: f64, most_s: f64) -> Self {
+        let coefficient = Coefficient::new("line_time_s", "s", 1e-4)
+            .at_least(-most_s)
+            .at_most(most_s);
         Self {
             about_s,
-            coefficients: [Coefficient::new("line_time_s", "s", 1e-4)],
+            most_s,
+            coefficients: [coefficient],
         }
     }
 }
@@ -118,7 +134,7 @@ impl Candidate for ShutterCandidate {
     fn refined(&self, values: &[f64]) -> Option<Box<dyn Candidate>> {
         values[0]
             .is_finite()
-            .then(|| Box::new(Self::about(values[0])) as Box<dyn Candidate>)
+            .then(|| Box::new(Self::about(values[0], self.most_s)) as Box<dyn Candidate>)
     }
     fn acts_on_stars(&self) -> bool {
         true

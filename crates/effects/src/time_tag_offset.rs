@@ -23,6 +23,9 @@ use crate::{
 };
 
 const ID: &str = "time_tag_offset";
+/// Largest offsets that a clock makes, or one frame taken for the next.
+const MOST_S: f64 = 1.0;
+const MOST_FRAMES: f64 = 1.5;
 
 /// The kind.
 #[derive(Debug)]
@@ -58,7 +61,12 @@ impl EffectKind for Kind {
         if !(scene.has_stars || scene.has_attitude && scene.has_reference) {
             return Vec::new();
         }
-        vec![Box::new(OffsetCandidate::about(0.0))]
+        let most_s = if scene.step_s.is_finite() {
+            MOST_S.max(MOST_FRAMES * scene.step_s)
+        } else {
+            MOST_S
+        };
+        vec![Box::new(OffsetCandidate::about(0.0, most_s))]
     }
 }
 
@@ -91,14 +99,19 @@ impl Effect for TimeTagOffset {
 #[derive(Clone, Debug)]
 struct OffsetCandidate {
     about_s: f64,
+    most_s: f64,
     coefficients: [Coefficient; 1],
 }
 
 impl OffsetCandidate {
-    fn about(about_s: f64) -> Self {
+    fn about(about_s: f64, most_s: f64) -> Self {
+        let coefficient = Coefficient::new("offset_s", "s", 0.05)
+            .at_least(-most_s)
+            .at_most(most_s);
         Self {
             about_s,
-            coefficients: [Coefficient::new("offset_s", "s", 0.05)],
+            most_s,
+            coefficients: [coefficient],
         }
     }
 }
@@ -113,7 +126,7 @@ impl Candidate for OffsetCandidate {
     fn refined(&self, values: &[f64]) -> Option<Box<dyn Candidate>> {
         values[0]
             .is_finite()
-            .then(|| Box::new(Self::about(values[0])) as Box<dyn Candidate>)
+            .then(|| Box::new(Self::about(values[0], self.most_s)) as Box<dyn Candidate>)
     }
     fn acts_on_stars(&self) -> bool {
         true

@@ -45,9 +45,8 @@ const MIN_STARS: usize = 4;
 const MIN_SPREAD_MAG: f64 = 0.02;
 /// Least relative spread of the squared rate.
 const MIN_SPREAD_RATE: f64 = 0.05;
-/// Largest slope, and noise of a rate in arcsec/(deg/s), that nature makes.
+/// Largest slope that nature makes.
 const CREDIBLE_SLOPE: f64 = 4.0;
-const CREDIBLE_RATE: f64 = 300.0;
 /// Fewest spikes that are a rate.
 const MIN_SPIKES: f64 = 3.0;
 /// Share of the largest share beyond which it would be larger still.
@@ -142,8 +141,8 @@ struct Bench<'a> {
     model: Model,
     folds: &'a Folds,
     stars: usize,
-    /// A slope that passes for nothing.
     least_slope: f64,
+    most_rate: f64,
 }
 
 /// A fit, how well its parameters are known, and what its folds tell where that is asked for.
@@ -167,6 +166,8 @@ pub(super) struct Known {
     pub(super) moving: bool,
     /// A slope that passes for nothing.
     pub(super) least_slope: f64,
+    /// Largest noise of a rate that nature makes, arcsec/(deg/s).
+    pub(super) most_rate: f64,
     /// Declared share and size.
     pub(super) outliers: Option<[f64; 2]>,
 }
@@ -199,6 +200,7 @@ pub(super) fn judge(make: &Make<'_>, folds: &Folds, known: Known) -> Option<Verd
         folds,
         stars,
         least_slope: known.least_slope,
+        most_rate: known.most_rate,
     };
     let full = up(hill, &bench.model, &bench.rows, free)?;
     let outliers = bench.spikes(&full);
@@ -415,7 +417,7 @@ impl Bench<'_> {
         };
         let credible = match k {
             MAGNITUDE => value.abs() <= CREDIBLE_SLOPE,
-            _ => values[0] <= CREDIBLE_RATE,
+            _ => values[0] <= self.most_rate,
         };
         let significant = gain > 0.0 && p_value < FAMILY_ALPHA;
         let against = if !credible {

@@ -25,6 +25,7 @@ const STARS: usize = 14;
 const KNOWN: Known = Known {
     moving: true,
     least_slope: super::SLOPE_OF_NONE,
+    most_rate: 300.0,
     outliers: None,
 };
 
