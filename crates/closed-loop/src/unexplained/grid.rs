@@ -44,3 +44,18 @@ impl Grid {
         self.first_hz + k as f64 * self.step_hz
     }
 }
+
+/// The frequency of most `power` within a `step` of `f`, by halves of it down to 1/4000.
+pub(crate) fn top(f: f64, step: f64, power: impl Fn(f64) -> f64) -> f64 {
+    let (mut centre, mut width) = (f, step);
+    for _ in 0..12 {
+        let best = [-1.0, -0.5, 0.0, 0.5, 1.0]
+            .map(|s| centre + s * width)
+            .into_iter()
+            .filter(|f| *f > 0.0)
+            .max_by(|a, b| power(*a).total_cmp(&power(*b)));
+        centre = best.unwrap_or(centre);
+        width *= 0.5;
+    }
+    centre
+}

@@ -14,6 +14,7 @@
 //! as slow without it as with it, they wander. And it has to be the stars': what a frame turned by
 //! is known but for its noise, and a reference that wanders leaves a step or a line in all stars alike, so
 //! that one has to be beyond chance at its instant or frequency without all that the stars of a frame share, too.
+//! A strong line passes for a step and a step for a line: of both the lesser one is looked for beside the other.
 //!
 //! Source: Scargle 1982 (periodogram); Wilks 1938.
 
@@ -27,7 +28,7 @@ use telemetry::report::Unattributed;
 use crate::causes::commonness::{self, IN_TIME, MOSTLY, stars_first};
 use crate::star::data::StarData;
 use crate::unexplained::around::Around;
-use crate::unexplained::grid::Grid;
+use crate::unexplained::grid::{Grid, top};
 use crate::unexplained::star_freedom::Freedom;
 
 /// Chance that either is told although there is none.
@@ -51,6 +52,8 @@ const USUAL: Around = Around {
 const MIN_SIDE: usize = 8;
 /// Sums of squares have wider tails than chi-squared.
 const WIDER: f64 = 1.3;
+/// Steps of the samples within which two jumps are one.
+const NEAR_STEPS: f64 = 2.5;
 /// Share of the stars' slow noise that may be left beside a step.
 const LEFT_SLOW: f64 = 0.5;
 /// Of the span, times on which noise is slow.
@@ -61,8 +64,9 @@ const SLOW_SHARE: f64 = 0.2;
 pub(crate) struct OwnSeries {
     pub(crate) line_hz: Option<f64>,
     pub(crate) jump_s: Option<f64>,
-    /// Lines nearer to each other are one.
+    /// Lines nearer to each other are one, and so are jumps.
     bin_hz: f64,
+    apart_s: f64,
     p_value: f64,
     explained: f64,
 }
@@ -80,8 +84,11 @@ impl OwnSeries {
         let line = self.line_hz.filter(new);
         lines.extend(line);
         lines.sort_by(f64::total_cmp);
-        unattributed.jumps_s.extend(self.jump_s);
-        unattributed.jumps_s.sort_by(f64::total_cmp);
+        let jumps = &mut unattributed.jumps_s;
+        let new = |t: &f64| jumps.iter().all(|s| (t - s).abs() > self.apart_s);
+        let jump = self.jump_s.filter(new);
+        jumps.extend(jump);
+        jumps.sort_by(f64::total_cmp);
         if !unattributed.present {
             unattributed.depends_on.clear();
         }
@@ -135,25 +142,55 @@ pub(crate) fn search(
         return out;
     };
     out.bin_hz = 1.0 / (last - first);
-    if let Some(lines) = Lines::of(&series, freedom, last - first)
-        && let Some((k, p, squares)) = lines.best()
-        && let Some(apart) = Lines::of(&by_itself, *beside_rotation, last - first)
-        && k < apart.grid.bins
-        && apart.at(k).0 < ALPHA_ALONE
-    {
-        out.line_hz = Some(lines.grid.at(k));
-        out.p_value = p;
-        out.explained = squares / (2.0 * rows);
+    out.apart_s = NEAR_STEPS * median_step(&data.frames.t_s).unwrap_or(0.0);
+    let line_in = |series: &[Own]| {
+        let lines = Lines::of(series, freedom, last - first)?;
+        let (k, found) = lines.best(series)?;
+        let apart = Lines::of(&by_itself, *beside_rotation, last - first)?;
+        (k < apart.grid.bins && apart.at(k).0 < ALPHA_ALONE).then_some(found)
+    };
+    let step_in = |series: &[Own]| {
+        let found = step(series, freedom, &data.frames.t_s)?;
+        let alone = step_at(&by_itself, *beside_rotation, found.at);
+        (alone.is_some_and(|(p, _)| p < ALPHA_ALONE) && is_no_wander(data, own, found.at))
+            .then_some(found)
+    };
+    let less = |basis: &(dyn Fn(f64) -> [f64; 2] + Sync)| -> Vec<Own> {
+        series.iter().map(|s| s.beside(basis)).collect()
+    };
+    let (mut line, mut jump) = (line_in(&series), step_in(&series));
+    if let (Some(both), Some(t)) = (&line, &jump) {
+        if both.squares > t.squares {
+            let omega = std::f64::consts::TAU * both.at;
+            jump = step_in(&less(&|t| [(omega * t).cos(), (omega * t).sin()]));
+        } else {
+            let side = |after: bool| f64::from(u8::from(after));
+            line = line_in(&less(&|s| [side(s <= t.at), side(s > t.at)]));
+        }
     }
-    if let Some((t, p, square)) = step(&series, freedom, &data.frames.t_s)
-        && step_at(&by_itself, *beside_rotation, t).is_some_and(|(p, _)| p < ALPHA_ALONE)
-        && is_no_wander(data, own, t)
-    {
-        out.jump_s = Some(t);
-        out.p_value = out.p_value.min(p);
-        out.explained = out.explained.max(square / (2.0 * rows));
+    for found in [&line, &jump].into_iter().flatten() {
+        out.p_value = out.p_value.min(found.p_value);
+        out.explained = out.explained.max(found.squares / (2.0 * rows));
     }
+    out.line_hz = line.map(|l| l.at);
+    out.jump_s = jump.map(|j| j.at);
     out
+}
+
+/// A line or a step: its frequency or instant, its chance, and the squares that it takes.
+#[derive(Clone, Copy, Debug)]
+struct Event {
+    at: f64,
+    p_value: f64,
+    squares: f64,
+}
+
+impl Event {
+    /// The one of most certain; of chances too small to tell, the one that takes most.
+    fn first(&self, other: &Self) -> std::cmp::Ordering {
+        let chance = self.p_value.total_cmp(&other.p_value);
+        chance.then(other.squares.total_cmp(&self.squares))
+    }
 }
 
 fn series(data: &StarData, own: &[Vec<f64>], weight: &[f64]) -> Vec<Own> {
@@ -195,20 +232,7 @@ fn series(data: &StarData, own: &[Vec<f64>], weight: &[f64]) -> Vec<Own> {
             }
             count.push(k);
         }
-        let sums = |of: &dyn Fn(usize) -> f64| -> Vec<f64> {
-            let mut all = vec![0.0];
-            for k in 0..count.len() {
-                all.push(all[k] + of(k));
-            }
-            all
-        };
-        Some(Own {
-            before: sums(&|k| count[k]),
-            running: [0, 1].map(|a| sums(&|k| count[k] * means[a][k])),
-            t_s,
-            value: means,
-            count,
-        })
+        Some(Own::of(t_s, means, count))
     });
     each.collect()
 }
@@ -265,33 +289,46 @@ impl Lines {
         (2.0 * one.min(all), squares)
     }
 
-    /// The line that is most certain: its grid point, chance, and the squares that it takes.
-    fn best(&self) -> Option<(usize, f64, f64)> {
+    /// The line of `series` that is most certain, and its grid point.
+    fn best(&self, series: &[Own]) -> Option<(usize, Event)> {
         let tried = (0..self.grid.bins).into_par_iter().map(|k| {
             let (p, squares) = self.at(k);
-            // the top between grid points
-            (k, 2.0 * self.grid.bins as f64 * p, squares.max(0.0))
+            let line = Event {
+                at: self.grid.at(k),
+                // the top between grid points
+                p_value: 2.0 * self.grid.bins as f64 * p,
+                squares: squares.max(0.0),
+            };
+            (k, line)
         });
-        tried
-            .min_by(|a, b| a.1.total_cmp(&b.1))
-            .filter(|best| best.1 < ALPHA)
+        let (k, line) = tried
+            .min_by(|a, b| a.1.first(&b.1))
+            .filter(|best| best.1.p_value < ALPHA)?;
+        let power = |f: f64| -> f64 { series.iter().map(|s| s.power_at(f)).sum() };
+        let at = top(line.at, self.grid.step_hz, power);
+        Some((k, Event { at, ..line }))
     }
 }
 
-/// The step that is most certain: its instant, chance, and the squares that it takes.
-fn step(series: &[Own], freedom: Freedom, t_s: &[f64]) -> Option<(f64, f64, f64)> {
+/// The step that is most certain.
+fn step(series: &[Own], freedom: Freedom, t_s: &[f64]) -> Option<Event> {
     let stride = t_s.len().div_ceil(MOST_POINTS).max(1);
     let instants: Vec<f64> = t_s
         .windows(2)
         .step_by(stride)
         .map(|w| 0.5 * (w[0] + w[1]))
         .collect();
-    let (t, (p, squares)) = instants
-        .par_iter()
-        .filter_map(|&t| Some((t, step_at(series, freedom, t)?)))
-        .min_by(|a, b| a.1.0.total_cmp(&b.1.0))?;
-    let p = p * instants.len() as f64;
-    (p < ALPHA).then_some((t, p, squares))
+    let tried = instants.par_iter().filter_map(|&at| {
+        let (p, squares) = step_at(series, freedom, at)?;
+        Some(Event {
+            at,
+            p_value: p * instants.len() as f64,
+            squares,
+        })
+    });
+    tried
+        .min_by(|a, b| a.first(b))
+        .filter(|best| best.p_value < ALPHA)
 }
 
 /// A step of every star at `t`: its chance there, and the squares that it takes.
@@ -328,7 +365,55 @@ fn is_no_wander(data: &StarData, own: &[Vec<f64>], t: f64) -> bool {
     slow(&beside) < LEFT_SLOW * slow(own)
 }
 
+/// Sums of two functions of time over the points of a star, and of their products with each axis.
+#[derive(Clone, Copy, Debug, Default)]
+struct Sums {
+    cc: f64,
+    cs: f64,
+    ss: f64,
+    score: [[f64; 2]; 2],
+}
+
+impl Sums {
+    /// Sizes of the two on each axis; none where they are not told apart.
+    fn sizes(&self) -> [[f64; 2]; 2] {
+        let determinant = self.cc * self.ss - self.cs * self.cs;
+        self.score.map(|[c, s]| {
+            let sizes = [self.ss * c - self.cs * s, self.cc * s - self.cs * c];
+            if determinant > 0.0 {
+                sizes.map(|size| size / determinant)
+            } else {
+                [0.0; 2]
+            }
+        })
+    }
+
+    /// Squares that the two take of both axes.
+    fn squares(&self) -> f64 {
+        let each = self.sizes().into_iter().zip(self.score);
+        each.map(|([a, b], [c, s])| a * c + b * s).sum()
+    }
+}
+
 impl Own {
+    /// With the sums of the rows.
+    fn of(t_s: Vec<f64>, value: [Vec<f64>; 2], count: Vec<f64>) -> Self {
+        let sums = |of: &dyn Fn(usize) -> f64| -> Vec<f64> {
+            let mut all = vec![0.0];
+            for k in 0..count.len() {
+                all.push(all[k] + of(k));
+            }
+            all
+        };
+        Self {
+            before: sums(&|k| count[k]),
+            running: [0, 1].map(|a| sums(&|k| count[k] * value[a][k])),
+            t_s,
+            value,
+            count,
+        }
+    }
+
     /// Squares that a step at `t` takes of both axes, in units of the noise.
     fn step_square(&self, t: f64) -> Option<f64> {
         let at = self.t_s.partition_point(|v| *v < t);
@@ -344,6 +429,44 @@ impl Own {
         Some(self.running.iter().map(square).sum())
     }
 
+    /// Squares that a sinusoid of this frequency takes of both axes, in units of the noise.
+    fn power_at(&self, f: f64) -> f64 {
+        let omega = std::f64::consts::TAU * f;
+        let each = self.t_s.iter().map(|t| omega * (t - self.t_s[0]));
+        let at: Vec<[f64; 2]> = each.map(|phase| [phase.cos(), phase.sin()]).collect();
+        self.sums(&at).squares()
+    }
+
+    /// Sums of two functions of time, at the points.
+    fn sums(&self, at: &[[f64; 2]]) -> Sums {
+        let [x, y] = &self.value;
+        let mut sums = Sums::default();
+        for (i, (&[c, s], n)) in at.iter().zip(&self.count).enumerate() {
+            let (nc, ns) = (n * c, n * s);
+            sums.cc += nc * c;
+            sums.cs += nc * s;
+            sums.ss += ns * s;
+            for (score, value) in sums.score.iter_mut().zip([x[i], y[i]]) {
+                score[0] += nc * value;
+                score[1] += ns * value;
+            }
+        }
+        sums
+    }
+
+    /// Less what two functions of time take of each axis.
+    fn beside(&self, basis: impl Fn(f64) -> [f64; 2]) -> Self {
+        let at: Vec<[f64; 2]> = self.t_s.iter().map(|t| basis(*t)).collect();
+        let sizes = self.sums(&at).sizes();
+        let mut value = self.value.clone();
+        for (value, [a, b]) in value.iter_mut().zip(sizes) {
+            for (v, [c, s]) in value.iter_mut().zip(&at) {
+                *v -= a * c + b * s;
+            }
+        }
+        Self::of(self.t_s.clone(), value, self.count.clone())
+    }
+
     /// Squares that a sinusoid takes of both axes, in units of the noise, at the frequencies of
     /// `grid`. Phasors of all points are turned from one frequency to the next.
     fn powers(&self, grid: &Grid) -> Vec<f64> {
@@ -353,28 +476,9 @@ impl Own {
             each.map(|phase| [phase.cos(), phase.sin()]).collect()
         };
         let (mut at, by) = (phasor(grid.first_hz), phasor(grid.step_hz));
-        let [x, y] = &self.value;
-        let power = |at: &[[f64; 2]]| {
-            let (mut cc, mut cs, mut ss) = (0.0, 0.0, 0.0);
-            let mut score = [[0.0; 2]; 2];
-            for (i, (&[c, s], n)) in at.iter().zip(&self.count).enumerate() {
-                let (c, s, nc, ns) = (c, s, n * c, n * s);
-                cc += nc * c;
-                cs += nc * s;
-                ss += ns * s;
-                score[0][0] += nc * x[i];
-                score[0][1] += ns * x[i];
-                score[1][0] += nc * y[i];
-                score[1][1] += ns * y[i];
-            }
-            let determinant = cc * ss - cs * cs;
-            let square =
-                |[c, s]: [f64; 2]| (ss * c * c - 2.0 * cs * c * s + cc * s * s) / determinant;
-            score.into_iter().map(square).sum()
-        };
         (0..grid.bins)
             .map(|_| {
-                let squares = power(&at);
+                let squares = self.sums(&at).squares();
                 for ([c, s], [bc, bs]) in at.iter_mut().zip(&by) {
                     (*c, *s) = (*c * bc - *s * bs, *s * bc + *c * bs);
                 }
@@ -394,8 +498,9 @@ mod tests {
     use rand_distr::{Distribution, StandardNormal};
     use rand_xoshiro::Xoshiro256PlusPlus;
 
-    /// What is found of six stars for 750 s where each swings at 0.05 Hz by half its noise, `apart` in phase.
-    fn swinging(apart: f64) -> OwnSeries {
+    /// What is found of six stars for 750 s that do this by themselves, of time and star, in units of their noise;
+    /// `alike`: all the same, so that they turn the frame.
+    fn found(alike: bool, does: impl Fn(f64, f64) -> f64) -> OwnSeries {
         let camera = Camera::from_fov_deg([1024, 1024], [20.0, 20.0]).unwrap();
         let mut frames = StarFrames::new();
         let t_s: Vec<f64> = (0..1500).map(|k| 0.5 * f64::from(k)).collect();
@@ -412,23 +517,66 @@ mod tests {
         let rows = data.t_s.len();
         let noise = [(); 2]
             .map(|()| -> Vec<f64> { (0..rows).map(|_| StandardNormal.sample(&mut rng)).collect() });
-        let swing = |r: usize| {
-            0.5 * (std::f64::consts::TAU * 0.05 * data.t_s[r] + apart * data.star[r] as f64).sin()
-        };
         let own = noise.each_ref().map(|axis| -> Vec<f64> {
-            axis.iter().enumerate().map(|(r, v)| v + swing(r)).collect()
+            let each = axis.iter().enumerate();
+            each.map(|(r, v)| v + does(data.t_s[r], data.star[r] as f64))
+                .collect()
         });
-        // what all stars do alike turns the frame
-        let alone = if apart > 0.0 { own.clone() } else { noise };
+        let alone = if alike { noise } else { own.clone() };
         search(&data, &own, || alone, &vec![1.0; rows])
     }
 
-    /// A line of 1500/16 nats an axis and star is beyond doubt, and the stars' own only where they differ.
+    /// A line of half the noise is 1500/16 nats an axis and star, beyond doubt; of thirty times the noise no chance is
+    /// left in which the frequencies differ. It is the stars' own only where they differ, and no step.
     #[test]
-    fn a_line_that_all_stars_share_is_not_their_own() {
-        let found = swinging(1.0);
-        assert!((found.line_hz.unwrap() - 0.05).abs() < found.bin_hz);
-        assert_eq!(swinging(0.0).line_hz, None);
+    fn a_line_is_told_at_its_frequency_and_is_no_step() {
+        let swing = |size: f64, apart: f64| {
+            found(apart == 0.0, |t, star| {
+                size * (std::f64::consts::TAU * 0.0507 * t + apart * star).sin()
+            })
+        };
+        for size in [0.5, 30.0] {
+            let found = swing(size, 1.0);
+            // the bound is sqrt(6) / (pi T) times the noise over the amplitudes and the root of half the numbers
+            let sigma = 6.0_f64.sqrt() / (std::f64::consts::PI * 750.0 * size * 9000.0_f64.sqrt());
+            let off = found.line_hz.unwrap() - 0.0507;
+            assert!(
+                off.abs() < 5.0 * sigma + 0.001 * found.bin_hz,
+                "{size}: {off}"
+            );
+            assert_eq!(found.jump_s, None, "{size}");
+        }
+        assert_eq!(swing(0.5, 0.0).line_hz, None);
+    }
+
+    /// A step of thirty times the noise has no chance at hundreds of instants, and is no line.
+    #[test]
+    fn a_step_is_told_at_its_instant_and_is_no_line() {
+        for size in [0.5, 30.0] {
+            let step =
+                |t: f64, star: f64| size * (star - 2.5).signum() * f64::from(u8::from(t > 290.0));
+            let found = found(false, step);
+            assert!((found.jump_s.unwrap() - 290.25).abs() < 5.0, "{size}");
+            assert!(size < 1.0 || found.jump_s == Some(290.25));
+            assert_eq!(found.line_hz, None, "{size}");
+        }
+    }
+
+    /// A jump that all stars share and each by itself is one.
+    #[test]
+    fn a_jump_that_is_known_is_listed_once() {
+        let own = OwnSeries {
+            jump_s: Some(290.25),
+            apart_s: 1.25,
+            explained: 0.3,
+            ..OwnSeries::default()
+        };
+        let mut left = Unattributed {
+            jumps_s: vec![289.75],
+            ..Unattributed::default()
+        };
+        own.tell(&mut left, 1.0);
+        assert_eq!(left.jumps_s, [289.75]);
     }
 
     /// A line that is listed already is not listed again; that it is the stars' is told all the same.

@@ -22,7 +22,7 @@ use spectra::{LombScargle, LombScargleSettings};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use crate::unexplained::around::Around;
-use crate::unexplained::grid::Grid;
+use crate::unexplained::grid::{Grid, top};
 
 use super::{MOST, Series, Track};
 
@@ -260,16 +260,6 @@ impl Track {
                 .and_then(|plan| plan.process(white).ok())
                 .map_or(0.0, |psd| psd.psd[0])
         };
-        let (mut centre, mut width) = (f, step);
-        for _ in 0..12 {
-            let best = [-1.0, -0.5, 0.0, 0.5, 1.0]
-                .map(|s| centre + s * width)
-                .into_iter()
-                .filter(|f| *f > 0.0)
-                .max_by(|a, b| power(*a).total_cmp(&power(*b)));
-            centre = best.unwrap_or(centre);
-            width *= 0.5;
-        }
-        centre
+        top(f, step, power)
     }
 }
