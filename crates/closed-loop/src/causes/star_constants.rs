@@ -28,7 +28,7 @@ use crate::search::selection::columns_of;
 use crate::search::{Found, without};
 use crate::star::data::StarData;
 use crate::star::evidence::StarEvidence;
-use means::{Means, Shift};
+use means::{Left, Means, Shift};
 
 mod means;
 
@@ -46,11 +46,10 @@ const TOGETHER: usize = 8;
 const STAR: &str = "star";
 
 /// What was chosen, and what it leaves of resting stars.
-#[derive(Clone, Copy)]
 pub(crate) struct Constants<'a> {
     level: &'a StarEvidence<'a>,
     found: &'a Found,
-    inside: &'a [Vec<f64>],
+    left: Left<'a>,
 }
 
 impl<'a> Constants<'a> {
@@ -64,10 +63,16 @@ impl<'a> Constants<'a> {
         let data: &StarData = level.data;
         let told = !data.free_directions && data.t_s.len() >= LEAST_ROWS * data.stars.len();
         let inside = inside.filter(|_| told)?;
+        let set = columns_of(&found.fitted.groups, &found.selection.chosen);
+        let values = found.fitted.fits.estimate(&set)?.value;
+        let nuisance = found.fitted.fits.nuisance(None, &set, &values);
         Some(Self {
             level,
             found,
-            inside,
+            left: Left {
+                inside,
+                distortion: level.nuisance.distortion_of(&nuisance),
+            },
         })
     }
 
@@ -105,7 +110,7 @@ impl<'a> Constants<'a> {
         if shifts.is_empty() {
             return Vec::new();
         }
-        let means = Means::of(self.level, &shifts, self.inside);
+        let means = Means::of(self.level, &shifts, &self.left);
         let mut standing: Vec<usize> = (0..shifts.len()).collect();
         let mut disputed = Vec::new();
         while !standing.is_empty() {
@@ -147,7 +152,7 @@ impl<'a> Constants<'a> {
         }
         let chosen: Vec<usize> = (0..shifts.len()).collect();
         shifts.extend(instead.iter().map(|part| term_of(described, part)));
-        let means = Means::of(self.level, &shifts, self.inside);
+        let means = Means::of(self.level, &shifts, &self.left);
         let terms: Vec<usize> = (chosen.len()..shifts.len()).collect();
         let price_of = |of: &[usize]| of.iter().map(|&e| price(&shifts[e].columns)).sum::<f64>();
         let paid: f64 = set.iter().map(|&k| described.paid[k]).sum();
@@ -164,7 +169,7 @@ impl<'a> Constants<'a> {
         let (_, mut shifts) = self.shifting();
         let chosen = shifts.len();
         shifts.extend(parts.iter().map(|part| term_of(described, part)));
-        let means = Means::of(self.level, &shifts, self.inside);
+        let means = Means::of(self.level, &shifts, &self.left);
         let standing: Vec<usize> = (0..chosen).collect();
         if means.scatter(&standing).is_none() {
             return parts;
@@ -189,7 +194,7 @@ impl<'a> Constants<'a> {
         }
         let (_, chosen) = self.shifting();
         let standing: Vec<usize> = (0..chosen.len()).collect();
-        let means = Means::of(self.level, &chosen, self.inside);
+        let means = Means::of(self.level, &chosen, &self.left);
         let Some((mut share, p_value)) = means.scatter(&standing) else {
             return;
         };
@@ -203,7 +208,7 @@ impl<'a> Constants<'a> {
             let of = |parts: &[Part]| {
                 let (_, mut shifts) = self.shifting();
                 shifts.extend(parts.iter().map(|part| term_of(described, part)));
-                let means = Means::of(self.level, &shifts, self.inside);
+                let means = Means::of(self.level, &shifts, &self.left);
                 let each = standing.len()..shifts.len();
                 let judged = each.map(|own| {
                     let with = [standing.as_slice(), &[own]].concat();

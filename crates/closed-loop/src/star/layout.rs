@@ -80,6 +80,11 @@ pub(crate) struct Layout {
     pub(super) left_out: Vec<bool>,
 }
 
+/// Place of polynomial `k` on `axis` where the first one's x stands at `from`.
+pub(super) fn shared_at(from: usize, k: usize, axis: usize) -> usize {
+    from + 2 * k + axis
+}
+
 impl Layout {
     /// Columns in all.
     pub(crate) fn width(&self) -> usize {
@@ -88,7 +93,7 @@ impl Layout {
 
     /// Place of polynomial `k` on `axis`.
     pub(crate) fn shared_at(&self, k: usize, axis: usize) -> usize {
-        self.shared_from + 2 * k + axis
+        shared_at(self.shared_from, k, axis)
     }
 
     /// The same without the columns of these candidates, and without the residuals, which someone else fills.

@@ -25,7 +25,7 @@ use nalgebra::{DMatrix, DVector, Vector3};
 use telemetry::Model;
 
 use crate::star::data::StarData;
-use crate::star::layout::Filled;
+use crate::star::layout::{Filled, shared_at};
 
 /// The unknowns of the declared model at star level.
 #[derive(Clone, Debug)]
@@ -127,9 +127,10 @@ impl StarNuisance {
         }
         if let Some((_, precision)) = &self.distortion {
             for axis in 0..2 {
-                let first = misaligned + axis * polynomials;
-                out.view_mut((first, first), precision.shape())
-                    .copy_from(precision);
+                let at = |k| shared_at(misaligned, k, axis);
+                for k in 0..polynomials {
+                    (0..polynomials).for_each(|j| out[(at(j), at(k))] = precision[(j, k)]);
+                }
             }
         }
         let directions = std::iter::repeat_n(self.direction_sigma, 2 * self.directions);
@@ -151,6 +152,19 @@ impl StarNuisance {
         )
     }
 
+    /// Prior precision of the distortion's coefficients of an axis, 1/arcsec^2.
+    pub(crate) fn distortion_precision(&self) -> Option<&DMatrix<f64>> {
+        self.distortion.as_ref().map(|(_, precision)| precision)
+    }
+
+    /// The distortion among the amplitudes of the columns, arcsec: those of x, then those of y.
+    pub(crate) fn distortion_of(&self, amplitudes: &DVector<f64>) -> Vec<f64> {
+        let (misalignment, polynomials, _) = self.parts();
+        let of_axis =
+            |axis| (0..polynomials).map(move |k| amplitudes[shared_at(misalignment, k, axis)]);
+        (0..2).flat_map(of_axis).collect()
+    }
+
     /// Columns of unknown directions.
     pub(crate) fn directions(&self) -> Range<usize> {
         let (misalignment, polynomials, _) = self.parts();
@@ -164,6 +178,34 @@ impl StarNuisance {
         Some(amplitudes.fixed_rows::<3>(0).into_owned())
     }
 
+    /// Writes what the distortion's coefficients of an axis do to a row, each less its mean over the field; `basis` is
+    /// scratch for a number more.
+    fn polynomials_into(&self, data: &StarData, row: usize, basis: &mut [f64], out: &mut [f64]) {
+        let Some((order, _)) = &self.distortion else {
+            return;
+        };
+        let at = Pixel {
+            x: data.modelled[0][row],
+            y: data.modelled[1][row],
+        };
+        DistortionField::basis_into(*order, data.camera.normalised(at), basis);
+        let basis = basis[1..].iter().zip(&self.moments[1..]);
+        for (out, (value, mean)) in out.iter_mut().zip(basis) {
+            *out = value - mean;
+        }
+    }
+
+    /// What the distortion does to each row, columns by rows.
+    pub(crate) fn polynomials(&self, data: &StarData, rows: Range<usize>) -> DMatrix<f64> {
+        let (_, count, _) = self.parts();
+        let mut out = DMatrix::zeros(count, rows.len());
+        let mut basis = vec![0.0; self.moments.len()];
+        for (row, mut own) in rows.zip(out.column_iter_mut()) {
+            self.polynomials_into(data, row, &mut basis, own.as_mut_slice());
+        }
+        out
+    }
+
     /// Writes the entries of the rows of `frames`, arcsec per arcsec, into zeros.
     pub(crate) fn fill(&self, data: &StarData, frames: Range<usize>, out: &mut Filled) {
         let first = data.frames.first_row[frames.start];
@@ -172,10 +214,6 @@ impl StarNuisance {
         for frame in frames {
             for row in data.frames.rows_of(frame) {
                 let i = row - first;
-                let at = Pixel {
-                    x: data.modelled[0][row],
-                    y: data.modelled[1][row],
-                };
                 if misalignment > 0 {
                     let turned = data.misalignment_row(row, frame);
                     for axis in 0..2 {
@@ -184,15 +222,9 @@ impl StarNuisance {
                         }
                     }
                 }
-                if let Some((order, _)) = &self.distortion {
-                    DistortionField::basis_into(*order, data.camera.normalised(at), &mut basis);
-                    let count = basis.len() - 1;
-                    let polynomials = &mut out.shared.as_mut_slice()[i * count..(i + 1) * count];
-                    let basis = basis[1..].iter().zip(&self.moments[1..]);
-                    for (out, (value, mean)) in polynomials.iter_mut().zip(basis) {
-                        *out = value - mean;
-                    }
-                }
+                let polynomials = out.shared.nrows();
+                let own = &mut out.shared.as_mut_slice()[i * polynomials..(i + 1) * polynomials];
+                self.polynomials_into(data, row, &mut basis, own);
                 if self.directions > 0 {
                     let u = data.stars[data.star[row]].direction;
                     let q = &data.attitude[frame];
@@ -236,4 +268,53 @@ fn moments(order: usize) -> Vec<f64> {
         }
     }
     out
+}
+
+#[cfg(test)]
+mod tests {
+    use focal_plane::{Camera, StarFrames};
+
+    use super::*;
+    use crate::star::harness::seen;
+
+    /// What a draw of the prior does to stars all over the field: on each axis the declared variance, wider by what
+    /// normalised draws of few modes have beyond a Gaussian (`coefficient_precision`), and nothing of x with y.
+    /// On a grid the mean over the field is short by the polynomials' steepness at the edges, 1 %.
+    #[test]
+    fn the_distortion_of_stars_has_the_declared_prior() {
+        let camera = Camera::from_focal_length_px([1024; 2], 3000.0).unwrap();
+        let side = 30;
+        let place = |k: usize| 1024.0 * ((k as f64 + 0.5) / side as f64 - 0.5);
+        let places: Vec<[f64; 2]> = (0..side * side)
+            .map(|star| [place(star % side), place(star / side)])
+            .collect();
+        let mut frames = StarFrames::new();
+        frames.begin(0.0);
+        for (id, [x, y]) in (0..).zip(&places) {
+            frames.push(0, id, *x, *y);
+        }
+        let data = seen(&camera, &frames, None, &places);
+        let mut model = Model::default();
+        model.noise.distortion_arcsec = Some(3.0);
+        model.noise.distortion_order = Some(7);
+        let nuisance = StarNuisance::declared(&model, &data);
+        let polynomials = nuisance.polynomials(&data, 0..data.t_s.len());
+        let precision = nuisance.precision();
+        let columns = [0, 1].map(|axis| {
+            let mut out = DMatrix::zeros(data.t_s.len(), precision.nrows());
+            for (row, values) in polynomials.column_iter().enumerate() {
+                for (k, value) in values.iter().enumerate() {
+                    out[(row, shared_at(0, k, axis))] = *value;
+                }
+            }
+            out
+        });
+        let [x, y] = columns;
+        let covariance = precision.try_inverse().unwrap();
+        let of_x = &x * &covariance;
+        let mean = (&of_x * x.transpose()).trace() / data.t_s.len() as f64;
+        let declared = 3.0_f64.powi(2) / 2.0;
+        assert!((0.99..1.2).contains(&(mean / declared)), "{mean}");
+        assert!((of_x * y.transpose()).amax() < 1e-9 * declared);
+    }
 }

@@ -1,14 +1,22 @@
 //! Mean errors of the stars, and what columns explain of them.
 //!
 //! What a rotation of the frames does is taken off where these are free, and in every fit where a reference may be
-//! misaligned. See [`super`] for the likelihoods.
+//! misaligned. What the declared distortion D may do by its prior, of covariance P, is no constant of a star's own, and
+//! hides what is no larger: means and columns are whitened,
 //!
-//! Source: least squares of the means; a row beside its star's mean has what is left.
+//! ```text
+//! e -> (I + D P D')^-1/2 e = e - U diag(1 - (1 + s^2)^-1/2) U' e        D P^1/2 = U diag(s) V'
+//! ```
+//!
+//! with the fitted distortion back in e: a fit beside what was chosen has put into it whatever contradicts that.
+//! See [`super`] for the likelihoods.
+//!
+//! Source: generalised least squares of the means; a row beside its star's mean has what is left.
 
 use std::ops::{AddAssign, Range};
 
 use effects::Candidate;
-use nalgebra::{DMatrix, DVector, Matrix3, Matrix3xX, Vector3};
+use nalgebra::{DMatrix, DVector, Dim, Dyn, Matrix, Matrix3, Matrix3xX, StorageMut, Vector3};
 use rayon::prelude::*;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
@@ -82,7 +90,7 @@ impl AddAssign for Sums {
     }
 }
 
-/// Mean errors of the stars, in units of what white noise leaves of them.
+/// Mean errors of the stars, in units of what white noise and the declared distortion make of them.
 pub(super) struct Means {
     /// Without any of the shifts.
     error: DVector<f64>,
@@ -102,8 +110,8 @@ pub(super) struct Means {
 }
 
 impl Means {
-    /// Beside what `level` keeps; `inside` is what is left in sample, arcsec.
-    pub(super) fn of(level: &StarEvidence<'_>, shifts: &[Shift<'_>], inside: &[Vec<f64>]) -> Self {
+    /// Beside what `level` keeps; `left` is what a fit leaves.
+    pub(super) fn of(level: &StarEvidence<'_>, shifts: &[Shift<'_>], left: &Left<'_>) -> Self {
         let turned = turns_freely(level);
         let turns = if turned { 0 } else { 3 };
         let kept: usize = level.kept.iter().map(|c| c.coefficients().len()).sum();
@@ -121,13 +129,19 @@ impl Means {
             level,
             shifts,
             of_shift: &of_shift,
-            inside,
-            columns: end,
+            inside: left.inside,
+            distorted: end,
+            columns: end + left.distortion.len(),
         };
         let parts: Vec<Sums> = ends
             .par_windows(2)
             .map(|ends| design.sums(ends[0]..ends[1]))
             .collect();
+        let prior = Prior {
+            from: end,
+            values: &left.distortion,
+            precision: level.nuisance.distortion_precision(),
+        };
         let squares: Vec<(f64, f64)> = parts.iter().map(|part| part.residual_means()).collect();
         let mut all = design.sums(0..0);
         parts.into_iter().for_each(|part| all += part);
@@ -135,7 +149,7 @@ impl Means {
         let (of_parts, seen) = squares
             .into_iter()
             .fold((0.0, 0.0), |sum, part| (sum.0 + part.0, sum.1 + part.1));
-        let mut means = Self::from_sums(all, shifts, of_shift, always, turned);
+        let mut means = Self::from_sums(all, shifts, of_shift, always, turned, &prior);
         means.drift = (of_parts - whole.0) / means.noise - 2.0 * (seen - whole.1);
         means
     }
@@ -146,6 +160,7 @@ impl Means {
         of_shift: Vec<Range<usize>>,
         always: usize,
         turned: bool,
+        distortion: &Prior<'_>,
     ) -> Self {
         let seen = sums.weight.iter().filter(|w| **w > 0.0).count() as f64;
         let mut columns = sums.columns.transpose();
@@ -175,8 +190,12 @@ impl Means {
             let beside = products - means.tr_mul(&with);
             within.push(taken(products, &beside, &shift.values) / noise);
         }
+        distortion.put_back(&columns, &mut error);
         error /= noise.sqrt();
-        let mut columns = columns.remove_column(last);
+        let modes = distortion.modes(&columns, noise.sqrt());
+        modes.whiten(&mut error);
+        let mut columns = columns.remove_columns(distortion.from, last + 1 - distortion.from);
+        modes.whiten(&mut columns);
         for mut column in columns.column_iter_mut() {
             let length = column.norm();
             if length > 0.0 {
@@ -260,6 +279,76 @@ impl Means {
     }
 }
 
+/// What a fit leaves.
+pub(super) struct Left<'a> {
+    /// Residual of each row in sample, arcsec.
+    pub(super) inside: &'a [Vec<f64>],
+    /// Coefficients of the distortion, those of x, then those of y, arcsec.
+    pub(super) distortion: Vec<f64>,
+}
+
+/// The distortion's columns among others.
+struct Prior<'a> {
+    from: usize,
+    values: &'a [f64],
+    /// Precision of the coefficients of an axis, 1/arcsec^2.
+    precision: Option<&'a DMatrix<f64>>,
+}
+
+impl Prior<'_> {
+    /// Puts the fitted distortion back into errors in the unit of the columns.
+    fn put_back(&self, columns: &DMatrix<f64>, error: &mut DVector<f64>) {
+        for (k, value) in self.values.iter().enumerate() {
+            error.axpy(*value, &columns.column(self.from + k), 1.0);
+        }
+    }
+
+    /// What its prior does to errors in this unit.
+    fn modes(&self, columns: &DMatrix<f64>, unit: f64) -> Modes {
+        let Some(root) = self.precision.and_then(|p| p.clone().cholesky()) else {
+            return Modes::default();
+        };
+        let of_axis = root.l_dirty().nrows();
+        let mut scaled = columns.columns(self.from, self.values.len()).transpose() / unit;
+        for axis in 0..2 {
+            // root of the covariance: the inverse of that of the precision
+            let own = &mut scaled.rows_mut(axis * of_axis, of_axis);
+            root.l_dirty().solve_lower_triangular_mut(own);
+        }
+        let svd = scaled.transpose().svd(true, false);
+        let less = svd.singular_values.map(|s| 1.0 - s.hypot(1.0).recip());
+        svd.u
+            .map_or_else(Modes::default, |along| Modes { along, less })
+    }
+}
+
+/// Directions in which errors are larger than noise, and the share by which each is to be less.
+struct Modes {
+    along: DMatrix<f64>,
+    less: DVector<f64>,
+}
+
+impl Default for Modes {
+    fn default() -> Self {
+        Self {
+            along: DMatrix::zeros(0, 0),
+            less: DVector::zeros(0),
+        }
+    }
+}
+
+impl Modes {
+    fn whiten<C: Dim, S: StorageMut<f64, Dyn, C>>(&self, errors: &mut Matrix<f64, Dyn, C, S>) {
+        if self.less.is_empty() {
+            return;
+        }
+        for mut error in errors.column_iter_mut() {
+            let size = self.along.tr_mul(&error).component_mul(&self.less);
+            error.gemv(-1.0, &self.along, &size, 1.0);
+        }
+    }
+}
+
 /// h of the module's header.
 fn minus_two_ln(squares: f64, numbers: f64) -> f64 {
     if squares > numbers && numbers > 0.0 {
@@ -301,7 +390,8 @@ struct Design<'a> {
     shifts: &'a [Shift<'a>],
     of_shift: &'a [Range<usize>],
     inside: &'a [Vec<f64>],
-    /// Columns before the residual.
+    /// Columns before those of the distortion, and before the residual.
+    distorted: usize,
     columns: usize,
 }
 
@@ -399,6 +489,14 @@ impl Design<'_> {
         }
         for shift in self.shifts {
             put(shift.candidate, &shift.columns);
+        }
+        if self.columns > self.distorted {
+            let polynomials = self.level.nuisance.polynomials(data, rows.clone());
+            let count = polynomials.nrows();
+            for (axis, out) in out.iter_mut().enumerate() {
+                let from = self.distorted + axis * count;
+                out.rows_mut(from, count).copy_from(&polynomials);
+            }
         }
         for (i, row) in rows.enumerate() {
             for (out, inside) in out.iter_mut().zip(self.inside) {
