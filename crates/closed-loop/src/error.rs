@@ -56,10 +56,12 @@ pub enum CloseError {
     },
     /// The reference's quaternions are in another convention.
     #[error(
-        "table reference, columns qx, qy, qz, qw: these attitudes are {given_deg:.3} deg from table {what}; read as {are} they are {angle_deg:.3} deg from it; expected inertial to tracker, v_tracker = q v_inertial, with the scalar in qw"
+        "table {table}, columns qx, qy, qz, qw: these attitudes are {given_deg:.3} deg from table {what}; read as {are} they are {angle_deg:.3} deg from it; expected inertial to tracker, v_tracker = q v_inertial, with the scalar in qw"
     )]
     Convention {
-        /// The table of what was measured.
+        /// The table that is, or one of the two that may be.
+        table: &'static str,
+        /// The one that it is held against.
         what: &'static str,
         /// Median angle from it, deg.
         given_deg: f64,

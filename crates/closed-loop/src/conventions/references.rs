@@ -89,25 +89,41 @@ pub(super) fn check(situation: &Situation<'_>) -> Result<(), CloseError> {
         });
     }
     let pairs = pairs(t_s, &reference.t_s);
-    let apart = |read: Reading| {
+    let apart = |read_reference: Reading, read_measured: Reading| {
         let mut angles = Vec::new();
         for &(k, at) in &pairs {
-            let q = read(&reference.q[at]);
+            let q = read_reference(&reference.q[at]);
             match measured {
                 Measured::Stars(stars) => angles.extend(of_stars(situation, stars, k, &q)),
-                Measured::Attitude(attitude) => angles.push(attitude.q[k].angle_to(&q)),
+                Measured::Attitude(attitude) => {
+                    angles.push(read_measured(&attitude.q[k]).angle_to(&q));
+                }
             }
         }
         median(&mut angles)
     };
     let near = NEAR * field(situation);
-    let Some(given) = apart(as_given).filter(|angle| *angle > near) else {
+    let Some(given) = apart(as_given, as_given).filter(|angle| *angle > near) else {
         return Ok(());
     };
-    let others = OTHERS.iter();
-    let others = others.filter_map(|(reading, are)| Some((apart(*reading)?, *are)));
-    match nearest(given, others) {
-        Some((angle, are)) => Err(CloseError::Convention {
+    let attitudes = matches!(measured, Measured::Attitude(_));
+    let others = OTHERS.iter().enumerate();
+    let of_reference = others.clone().filter_map(|(k, (reading, are))| {
+        // of two tables of attitudes of which one turns the other way round nothing tells which
+        let table = if attitudes && k == 0 {
+            "reference or attitude"
+        } else {
+            "reference"
+        };
+        Some((apart(*reading, as_given)?, (table, what, *are)))
+    });
+    let of_attitude = others.skip(1).filter(|_| attitudes);
+    let of_attitude = of_attitude.filter_map(|(_, (reading, are))| {
+        Some((apart(as_given, *reading)?, ("attitude", "reference", *are)))
+    });
+    match nearest(given, of_reference.chain(of_attitude)) {
+        Some((angle, (table, what, are))) => Err(CloseError::Convention {
+            table,
             what,
             given_deg: given.to_degrees(),
             are,
