@@ -204,7 +204,9 @@ pub(crate) fn run<'a>(
         let terms = (quest.terms)(searched.wander.is_some());
         let described = Described::new(level, folds, &searched.found, terms, quest.ways)?;
         let agreed = |set: &[usize], instead: &[Part]| {
-            constants.is_some_and(|constants| constants.agree(&described, set, instead))
+            constants
+                .as_ref()
+                .is_some_and(|constants| constants.agree(&described, set, instead))
         };
         if let Some(wander) = searched.wander.as_ref().filter(|_| !last) {
             let plain = Described::new(&beside, folds, &searched.found, (quest.terms)(false), &[])?;
@@ -264,7 +266,7 @@ pub(crate) fn run<'a>(
             if (named || kept.is_empty())
                 && let Some(mut left) = described.left()
             {
-                if let Some(constants) = constants {
+                if let Some(constants) = &constants {
                     left = constants.beyond(&described, left);
                 }
                 if !left.is_empty() {
@@ -279,7 +281,7 @@ pub(crate) fn run<'a>(
             let spoken = stand_ins(&described, &agreed).map(|(set, _)| (set, Refusal::StandIn));
             let beside = best_beside(&searched.found, &may);
             let changes = changing(&described, beside).map(|c| (vec![c.chosen], Refusal::Change));
-            let disputed = constants.map(|constants| {
+            let disputed = constants.as_ref().map(|constants| {
                 let paid = paid(&searched.found, &may);
                 (constants.disputed(&paid), Refusal::StarConstants)
             });
@@ -423,7 +425,7 @@ fn judged_alone(mut found: Found, refused: &mut Refused) -> Found {
 fn best_beside(found: &Found, may: &[bool]) -> f64 {
     let groups = &found.fitted.groups;
     let chosen = &found.selection.chosen;
-    let new = |g: usize| chosen.iter().all(|&c| groups[c].family != groups[g].family);
+    let new = |g: usize| chosen.iter().all(|&c| !groups[c].excludes(&groups[g]));
     let judged = found.selection.judged.iter().zip(may).enumerate();
     let open = judged.filter(|(g, (j, may))| **may && j.credible && j.observable && new(*g));
     open.map(|(_, (j, _))| j.delta_loglik).fold(0.0, f64::max)

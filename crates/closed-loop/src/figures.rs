@@ -25,8 +25,9 @@ use crate::error::CloseError;
 use crate::evidence::Residuals;
 use crate::questions::hypothesis::{Questions, Told};
 use crate::search::empirical::EMPIRICAL;
+use crate::search::group::Group;
 use crate::search::refusal::Refused;
-use crate::search::selection::{Group, columns_of, each};
+use crate::search::selection::{columns_of, each};
 use crate::search::{Found, family, first_column};
 use crate::star::data::StarData;
 use crate::unexplained::SEARCH_ALPHA;
@@ -526,33 +527,4 @@ pub(crate) fn star_rms(residual: &Residuals, data: &StarData) -> [f64; 2] {
 /// Sum of the mean squares of both axes, arcsec^2.
 pub(crate) fn star_power(residual: &Residuals, data: &StarData) -> f64 {
     star_rms(residual, data).iter().map(|v| v * v).sum()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// A size at its bound is believed, one beyond it not; what the group does not have has no bound.
-    #[test]
-    fn sizes_within_their_bounds_are_believed() {
-        let group = Group {
-            columns: vec![4, 6],
-            bounds: vec![[-1.0, 1.0], [0.0, 2.0]],
-            choices: 0,
-            shapes: 0,
-            slopes: 0,
-            family: String::new(),
-            kind: EMPIRICAL,
-            stands_for: 1.0,
-        };
-        for (columns, sizes, believed) in [
-            (&[4, 6][..], &[-1.0, 2.0][..], true),
-            (&[6], &[1.5], true),
-            (&[4], &[1.5], false),
-            (&[6, 4], &[-0.1, 0.5], false),
-            (&[5], &[9.0], true),
-        ] {
-            assert_eq!(group.believes(columns, sizes), believed, "{columns:?}");
-        }
-    }
 }

@@ -17,10 +17,12 @@ use nalgebra::DVector;
 
 use crate::error::CloseError;
 use crate::evidence::{Amplitudes, Evidence, Residuals};
-use selection::{Group, Selection, Trials, columns_of, costs};
+use group::Group;
+use selection::{Selection, Trials, columns_of, costs};
 
 pub(crate) mod catalogue;
 pub(crate) mod empirical;
+pub(crate) mod group;
 pub(crate) mod instants;
 pub(crate) mod misplaced;
 pub(crate) mod orbits;
@@ -75,7 +77,13 @@ impl Fitted {
         self.fits.variance(&columns_of(&self.groups, chosen))
     }
 
-    /// The same with priors weighed against the noise beside `chosen`, where that is much less.
+    /// Log-likelihood of the measurements in arcsec out of fold, beside these columns.
+    pub(crate) fn data_loglik(&self, columns: &[usize]) -> Option<f64> {
+        let out_of_fold = self.fits.out_of_fold(columns)?;
+        Some(out_of_fold.data_loglik() + self.log_scale)
+    }
+
+    /// These fits with priors weighed against the noise beside `chosen`, where that is much less.
     pub(crate) fn beside(
         self,
         folds: &Folds,
@@ -232,6 +240,7 @@ fn grouped(fits: &Fits, candidates: &[&dyn Candidate]) -> Vec<Group> {
                 Some(part) => format!("{}/part {part}", family(*candidate)),
                 None => family(*candidate),
             },
+            reach: candidate.reach_px(),
             kind: candidate.id(),
             stands_for: candidate.stands_for(),
         });

@@ -3,7 +3,7 @@
 //! Not physics: tests of the physics in the other files.
 
 use focal_plane::{ARCSEC_PER_RAD, Pixel};
-use nalgebra::{DMatrix, Matrix6, Vector3};
+use nalgebra::{DMatrix, Matrix6, Vector3, Vector6};
 use star_tracker::{Disturbance, Pbm, TemporalNoise};
 
 use crate::harness::{Bench, Sway, as_given};
@@ -479,5 +479,35 @@ fn uncertainty_goes_through_to_the_reported_parameters() {
             (sigma - spread).abs() < 1e-5 * spread,
             "{parameter:?}: {sigma}"
         );
+    }
+}
+
+/// Turning an orbit about the pole changes its node and nothing else: its sigma is the same where the node passes from
+/// 360 degrees to 0.
+#[test]
+fn a_node_near_zero_is_known_as_well_as_any() {
+    let bench = Bench::new();
+    let sigmas: Vec<f64> = (0..360)
+        .step_by(10)
+        .map(|turn| {
+            let (s, c) = f64::from(turn).to_radians().sin_cos();
+            let turned = |[x, y, z]: [f64; 3]| [c * x - s * y, s * x + c * y, z];
+            let both = [turned([3000.0, 0.0, 4000.0]), turned([0.0, 5000.0, 0.0])];
+            let values = Vector6::from_iterator(both.into_iter().flatten());
+            let span_s = [0.0, 120.0];
+            let (_, orbit) = nearest_circle(200.0, span_s, &values, &Matrix6::identity(), 1);
+            let covariance = DMatrix::from_diagonal_element(5, 5, 1e4);
+            let values = [5000.0, 0.0, 0.0, 0.0, 0.0];
+            let surroundings = bench.surroundings();
+            let told = reported(orbit.as_ref(), &values, covariance.as_view(), &surroundings);
+            let told = told.unwrap();
+            let node = told.iter().find(|(p, _)| p.name == "node_deg");
+            node.expect("an orbit has one").1
+        })
+        .collect();
+    // 100 m/s of 5000, by the sine of the inclination
+    assert!((0.5..5.0).contains(&sigmas[0]), "{sigmas:?}");
+    for sigma in &sigmas {
+        assert!((sigma - sigmas[0]).abs() < 1e-3 * sigmas[0], "{sigmas:?}");
     }
 }

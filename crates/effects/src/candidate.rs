@@ -218,6 +218,11 @@ pub trait Candidate: Debug + Send + Sync {
     fn stands_for(&self) -> f64 {
         1.0
     }
+    /// Middle and half-width, px, of the square of the detector outside which it does nothing; `None`: it acts
+    /// everywhere.
+    fn reach_px(&self) -> Option<([f64; 2], f64)> {
+        None
+    }
     /// The same candidate with other values of [`nonlinear`](Self::nonlinear), in its order; `None`
     /// when a value is out of range or there is nothing to change.
     fn with_nonlinear(&self, values: &[f64]) -> Option<Box<dyn Candidate>> {
@@ -329,9 +334,14 @@ pub fn reported(
         let width = values[j] + step - moved[j];
         for (i, parameter) in parameters.iter().enumerate() {
             let mut change = above[i].value - below[i].value;
-            if parameter.unit == "rad" {
-                // a phase may wrap between the two
-                change -= core::f64::consts::TAU * (change / core::f64::consts::TAU).round();
+            // a phase or a node may wrap between the two
+            let turn = match parameter.unit {
+                "rad" => core::f64::consts::TAU,
+                "deg" => 360.0,
+                _ => f64::INFINITY,
+            };
+            if turn.is_finite() {
+                change -= turn * (change / turn).round();
             }
             jacobian[(i, j)] = change / width;
         }

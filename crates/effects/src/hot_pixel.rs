@@ -153,6 +153,9 @@ impl Shift for HotPixel {
     fn stands_for(&self) -> f64 {
         self.stands_for
     }
+    fn reach_px(&self) -> Option<([f64; 2], f64)> {
+        Some(([self.at.x, self.at.y], self.half_width_px))
+    }
     fn parameters(&self, values: &[f64]) -> Vec<Parameter> {
         vec![
             Parameter::new("x_px", self.at.x, "px"),

@@ -70,6 +70,10 @@ pub(crate) trait Shift: Clone + Debug + Send + Sync + 'static {
     fn stands_for(&self) -> f64 {
         1.0
     }
+    /// See [`Candidate::reach_px`].
+    fn reach_px(&self) -> Option<([f64; 2], f64)> {
+        None
+    }
     /// See [`Candidate::part`].
     fn part(&self) -> Option<u32> {
         None
@@ -162,6 +166,9 @@ impl<S: Shift> Candidate for ShiftCandidate<S> {
     }
     fn stands_for(&self) -> f64 {
         self.shift.stands_for()
+    }
+    fn reach_px(&self) -> Option<([f64; 2], f64)> {
+        self.shift.reach_px()
     }
     fn part(&self) -> Option<u32> {
         self.shift.part()

@@ -340,7 +340,7 @@ impl<'a, 'd> Trial<'a, 'd> {
         let mut ranked: Vec<usize> = (0..self.candidates.len())
             .filter(|g| !chosen.contains(g) && !banned[*g] && judged[*g].stands())
             .filter(|&g| self.candidates[g].id() != EMPIRICAL)
-            .filter(|&g| chosen.iter().all(|&c| groups[c].family != groups[g].family))
+            .filter(|&g| chosen.iter().all(|&c| !groups[c].excludes(&groups[g])))
             .collect();
         ranked.sort_by(|&a, &b| score(b).total_cmp(&score(a)));
         ranked

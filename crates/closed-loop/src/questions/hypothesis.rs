@@ -198,6 +198,8 @@ impl Grounds<'_> {
             .fold(1.0, f64::max);
         let chi2 = ChiSquared::new(p as f64).map_or(0.0, |law| law.inverse_cdf(0.95));
         let most = (taken.sqrt() + (widening * variance * chi2).sqrt()).powi(2);
+        // of what was added all that it explains is told, and nothing of what is left
+        let left = self.left.filter(|_| !chosen);
         answer.variance_share = Some(taken / e0);
         answer.variance_share_at_most = Some((most / e0).min(1.0));
         let first = first_column(&found.candidates, g);
@@ -205,25 +207,22 @@ impl Grounds<'_> {
             .columns
             .iter()
             .enumerate()
-            .map(|(k, &column)| self.size(candidate, column, column - first, &estimate, own + k))
+            .map(|(k, &column)| {
+                let at = (column, column - first, own + k);
+                self.size(candidate, at, &estimate, left)
+            })
             .collect();
-        if chosen {
-            for size in &mut answer.sizes {
-                size.needed = None;
-                size.needed_is_plausible = None;
-            }
-        }
         answer
     }
 
-    /// The sizes of coefficient `j` of a candidate, whose estimate is number `at`.
+    /// The sizes of coefficient `j` of a candidate, whose column is `column` and whose estimate is number `at`; `left`
+    /// is what it is to explain.
     fn size(
         &self,
         candidate: &dyn Candidate,
-        column: usize,
-        j: usize,
+        (column, j, at): (usize, usize, usize),
         estimate: &Estimate,
-        at: usize,
+        left: Option<f64>,
     ) -> HypothesisSize {
         let coefficient = &candidate.coefficients()[j];
         let told = Told::of(candidate, j, &self.surroundings);
@@ -234,7 +233,7 @@ impl Grounds<'_> {
                 .filter(|_| information > 0.0)
                 .map(|e| (e / information).sqrt())
         };
-        let [left, alone] = [needed(self.left), needed(self.alone)];
+        let [left, alone] = [needed(left), needed(self.alone)];
         HypothesisSize {
             parameter: told.name.clone(),
             unit: told.unit.clone(),
@@ -495,11 +494,12 @@ fn told_size(h: &Hypothesis, size: &HypothesisSize) -> Vec<String> {
     }
     let plausible = size.plausible.map_or_else(String::new, |p| {
         let judged = match size.needed_is_plausible {
-            Some(true) => "plausible",
-            _ => "not plausible",
+            Some(true) => "plausible beside",
+            Some(false) => "not plausible beside",
+            None => "beside",
         };
         format!(
-            ", {judged} beside {} (1 sigma of what nature makes)",
+            ", {judged} {} (1 sigma of what nature makes)",
             with_unit(p, unit)
         )
     });

@@ -35,7 +35,8 @@ use telemetry::report::FoundEffect;
 
 use crate::error::CloseError;
 use crate::evidence::Evidence;
-use crate::search::selection::{Group, columns_of};
+use crate::search::group::Group;
+use crate::search::selection::columns_of;
 use crate::search::{Found, first_column, fit, fit_whole};
 
 /// Parameters that are instants.

@@ -6,7 +6,7 @@
 //!
 //! Not physics: a count.
 
-use crate::search::selection::Group;
+use crate::search::group::Group;
 
 /// The effect on a single star.
 pub(crate) const MISPLACED: &str = "catalogue_position";

@@ -42,6 +42,7 @@ use std::ops::Range;
 use block_regression::{Fits, OutOfFold};
 use rayon::prelude::*;
 
+use super::group::Group;
 use super::misplaced::{piled, stars_of};
 
 /// Chance that a bundle which follows its model gets any effect at all.
@@ -52,39 +53,6 @@ pub(crate) const WIDENING: f64 = 1.3;
 /// What a slow error of an axis pays for its size and correlation time, nats: a size is
 /// known to a fifth and a time to a factor of two, within the decades that they may have.
 pub(crate) const SLOW_PRICE: f64 = 4.0;
-
-/// Candidate columns that enter or leave together.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Group {
-    /// Positions among the candidate columns; those that the data cannot show are
-    /// not among them.
-    pub(crate) columns: Vec<usize>,
-    /// Least and largest credible amplitude of each of `columns`.
-    pub(crate) bounds: Vec<[f64; 2]>,
-    /// Choices among discrete forms that the group stands for, each paid for like
-    /// a parameter.
-    pub(crate) choices: usize,
-    /// Parameters that the columns follow non-linearly, found by scanning.
-    pub(crate) shapes: usize,
-    /// Columns that are slopes of such parameters.
-    pub(crate) slopes: usize,
-    /// Groups of one family are forms of one cause, or of one part of it: at most one is chosen.
-    pub(crate) family: String,
-    /// Groups of one kind are one effect, whatever it acts on.
-    pub(crate) kind: &'static str,
-    /// How many of its kind were looked at for each that is tried.
-    pub(crate) stands_for: f64,
-}
-
-impl Group {
-    /// Whether `values` of `columns`, some of its own, are all credible.
-    pub(crate) fn believes(&self, columns: &[usize], values: &[f64]) -> bool {
-        columns.iter().zip(values).all(|(column, value)| {
-            let at = self.columns.iter().position(|c| c == column);
-            at.is_none_or(|k| (self.bounds[k][0]..=self.bounds[k][1]).contains(value))
-        })
-    }
-}
 
 /// One group's standing beside the chosen ones.
 #[derive(Clone, Debug, PartialEq)]
@@ -235,7 +203,7 @@ impl Trials<'_> {
         let mut tried: Vec<Tried> = (0..groups.len())
             .into_par_iter()
             .filter(|&g| may[g] && !chosen.contains(&g))
-            .filter(|&g| chosen.iter().all(|&c| groups[c].family != groups[g].family))
+            .filter(|&g| chosen.iter().all(|&c| !groups[c].excludes(&groups[g])))
             .filter_map(|g| {
                 // what gains nothing cannot stand, whatever its errors
                 let gain = self.gain(chosen, g, &base).filter(|gain| *gain > 0.0)?;
@@ -260,7 +228,7 @@ impl Trials<'_> {
         let mut best = (0.0, Vec::new());
         for (i, a) in alone.iter().enumerate() {
             for b in &alone[i + 1..] {
-                if self.groups[a.group].family == self.groups[b.group].family {
+                if self.groups[a.group].excludes(&self.groups[b.group]) {
                     continue;
                 }
                 let pair = [a.group, b.group];
@@ -288,7 +256,11 @@ impl Trials<'_> {
         let family = |g: usize| groups[g].family.as_str();
         let mut swapped: Vec<Vec<usize>> = Vec::new();
         for (at, &g) in chosen.iter().enumerate() {
-            let forms = all.iter().filter(|&&c| c != g && family(c) == family(g));
+            let others = chosen.iter().filter(|&&c| c != g);
+            let open = |c: usize| others.clone().all(|&o| !groups[o].excludes(&groups[c]));
+            let forms = all
+                .iter()
+                .filter(|&&c| c != g && family(c) == family(g) && open(c));
             swapped.extend(forms.map(|&form| {
                 let mut set = chosen.to_vec();
                 set[at] = form;
@@ -300,7 +272,7 @@ impl Trials<'_> {
         let mut better: Vec<(f64, Vec<usize>)> = swapped
             .into_par_iter()
             .flat_map_iter(|set| {
-                let other = |h: &&usize| set.iter().all(|&c| family(c) != family(**h));
+                let other = |h: &&usize| set.iter().all(|&c| !groups[c].excludes(&groups[**h]));
                 let more = all.iter().filter(other).map(|&h| [&set[..], &[h]].concat());
                 let sets = std::iter::once(set.clone()).chain(more);
                 let fits = sets.filter_map(|set| Some((self.fit(&set)?, set)));
@@ -331,7 +303,12 @@ impl Trials<'_> {
         let mut out = Vec::new();
         for &g in chosen {
             let others: Vec<usize> = chosen.iter().copied().filter(|&c| c != g).collect();
-            let open = |h: &&usize| **h != g && others.iter().all(|&c| family(c) != family(**h));
+            let excluded = |h: usize| {
+                others
+                    .iter()
+                    .any(|&c| self.groups[c].excludes(&self.groups[h]))
+            };
+            let open = |h: &&usize| **h != g && !excluded(**h);
             let alone: Vec<(f64, usize)> = all
                 .par_iter()
                 .filter(open)
@@ -470,6 +447,7 @@ mod tests {
             shapes: 0,
             slopes: 0,
             family: kind.to_owned(),
+            reach: None,
             kind,
             stands_for: 1.0,
         }

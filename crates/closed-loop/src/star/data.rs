@@ -134,6 +134,8 @@ pub(crate) struct StarData {
     /// Star rows that had to be set aside because the reference does not cover them, or not enough of
     /// the time around them.
     pub(crate) outside_reference: usize,
+    /// Those of them that are rows here, among the outliers.
+    pub(crate) unplaced: usize,
 }
 
 /// What [`StarData::prepare`] starts from.
@@ -319,6 +321,7 @@ impl StarData {
             log_flux: vec![f64::NAN; n],
             window_px: [Vec::new(), Vec::new()],
             outside_reference: from.rows() - n,
+            unplaced: 0,
             frames,
             stars,
             star,

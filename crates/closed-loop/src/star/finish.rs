@@ -290,26 +290,18 @@ pub(crate) fn finish(
     };
     let before_loglik = match f.settled.loglik {
         Some(known) => Some(known),
-        None => {
-            let fitted = fit(f.measured, f.folds, &[])?;
-            fitted.fits.out_of_fold(&[]).map(|o| o.data_loglik())
-        }
+        None => fit(f.measured, f.folds, &[])?.data_loglik(&[]),
     };
     let set = columns_of(&f.found.fitted.groups, &added);
-    let after_loglik = f
-        .found
-        .fitted
-        .fits
-        .out_of_fold(&set)
-        .map(|o| o.data_loglik() + f.found.fitted.log_scale);
-    let outliers = f.data.outlier.iter().filter(|o| **o).count();
+    let after_loglik = f.found.fitted.data_loglik(&set);
+    let set_aside = f.data.outlier.iter().filter(|o| **o).count();
     let report = Report {
         format: telemetry::report::REPORT_FORMAT.to_owned(),
         verdict: figures::verdict(&effects, unattributed.present),
         folds: f.folds.count,
         rows: Rows {
-            used: f.data.t_s.len() - outliers,
-            outliers,
+            used: f.data.t_s.len() - set_aside,
+            outliers: set_aside - f.data.unplaced,
             outside_reference: f.data.outside_reference,
         },
         before: f.errors(

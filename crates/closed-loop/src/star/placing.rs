@@ -32,7 +32,17 @@ impl StarData {
         effects: &[Arc<dyn Effect>],
     ) {
         self.project();
+        self.set_aside_behind();
         self.disturb(motion, effects);
+    }
+
+    /// A star behind the camera was taken for another.
+    fn set_aside_behind(&mut self) {
+        let [x, y] = &self.projected;
+        let places = x.iter().zip(y).zip(&mut self.outlier);
+        for ((x, y), outlier) in places {
+            *outlier |= !(x.is_finite() && y.is_finite());
+        }
     }
 
     /// Projection of every row by its frame's attitude, before any effect, px.
@@ -139,6 +149,7 @@ impl StarData {
             if !self.projected[0][row].is_finite() && !self.outlier[row] {
                 self.outlier[row] = true;
                 self.outside_reference += 1;
+                self.unplaced += 1;
             }
         }
     }

@@ -60,7 +60,7 @@ pub(crate) fn settle(
                 nuisance: vec![whole; folds.count],
                 candidates: vec![none; folds.count],
             };
-            let loglik = fitted.fits.out_of_fold(&[]).map(|o| o.data_loglik());
+            let loglik = fitted.data_loglik(&[]);
             let variance = fitted.fits.variance(&[]).unwrap_or(0.0);
             // where other folds have no stars they know little of the distortion, and so of where the light fell
             let [before, inside] = evidence.residuals_of(folds, &[], [&amplitudes, &inside]);

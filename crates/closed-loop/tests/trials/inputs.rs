@@ -1,7 +1,7 @@
 //! Bundles with little or odd data in them: a clear error or a sensible result, never a panic.
 
 use closed_loop::{CloseError, Closed};
-use focal_plane::StarFrames;
+use focal_plane::{Catalogue, CatalogueStar, StarFrames, ra_dec};
 use nalgebra::{UnitQuaternion, Vector3};
 use telemetry::{Bundle, Model};
 
@@ -72,18 +72,27 @@ fn quaternions_in_another_convention_are_refused() {
             1 => first(q),
             _ => first(&q.inverse()),
         };
-        for stars in [true, false] {
+        // which table is read otherwise, and what it is held against
+        let either = k == 0;
+        for (of_reference, stars) in [(true, true), (true, false), (false, false)] {
             let refused = after(&short(), |bundle| {
                 let reference = bundle.reference.as_mut().expect("it has one");
-                reference.q.iter_mut().for_each(|q| *q = written(&*q));
                 reference.rates_rad_s = None;
+                let attitude = bundle.attitude.as_mut().expect("it has one");
+                let q = if of_reference {
+                    &mut reference.q
+                } else {
+                    &mut attitude.q
+                };
+                q.iter_mut().for_each(|q| *q = written(&*q));
                 bundle.stars = bundle.stars.take().filter(|_| stars);
             });
             let words = refused.map(|_| ()).expect_err("it is refused").to_string();
-            let table = if stars {
-                "table stars"
-            } else {
-                "table attitude"
+            let table = match (stars, either, of_reference) {
+                (true, ..) => "table reference, columns qx, qy, qz, qw: these",
+                (_, true, _) => "table reference or attitude, columns",
+                (_, _, true) => "table reference, columns",
+                (_, _, false) => "table attitude, columns",
             };
             assert!(words.contains(said) && words.contains(table), "{words}");
         }
@@ -95,6 +104,35 @@ fn quaternions_in_another_convention_are_refused() {
         reference.q.iter_mut().for_each(|q| *q = turn * *q);
     });
     assert!(!matches!(turned, Err(CloseError::Convention { .. })));
+}
+
+/// One row says that it is a star behind the camera: it is set aside and counted, with a reference and without, and
+/// nothing is named.
+#[test]
+fn a_star_behind_the_camera_is_an_outlier() {
+    for reference in [true, false] {
+        let closed = after(&short(), |bundle| {
+            let q = bundle.reference.as_ref().expect("it has one").q[0];
+            let behind = q.inverse() * -Vector3::z();
+            let known = bundle.catalog.as_ref().expect("it has one");
+            let (ra, dec) = ra_dec(&behind);
+            let more = CatalogueStar {
+                id: 4242,
+                ra_deg: ra.deg(),
+                dec_deg: dec.deg(),
+                ..CatalogueStar::default()
+            };
+            let all = [known.stars(), &[more]].concat();
+            bundle.catalog = Some(Catalogue::new(known.epoch_year(), all).expect("they differ"));
+            let stars = bundle.stars.as_mut().expect("it has some");
+            let row = stars.rows_of(7).start;
+            stars.star_id[row] = 4242;
+            bundle.reference = bundle.reference.take().filter(|_| reference);
+        });
+        let report = closed.expect("one row is nothing").report;
+        assert_eq!(report.rows.outliers, 1, "reference {reference}");
+        assert!(report.effects.is_empty() && !report.unattributed.present);
+    }
 }
 
 #[test]

@@ -14,7 +14,8 @@ use coloured_noise::{CommonNoise, Rotations, SlowGains};
 use nalgebra::DMatrix;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use crate::search::selection::{Group, Judgement, WIDENING, columns_of};
+use crate::search::group::Group;
+use crate::search::selection::{Judgement, WIDENING, columns_of};
 use crate::star::moments::StarMoments;
 
 /// Rounds of generalised least squares and noise fit.

@@ -1,0 +1,92 @@
+//! What enters or leaves a choice as one.
+//!
+//! Not physics: which columns belong together, and which stand in each other's place.
+
+/// Candidate columns that enter or leave together.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Group {
+    /// Positions among the candidate columns; those that the data cannot show are
+    /// not among them.
+    pub(crate) columns: Vec<usize>,
+    /// Least and largest credible amplitude of each of `columns`.
+    pub(crate) bounds: Vec<[f64; 2]>,
+    /// Choices among discrete forms that the group stands for, each paid for like
+    /// a parameter.
+    pub(crate) choices: usize,
+    /// Parameters that the columns follow non-linearly, found by scanning.
+    pub(crate) shapes: usize,
+    /// Columns that are slopes of such parameters.
+    pub(crate) slopes: usize,
+    /// Groups of one family are forms of one cause, or of one part of it: at most one is chosen, but for those that
+    /// act apart.
+    pub(crate) family: String,
+    /// Middle and half-width, px, where it acts on a part of the detector alone.
+    pub(crate) reach: Option<([f64; 2], f64)>,
+    /// Groups of one kind are one effect, whatever it acts on.
+    pub(crate) kind: &'static str,
+    /// How many of its kind were looked at for each that is tried.
+    pub(crate) stands_for: f64,
+}
+
+impl Group {
+    /// Whether `values` of `columns`, some of its own, are all credible.
+    pub(crate) fn believes(&self, columns: &[usize], values: &[f64]) -> bool {
+        columns.iter().zip(values).all(|(column, value)| {
+            let at = self.columns.iter().position(|c| c == column);
+            at.is_none_or(|k| (self.bounds[k][0]..=self.bounds[k][1]).contains(value))
+        })
+    }
+
+    /// Whether not both are chosen: forms of one cause, of which two pixels that no star is near at once are none.
+    pub(crate) fn excludes(&self, other: &Self) -> bool {
+        let apart = self.reach.zip(other.reach).is_some_and(|((a, r), (b, s))| {
+            let [x, y] = [0, 1].map(|axis| (a[axis] - b[axis]).abs());
+            x.max(y) > r + s
+        });
+        self.family == other.family && !apart
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn group(family: &str, reach: Option<([f64; 2], f64)>) -> Group {
+        Group {
+            columns: vec![4, 6],
+            bounds: vec![[-1.0, 1.0], [0.0, 2.0]],
+            choices: 0,
+            shapes: 0,
+            slopes: 0,
+            family: family.to_owned(),
+            reach,
+            kind: "hot_pixel",
+            stands_for: 1.0,
+        }
+    }
+
+    /// A size at its bound is believed, one beyond it not; what the group does not have has no bound.
+    #[test]
+    fn sizes_within_their_bounds_are_believed() {
+        let group = group("", None);
+        for (columns, sizes, believed) in [
+            (&[4, 6][..], &[-1.0, 2.0][..], true),
+            (&[6], &[1.5], true),
+            (&[4], &[1.5], false),
+            (&[6, 4], &[-0.1, 0.5], false),
+            (&[5], &[9.0], true),
+        ] {
+            assert_eq!(group.believes(columns, sizes), believed, "{columns:?}");
+        }
+    }
+
+    /// Pixels on two sides of a star are forms of one pull; those that no star is near at once are two.
+    #[test]
+    fn what_acts_apart_is_no_other_form() {
+        let pixel = |x: f64| group("hot_pixel", Some(([x, 20.0], 1.5)));
+        assert!(pixel(10.0).excludes(&pixel(13.0)));
+        assert!(!pixel(10.0).excludes(&pixel(13.5)));
+        assert!(group("a", None).excludes(&group("a", None)));
+        assert!(!group("a", None).excludes(&group("b", None)));
+    }
+}
