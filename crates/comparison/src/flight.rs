@@ -153,7 +153,8 @@ impl<'a> Flight<'a> {
         self.of(self.model, &self.disturbances(), draw)
     }
 
-    /// The same of a hybrid model's processes alone, without distortion and effects.
+    /// The same of a hybrid model's processes and the wander of a declared reference, without distortion and without what
+    /// other effects shift.
     ///
     /// # Errors
     ///

@@ -260,7 +260,7 @@ impl EffectKind for Kind {
 }
 
 impl Empirical {
-    /// `P_1`..`P_3` of a value; zero where it is unknown.
+    /// `P_1`..`P_3` of a value; of the middle where it is unknown.
     fn orders(&self, value: f64) -> [f64; ORDERS] {
         let z = (value - self.middle) / self.half;
         let z = if z.is_finite() { z } else { 0.0 };

@@ -98,7 +98,7 @@ impl EffectKind for Kind {
 /// A line of unknown amplitude at `frequency_hz`, in data from `span_s[0]` to `span_s[1]`, picked from
 /// so many frequencies by looking at the data.
 ///
-/// Frequency is refined within half a bin `1 / span_s` to either side: what a line leaves at a slightly
+/// Frequency is refined within a bin `1 / span_s` to either side: what a line leaves at a slightly
 /// wrong frequency would pass for another line.
 pub fn line_at(frequency_hz: f64, span_s: [f64; 2], picked_from: usize) -> Box<dyn Candidate> {
     let (span, middle) = (span_s[1] - span_s[0], 0.5 * (span_s[0] + span_s[1]));

@@ -258,7 +258,7 @@ const LONGEST_HOLE: f64 = 64.0;
 ///
 /// # Errors
 ///
-/// As [`fit_series`]; [`FogmError::NotIncreasing`] times, [`FogmError::LengthMismatch`],
+/// As [`fit_series`]; [`FogmError::NotIncreasing`] times, [`FogmError::Unequal`] numbers,
 /// [`FogmError::Gaps`] with a choice of frequencies.
 pub fn fit_times(t_s: &[f64], y: &[f64], options: &FitOptions) -> Result<Fit, FogmError> {
     if t_s.len() != y.len() {

@@ -47,7 +47,9 @@ impl Psd {
     pub fn step_hz(&self) -> Option<f64> {
         let last = *self.frequency_hz.last()?;
         let step = last / (self.len() - 1) as f64;
-        let uniform = |(k, f): (usize, &f64)| (f - k as f64 * step).abs() <= 1e-9 * step;
+        // a product is rounded by half a unit in its last place, which of many bins is much of a step
+        let rounding = |f: f64| 1e-9 * step + 4.0 * f64::EPSILON * f;
+        let uniform = |(k, f): (usize, &f64)| (f - k as f64 * step).abs() <= rounding(*f);
         (step > 0.0 && self.frequency_hz.iter().enumerate().all(uniform)).then_some(step)
     }
 
@@ -85,5 +87,30 @@ impl Psd {
     pub fn log_unbiased(&self) -> Vec<f64> {
         let bins = self.psd.iter().zip(&self.dof);
         bins.map(|(p, d)| p.ln() - log_bias(*d)).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Sixteen million bins of 0.7 Hz over a number of samples that is no power of two: products are off by 1e-9 of a
+    /// step by rounding alone.
+    #[test]
+    fn a_grid_of_many_bins_is_uniform() {
+        let n = 32_000_001_u32;
+        let bins = n.div_ceil(2);
+        let psd = Psd {
+            frequency_hz: (0..bins)
+                .map(|k| f64::from(k) * 0.7 / f64::from(n))
+                .collect(),
+            psd: Vec::new(),
+            dof: Vec::new(),
+            fs_hz: 0.7,
+        };
+        assert!(psd.step_hz().is_some());
+        let mut bent = psd;
+        bent.frequency_hz[7] *= 1.0 + 1e-6;
+        assert!(bent.step_hz().is_none());
     }
 }
