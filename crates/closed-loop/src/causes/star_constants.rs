@@ -23,7 +23,6 @@ use telemetry::report::{Dependence, Unattributed};
 use crate::causes::commonness::IN_TIME;
 use crate::causes::description::{Described, Part};
 use crate::causes::stand_ins::BY_FAR;
-use crate::search::misplaced::MISPLACED;
 use crate::search::selection::columns_of;
 use crate::search::{Found, without};
 use crate::star::data::StarData;
@@ -145,9 +144,7 @@ impl<'a> Constants<'a> {
         let own: Vec<usize> = (0..places.len())
             .filter(|&e| set.contains(&places[e]))
             .collect();
-        // one star never wins against a slope
-        let one = |&e: &usize| shifts[e].candidate.id() == MISPLACED;
-        if own.len() < set.len() || own.iter().any(one) {
+        if own.len() < set.len() {
             return false;
         }
         let chosen: Vec<usize> = (0..shifts.len()).collect();

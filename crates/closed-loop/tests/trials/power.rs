@@ -343,10 +343,17 @@ fn a_long_exposure_that_nobody_declared() {
     assert!((refused.believed[1] - 2.0).abs() < 1e-9, "{refused:?}");
 }
 
-/// A warm pixel that sixty others are visited longer than, in three fifths of the run and more, is looked at
-/// like any other; its pull, all pixels paid for, is named with its place.
+/// Warm pixels that sixty others are visited longer than, in three fifths of the run and more, are looked at
+/// like any other; the pull of each, all pixels paid for, is named with its place, of two that no star is near at
+/// once as of one.
 #[test]
-fn a_warm_pixel_that_is_visited_no_longer_than_others() {
+fn warm_pixels_that_are_visited_no_longer_than_others() {
+    for count in [1, 2] {
+        warm_pixels_are_named(count);
+    }
+}
+
+fn warm_pixels_are_named(count: usize) {
     let mut case = Case::new(Path::Nods, 7);
     case.duration_s = 1200.0;
     let (_, bundle) = case.make();
@@ -362,19 +369,29 @@ fn a_warm_pixel_that_is_visited_no_longer_than_others() {
     let fifth = stars.frames().div_ceil(5);
     let mut pixels: Vec<_> = visits.into_iter().collect();
     pixels.sort_by_key(|(pixel, frames)| (std::cmp::Reverse(frames.len()), *pixel));
-    let at = pixels.iter().skip(60).find(|(_, frames)| {
+    let often = |frames: &Vec<usize>| {
         let fifths: std::collections::BTreeSet<_> = frames.iter().map(|f| f / fifth).collect();
         fifths.len() >= 3
-    });
-    let (pixel, _) = at.expect("such a pixel");
-    let [x, y] = pixel.map(|p| f64::from(p) + 0.5);
-    let lines = format!("x_px = {x:?}\ny_px = {y:?}\nstrength = 0.06");
-    let report = case.with("hot_pixel", &lines).close().report;
-    assert_eq!(report.effects.len(), 1, "{:?}", report.effects);
-    let effect = &report.effects[0];
-    let of = |name: &str| effect.parameters[name].value;
-    assert_eq!(effect.id, "hot_pixel");
-    assert!((of("x_px") - x).abs() < 1e-9 && (of("y_px") - y).abs() < 1e-9);
-    let sigma = effect.parameters["strength"].sigma.unwrap();
-    assert!((of("strength") - 0.06).abs() < 4.0 * sigma, "{effect:?}");
+    };
+    let mut warm: Vec<[f64; 2]> = Vec::new();
+    for (pixel, _) in pixels.iter().skip(60).filter(|(_, f)| often(f)) {
+        let [x, y] = pixel.map(|p| f64::from(p) + 0.5);
+        let apart = |at: &[f64; 2]| (at[0] - x).abs().max((at[1] - y).abs()) > 10.0;
+        if warm.len() < count && warm.iter().all(apart) {
+            warm.push([x, y]);
+            let lines = format!("x_px = {x:?}\ny_px = {y:?}\nstrength = 0.06");
+            case = case.with("hot_pixel", &lines);
+        }
+    }
+    assert_eq!(warm.len(), count, "such pixels");
+    let report = case.close().report;
+    assert_eq!(report.effects.len(), count, "{:?}", report.effects);
+    for effect in &report.effects {
+        let of = |name: &str| effect.parameters[name].value;
+        assert_eq!(effect.id, "hot_pixel");
+        let there = |at: &[f64; 2]| (of("x_px") - at[0]).hypot(of("y_px") - at[1]) < 1e-9;
+        assert!(warm.iter().any(there), "{effect:?} of {warm:?}");
+        let sigma = effect.parameters["strength"].sigma.unwrap();
+        assert!((of("strength") - 0.06).abs() < 4.0 * sigma, "{effect:?}");
+    }
 }
