@@ -91,6 +91,9 @@ pub(crate) struct Simulate {
     /// Folder of the bundle
     #[arg(long, value_name = "BUNDLE", required_unless_present = "print_preset")]
     pub(crate) out: Option<PathBuf>,
+    /// Also replace a bundle that boresight did not make, such as measured telemetry
+    #[arg(long)]
+    pub(crate) force: bool,
     /// How tables are written
     #[arg(long, value_enum, default_value_t = Tables::CsvGz)]
     pub(crate) tables: Tables,

@@ -220,10 +220,7 @@ fn metadata(
     };
     Ok(Metadata {
         title: run.title.clone(),
-        source: Some(format!(
-            "rendered by boresight, seed {}, draw {}",
-            run.seed, run.draw
-        )),
+        source: Some(telemetry::made_here("rendered", run.seed, run.draw)),
         epoch: run.epoch,
         time_scale: run.time_scale,
         sample_rate_hz: Some(run.rate_hz),

@@ -395,10 +395,7 @@ fn metadata(scenario: &Scenario, rate_hz: f64, draw: u64, vectors: bool) -> Meta
     };
     Metadata {
         title: run.title.clone().or_else(|| scenario.model.title.clone()),
-        source: Some(format!(
-            "simulated by boresight, seed {}, draw {draw}",
-            run.seed
-        )),
+        source: Some(telemetry::made_here("simulated", run.seed, draw)),
         epoch: run.epoch,
         time_scale: run.time_scale,
         sample_rate_hz: Some(rate_hz),

@@ -3,6 +3,7 @@
 //! Source: telemetry bundle format (docs/formats/bundle.md).
 
 mod convert;
+mod owner;
 mod read;
 mod stream;
 mod write;
@@ -16,6 +17,7 @@ use crate::{
     ReferenceTable, TelemetryError, WindowTable,
 };
 
+pub use owner::{bundle_files, foreign_file, made_here};
 pub use stream::BundleWriter;
 
 /// How tables are written.

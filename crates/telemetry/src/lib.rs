@@ -22,7 +22,7 @@ mod table;
 mod tables;
 mod time;
 
-pub use bundle::{Bundle, BundleWriter, TableFormat};
+pub use bundle::{Bundle, BundleWriter, TableFormat, bundle_files, foreign_file, made_here};
 pub use error::{CellError, Place, TelemetryError, TomlError};
 pub use extra::{ExtraCells, ExtraColumn, ExtraColumns, TextCells};
 pub use files::{Files, Folder, MemoryFiles, Source};

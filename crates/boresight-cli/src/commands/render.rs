@@ -10,6 +10,7 @@ use boresight::telemetry::config::Config;
 
 use crate::arguments::Simulate;
 use crate::commands::close::interrupted;
+use crate::commands::simulate::refuse_inputs;
 use crate::console::Console;
 
 /// Frames per second where neither run nor model says.
@@ -87,6 +88,7 @@ fn render(
     options: &Simulate,
     console: &Console,
 ) -> anyhow::Result<()> {
+    refuse_inputs(options, &course.motion, &course.folder, out)?;
     let settings = &course.run;
     let (truth, first_s, frames) = course.long_truth(rate_hz)?;
     let year = settings.epoch.map_or(YEAR, |epoch| epoch.julian_year(0.0));

@@ -1,17 +1,18 @@
 //! `boresight simulate`: a bundle from a scenario.
 
 use std::io::Write as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
 use boresight::comparison::Scene;
 use boresight::report::scene_figures;
-use boresight::scenarios::{Scenario, Simulated, preset, simulate_with_truth};
+use boresight::scenarios::{Motion, Scenario, Simulated, preset, simulate_with_truth};
 use boresight::telemetry::Output;
 
 use crate::arguments::{Fidelity, Simulate};
 use crate::commands::render;
 use crate::console::Console;
+use crate::targets;
 
 pub(crate) fn run(options: &Simulate, console: &Console) -> anyhow::Result<()> {
     if let Some(name) = options.print_preset.as_deref() {
@@ -24,6 +25,9 @@ pub(crate) fn run(options: &Simulate, console: &Console) -> anyhow::Result<()> {
         return Ok(());
     }
     let out = options.out.as_ref().context("--out needs a folder")?;
+    if !options.force {
+        targets::refuse_measured(out)?;
+    }
     if let Some(path) = &options.scenario
         && options.fidelity != Some(Fidelity::Model)
         && render::is_world(path)?
@@ -40,6 +44,7 @@ pub(crate) fn run(options: &Simulate, console: &Console) -> anyhow::Result<()> {
         return render::scenario(&scenario, out, options, console);
     }
     console.progress("simulating");
+    refuse_inputs(options, &scenario.motion, &scenario.folder, out)?;
     let simulated = simulate_with_truth(&scenario, scenario.run.draw)?;
     let bundle = &simulated.bundle;
     console.progress("writing the bundle");
@@ -60,6 +65,22 @@ pub(crate) fn run(options: &Simulate, console: &Console) -> anyhow::Result<()> {
             .to_string(),
     );
     Ok(())
+}
+
+/// Neither the scenario nor the recording that it names is written over.
+pub(super) fn refuse_inputs(
+    options: &Simulate,
+    motion: &Motion,
+    folder: &Path,
+    out: &Path,
+) -> anyhow::Result<()> {
+    let mut inputs: Vec<PathBuf> = options.scenario.iter().cloned().collect();
+    if let Motion::Recorded(recorded) = motion {
+        inputs.extend(targets::of_bundle(&folder.join(&recorded.bundle)));
+    }
+    let replaced = targets::of_bundle(out);
+    let mut each = replaced.iter();
+    each.try_for_each(|file| targets::refuse_input(file, &inputs))
 }
 
 /// Pictures of the run; the motion is the reference's where there is one, else the true one.
