@@ -21,6 +21,12 @@ pub(crate) fn of_bundle(dir: &Path) -> Vec<PathBuf> {
     names.map(|name| dir.join(name)).collect()
 }
 
+/// Refuses a folder where a file of these names is one of the inputs.
+pub(crate) fn refuse_inputs(dir: &Path, names: &[&str], inputs: &[PathBuf]) -> anyhow::Result<()> {
+    let mut files = names.iter().map(|name| dir.join(name));
+    files.try_for_each(|file| refuse_input(&file, inputs))
+}
+
 /// Refuses to write a file over one of the inputs, whatever way leads there.
 pub(crate) fn refuse_input(target: &Path, inputs: &[PathBuf]) -> anyhow::Result<()> {
     // what is not there is not written over

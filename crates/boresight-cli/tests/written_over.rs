@@ -125,3 +125,39 @@ fn a_recording_is_not_written_over_by_its_replay() -> Done {
         .success();
     Ok(())
 }
+
+#[test]
+fn inputs_are_not_written_over() -> Done {
+    let dir = tempfile::tempdir()?;
+    let here = dir.path();
+    let model = here.join("model.toml");
+    fs::copy(fixtures().join("example/model.toml"), &model)?;
+    let bundle = fixtures().join("example/bundle");
+    let mut close = boresight();
+    close.arg("close").arg(&model).arg(&bundle);
+    // another way to the same folder is the same folder
+    let around = here.join("..").join(here.file_name().ok_or("name")?);
+    let words = ["model.toml", "--out", "reads"];
+    refuses(close.arg("--out").arg(around), here, &words)?;
+
+    let other = here.join("psd.csv");
+    fs::rename(&model, &other)?;
+    let mut compare = boresight();
+    compare
+        .arg("compare")
+        .arg(fixtures().join("example/model.toml"));
+    compare.arg(&bundle).arg("--with").arg(&other);
+    refuses(compare.arg("--out").arg(here), here, &["psd.csv", "--out"])?;
+
+    let night = here.join("night");
+    copy(&bundle, &night)?;
+    for name in ["bundle.toml", "stars.csv.gz"] {
+        let mut fit = boresight();
+        fit.arg("fit")
+            .arg(&night)
+            .arg("--out")
+            .arg(night.join(name));
+        refuses(&mut fit, &night, &[name, "--out"])?;
+    }
+    Ok(())
+}

@@ -10,8 +10,21 @@ use boresight::telemetry::{Bundle, Output};
 
 use crate::arguments::{Assess, Method};
 use crate::console::Console;
+use crate::targets;
+
+/// All files that the command may write.
+const RESULTS: [&str; 5] = [
+    "assess.json",
+    "summary.txt",
+    "noise.svg",
+    "residual.svg",
+    "residuals_attitude.parquet",
+];
 
 pub(crate) fn run(options: &Assess, console: &Console) -> anyhow::Result<()> {
+    if let Some(dir) = &options.out {
+        targets::refuse_inputs(dir, &RESULTS, &targets::of_bundle(&options.bundle))?;
+    }
     console.progress("reading");
     let bundle = Bundle::read(&options.bundle)?;
     let settings = Options {

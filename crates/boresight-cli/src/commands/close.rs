@@ -1,6 +1,7 @@
 //! `boresight close`: the main job.
 
 use std::io::Write as _;
+use std::path::PathBuf;
 
 use anyhow::Context as _;
 use boresight::closed_loop::{Closed, Questions, close_asking};
@@ -12,9 +13,26 @@ use boresight::telemetry::{Bundle, Model, Output};
 use crate::arguments::Close;
 use crate::console::Console;
 use crate::example;
+use crate::targets;
+
+/// All files that the command may write.
+const RESULTS: [&str; 7] = [
+    "report.json",
+    "report.html",
+    "summary.txt",
+    "model.toml",
+    "residuals_stars.parquet",
+    "residuals_attitude.parquet",
+    "dark_map.csv",
+];
 
 pub(crate) fn run(options: &Close, console: &Console) -> anyhow::Result<()> {
     let questions = Questions::about(&options.tests)?.adding_empirical(options.add_empirical);
+    if let Some(dir) = &options.out {
+        let bundle = options.bundle.iter().flat_map(|b| targets::of_bundle(b));
+        let inputs: Vec<PathBuf> = options.model.iter().cloned().chain(bundle).collect();
+        targets::refuse_inputs(dir, &RESULTS, &inputs)?;
+    }
     console.progress("reading");
     let (model, bundle, title) = match (&options.model, &options.bundle) {
         (Some(model), Some(bundle)) => {

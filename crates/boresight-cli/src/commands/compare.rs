@@ -10,8 +10,30 @@ use boresight::telemetry::{Bundle, Model, Output};
 use crate::arguments::Compare;
 use crate::commands::close::interrupted;
 use crate::console::Console;
+use crate::targets;
+
+/// All files that the command may write.
+const RESULTS: [&str; 11] = [
+    "compare.json",
+    "summary.txt",
+    "psd.csv",
+    "draws.csv",
+    "psd.svg",
+    "psd_x.svg",
+    "psd_y.svg",
+    "psd_z.svg",
+    "error.svg",
+    "residual.svg",
+    "distortion.svg",
+];
 
 pub(crate) fn run(options: &Compare, console: &Console) -> anyhow::Result<()> {
+    if let Some(dir) = &options.out {
+        let mut inputs = targets::of_bundle(&options.bundle);
+        inputs.push(options.model.clone());
+        inputs.extend(options.others.iter().cloned());
+        targets::refuse_inputs(dir, &RESULTS, &inputs)?;
+    }
     console.progress("reading");
     let model = Model::read(&options.model)?;
     let mut others = vec![];

@@ -9,8 +9,12 @@ use boresight::telemetry::{Bundle, write_file};
 
 use crate::arguments::Fit;
 use crate::console::Console;
+use crate::targets;
 
 pub(crate) fn run(options: &Fit, console: &Console) -> anyhow::Result<()> {
+    if let Some(out) = &options.out {
+        targets::refuse_input(out, &targets::of_bundle(&options.bundle))?;
+    }
     console.progress("reading");
     let bundle = Bundle::read(&options.bundle)?;
     console.progress("fitting");
