@@ -15,6 +15,13 @@ pub(crate) fn refuse_measured(dir: &Path) -> anyhow::Result<()> {
     )
 }
 
+/// Whether a file is a result of this format: then what lies beside it may be of the same run.
+pub(crate) fn is_result(path: &Path, format: &str) -> bool {
+    let text = std::fs::read(path).unwrap_or_default();
+    let read: serde_json::Result<serde_json::Value> = serde_json::from_slice(&text);
+    read.is_ok_and(|value| value["format"] == format)
+}
+
 /// The files of a bundle.
 pub(crate) fn of_bundle(dir: &Path) -> Vec<PathBuf> {
     let names = bundle_files(dir).into_iter();

@@ -161,3 +161,37 @@ fn inputs_are_not_written_over() -> Done {
     }
     Ok(())
 }
+
+#[test]
+fn results_of_an_earlier_run_do_not_stay() -> Done {
+    let dir = tempfile::tempdir()?;
+    let (results, bundle) = (dir.path().join("results"), dir.path().join("bundle"));
+    copy(&fixtures().join("example/bundle"), &bundle)?;
+    let close = || {
+        let mut close = boresight();
+        close
+            .arg("close")
+            .arg(fixtures().join("example/model.toml"));
+        close.arg(&bundle).arg("--out").arg(&results);
+        close
+    };
+    // no report is there: what has the name of a result is somebody's own
+    fs::create_dir(&results)?;
+    fs::write(results.join("dark_map.csv"), "mine")?;
+    close().assert().success();
+    assert!(results.join("dark_map.csv").exists());
+    fs::write(results.join("notes.txt"), "mine")?;
+    assert!(results.join("residuals_stars.parquet").exists());
+    fs::remove_file(bundle.join("stars.csv.gz"))?;
+    close().assert().success();
+    for (name, there) in [
+        ("residuals_stars.parquet", false),
+        ("dark_map.csv", false),
+        ("residuals_attitude.parquet", true),
+        ("report.html", true),
+        ("notes.txt", true),
+    ] {
+        assert_eq!(results.join(name).exists(), there, "{name}");
+    }
+    Ok(())
+}

@@ -132,6 +132,28 @@ impl Output {
         Ok(())
     }
 
+    /// As [`commit`](Self::commit), in the place of an earlier run: of its files, of which these are all
+    /// names, those that this run did not write are taken away.
+    ///
+    /// # Errors
+    ///
+    /// What the operating system says.
+    pub fn commit_in_place_of(self, earlier: &[&str]) -> Result<(), TelemetryError> {
+        let stale: Vec<PathBuf> = earlier
+            .iter()
+            .filter(|name| !self.partial.join(name).exists())
+            .map(|name| self.target.join(name))
+            .filter(|path| path.is_file())
+            .collect();
+        self.commit()?;
+        for path in stale {
+            fs::remove_file(&path).map_err(|error| {
+                TelemetryError::io(path.display().to_string(), "remove", &error)
+            })?;
+        }
+        Ok(())
+    }
+
     fn move_files(&self) -> io::Result<()> {
         for entry in fs::read_dir(&self.partial)? {
             let entry = entry?;
@@ -233,6 +255,20 @@ mod tests {
         output.write("x", |to| to.write_all(b"new")).unwrap();
         output.commit().unwrap();
         assert_eq!(names(&base), ["x", "y"]);
+        assert_eq!(fs::read(base.join("x")).unwrap(), b"new");
+        fs::remove_dir_all(base).unwrap();
+    }
+
+    #[test]
+    fn an_earlier_run_leaves_nothing_behind() {
+        let base = place("earlier");
+        for name in ["x", "y", "z"] {
+            fs::write(base.join(name), "old").unwrap();
+        }
+        let output = Output::new(&base).unwrap();
+        output.write("x", |to| to.write_all(b"new")).unwrap();
+        output.commit_in_place_of(&["x", "y", "never"]).unwrap();
+        assert_eq!(names(&base), ["x", "z"]);
         assert_eq!(fs::read(base.join("x")).unwrap(), b"new");
         fs::remove_dir_all(base).unwrap();
     }

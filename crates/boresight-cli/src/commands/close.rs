@@ -7,7 +7,7 @@ use anyhow::Context as _;
 use boresight::closed_loop::{Closed, Questions, close_asking};
 use boresight::comparison::{CompareSettings, Compared, compare};
 use boresight::report::{Run, html, summary};
-use boresight::telemetry::report::ComparedModel;
+use boresight::telemetry::report::{ComparedModel, REPORT_FORMAT};
 use boresight::telemetry::{Bundle, Model, Output};
 
 use crate::arguments::Close;
@@ -71,7 +71,11 @@ pub(crate) fn run(options: &Close, console: &Console) -> anyhow::Result<()> {
         let (written, page) = rayon::join(|| write(&closed, &text, &output), || html(&run));
         written?;
         output.write("report.html", |to| to.write_all(page.as_bytes()))?;
-        output.commit()?;
+        if targets::is_result(&dir.join("report.json"), REPORT_FORMAT) {
+            output.commit_in_place_of(&RESULTS)?;
+        } else {
+            output.commit()?;
+        }
     }
     console.say(&format!("Input     {title}\n{text}"));
     if console.json() {
