@@ -74,6 +74,18 @@ fn a_model_goes_round() {
     );
 }
 
+/// Not as a misspelt key whose nearest one has nothing to do with it.
+#[test]
+fn a_scenario_is_told_as_one() {
+    let text = format!("{GOOD}[run]\nduration_s = 5.0\n[motion]\nkind = \"hold\"\n");
+    let said = Model::parse(&text, "s.toml", &[]).unwrap_err().to_string();
+    for part in ["s.toml, line 18", "a scenario", "[motion], [run]"] {
+        assert!(said.contains(part), "no {part:?} in:\n{said}");
+    }
+    assert!(!said.contains("nearest"), "{said}");
+    assert!(Model::parse(&text, "s.toml", &["motion", "run"]).is_ok());
+}
+
 #[test]
 fn what_is_left_out_is_none() {
     let model = Model::parse("format = \"boresight-model/1\"\n", "m.toml", &[]).unwrap();

@@ -33,6 +33,9 @@ const NOISE: &[&str] = &[
 ];
 const AXIS: &[&str] = &["sigma_hsf_arcsec", "tau_hsf_s", "sigma_tn_arcsec"];
 
+/// Tables that only a scenario has.
+const SCENARIO: &[&str] = &["motion", "sky", "run", "reference", "rates", "housekeeping"];
+
 /// Where a key that stands in the wrong table belongs.
 const PLACES: &[(&str, &[&str])] = &[
     ("[tracker]", TRACKER),
@@ -46,6 +49,9 @@ const HIGHEST_ORDER: i64 = 15;
 
 pub(super) fn read(config: &Config, file: &str, ignored: &[&str]) -> Result<Model, TelemetryError> {
     let top = config.root();
+    if ignored.is_empty() {
+        refuse_scenario(&top)?;
+    }
     top.allow_or_point(&[TOP, ignored].concat(), PLACES)?;
     format(&top, MODEL_FORMAT)?;
     let kind = match top.entry("kind") {
@@ -74,6 +80,19 @@ pub(super) fn read(config: &Config, file: &str, ignored: &[&str]) -> Result<Mode
         return Err(config.error_at("kind", message));
     }
     Ok(model)
+}
+
+/// A scenario where a model is wanted is told as one, not as a misspelt key.
+fn refuse_scenario(top: &Section<'_>) -> Result<(), TelemetryError> {
+    let found: Vec<_> = SCENARIO.iter().filter_map(|key| top.entry(key)).collect();
+    let Some(first) = found.iter().min_by_key(|entry| entry.line()) else {
+        return Ok(());
+    };
+    let names: Vec<String> = found.iter().map(|e| format!("[{}]", e.key())).collect();
+    Err(first.error_at_key(format!(
+        "this is a scenario, expected a model, which has no {}: take these tables out, and the effects that are not to be declared",
+        names.join(", ")
+    )))
 }
 
 fn tracker(section: &Section<'_>) -> Result<ModelTracker, TelemetryError> {
