@@ -12,6 +12,9 @@ use flate2::read::MultiGzDecoder;
 use super::{Builder, RawTable, Setting};
 use crate::{Place, Source, TelemetryError};
 
+/// What messages call the compressed file.
+const GZIP: &str = "gzip stream";
+
 /// One read of the file system.
 const BUFFER: usize = 1 << 18;
 
@@ -39,6 +42,14 @@ pub(crate) fn read(
         first: 0,
         text: Vec::new(),
     };
+    rows(&mut lines, setting).map_err(|error| match error {
+        TelemetryError::Broken { what: GZIP, .. } => error,
+        _ => lines.damage().unwrap_or(error),
+    })
+}
+
+fn rows(lines: &mut Lines<'_>, setting: Setting<'_>) -> Result<RawTable, TelemetryError> {
+    let file = lines.file;
     let mut builder = Builder::new(file, lines.header()?, setting)?;
     while lines.next()? {
         let place = Place::Line(lines.first);
@@ -128,6 +139,18 @@ impl Lines<'_> {
         Ok(true)
     }
 
+    /// What is wrong with a gzip stream as such: its checksum stands at its end, so that a row of damaged
+    /// bytes is met before it. None where the row itself is to blame.
+    fn damage(&mut self) -> Option<TelemetryError> {
+        if !self.gzip {
+            return None;
+        }
+        let sound = self.first.saturating_sub(1);
+        let error = io::copy(&mut self.reader, &mut io::sink()).err()?;
+        self.line = sound;
+        Some(self.broken(&error))
+    }
+
     fn header(&mut self) -> Result<Vec<String>, TelemetryError> {
         if !self.next()? {
             return Ok(Vec::new());
@@ -168,7 +191,7 @@ impl Lines<'_> {
         TelemetryError::Broken {
             file: self.file.into(),
             place: Place::Line(self.line),
-            what: "gzip stream",
+            what: GZIP,
             reason,
         }
     }

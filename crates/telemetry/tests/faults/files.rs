@@ -59,6 +59,27 @@ fn gzip_damaged_or_misnamed() {
     check(&files, &["b/stars.csv.gz", "gzip"]);
 }
 
+/// Bytes that changed on the way make a row that cannot be read, long before the checksum that tells it.
+#[test]
+fn damaged_bytes_are_not_blamed_on_a_column() {
+    let mut files = fixture("complete");
+    let stars = text(&files, "stars.csv");
+    files.remove("stars.csv");
+    let comma = stars.match_indices(',').nth(30).unwrap().0;
+    let mut gzip = GzEncoder::new(Vec::new(), Compression::none());
+    gzip.write_all(stars.as_bytes()).unwrap();
+    let mut bytes = gzip.finish().unwrap();
+    let head = bytes.len() - stars.len() - 8;
+    assert_eq!(bytes[head + comma], b',', "stored as it is");
+    bytes[head + comma] = b'7';
+    files.insert("stars.csv.gz", bytes);
+    let message = refusal(&files);
+    for part in ["b/stars.csv.gz, after line", "expected a whole gzip stream"] {
+        assert!(message.contains(part), "{message}");
+    }
+    assert!(!message.contains("column"), "{message}");
+}
+
 #[test]
 fn fault_in_a_gzipped_table_has_its_line() {
     let mut files = cell_changed("stars.csv", 9, "mag", "dim");
