@@ -330,7 +330,7 @@ fn built(
             ));
             continue;
         }
-        let parameters = effect_parameters(entry)?;
+        let parameters = effect_parameters(entry);
         out.push(effects::build(&entry.id, &parameters, &surroundings)?.into());
     }
     Ok(out)

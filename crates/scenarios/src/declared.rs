@@ -107,21 +107,18 @@ fn hybrid(model: &Model, pbm: &Pbm) -> Result<Hem, ScenarioError> {
 
 /// What an `[[effect]]` of a model gives the effect to be built with.
 ///
-/// # Errors
-/// Several numbers where an effect takes one.
-pub fn effect_parameters(entry: &EffectEntry) -> Result<Parameters, ScenarioError> {
+/// Several numbers are a text with commas, which an effect that takes one number refuses.
+pub fn effect_parameters(entry: &EffectEntry) -> Parameters {
     let value = |(name, value): (&String, &EffectValue)| {
         let value = match value {
             EffectValue::Number(number) => ParameterValue::Number(*number),
             EffectValue::Text(text) => ParameterValue::Text(text.clone()),
-            EffectValue::Numbers(_) => {
-                return Err(ScenarioError::EffectList {
-                    effect: entry.id.clone(),
-                    name: name.clone(),
-                });
+            EffectValue::Numbers(numbers) => {
+                let texts: Vec<String> = numbers.iter().map(f64::to_string).collect();
+                ParameterValue::Text(texts.join(","))
             }
         };
-        Ok((name.clone(), value))
+        (name.clone(), value)
     };
     entry.parameters.iter().map(value).collect()
 }

@@ -46,14 +46,6 @@ pub enum ScenarioError {
     /// The hybrid model.
     #[error(transparent)]
     Fogm(#[from] FogmError),
-    /// Several numbers where the effect takes one.
-    #[error("effect `{effect}`: `{name}` is a list, expected one number or text")]
-    EffectList {
-        /// The effect.
-        effect: String,
-        /// The parameter.
-        name: String,
-    },
     /// Two channels of one name.
     #[error("housekeeping channel `{name}` is given twice")]
     RepeatedChannel {

@@ -252,7 +252,7 @@ fn build_effects(
     entries
         .iter()
         .map(|entry| {
-            let built = effects::build(&entry.id, &effect_parameters(entry)?, surroundings)?;
+            let built = effects::build(&entry.id, &effect_parameters(entry), surroundings)?;
             Ok(Arc::from(built))
         })
         .collect()
