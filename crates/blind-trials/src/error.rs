@@ -19,12 +19,12 @@ pub enum BlindError {
         world: String,
     },
     /// A world cannot be rendered.
-    #[error("{world}: {source}")]
+    #[error("{world}: {reason}")]
     Imager {
         /// Which world.
         world: String,
         /// Why.
-        source: Box<imager::ImagerError>,
+        reason: Box<imager::ImagerError>,
     },
     /// A scenario, or the motion of a world, is wrong.
     #[error(transparent)]
@@ -33,14 +33,14 @@ pub enum BlindError {
     #[error(transparent)]
     Telemetry(#[from] telemetry::TelemetryError),
     /// The loop gave up.
-    #[error("{world}, seed {seed}: {source}")]
+    #[error("{world}, seed {seed}: {reason}")]
     Close {
         /// Which world.
         world: String,
         /// Which seed, from 0.
         seed: u64,
         /// Why.
-        source: Box<closed_loop::CloseError>,
+        reason: Box<closed_loop::CloseError>,
     },
     /// No trial has such a name.
     #[error("no world is called {name}; there are {known}")]

@@ -109,10 +109,10 @@ fn one(trial: &Trial, seed: u64, keep: Option<&Path>) -> Result<Score, BlindErro
     }
     // all that the loop is given
     let closed = closed_loop::close(&trial.model, &bundle, &|_| ());
-    let closed = closed.map_err(|source| BlindError::Close {
+    let closed = closed.map_err(|reason| BlindError::Close {
         world: trial.name.clone(),
         seed,
-        source: Box::new(source),
+        reason: Box::new(reason),
     })?;
     let mut floor = None;
     if let (Some(world), Some(figures)) = (trial.world(), &closed.stars) {

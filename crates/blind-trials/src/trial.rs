@@ -66,13 +66,13 @@ impl World {
             time_scale: settings.time_scale,
         };
         let rendered = imager::frames(instrument, &truth, &self.sky, &run);
-        rendered.map_err(|source| self.failed(source))
+        rendered.map_err(|reason| self.failed(reason))
     }
 
-    fn failed(&self, source: ImagerError) -> BlindError {
+    fn failed(&self, reason: ImagerError) -> BlindError {
         let world = self.course.run.title.clone().unwrap_or_default();
-        let source = Box::new(source);
-        BlindError::Imager { world, source }
+        let reason = Box::new(reason);
+        BlindError::Imager { world, reason }
     }
 }
 
@@ -99,9 +99,9 @@ impl Trial {
     ///
     /// As [`read`](Self::read).
     pub fn parse(text: &str, name: &str, file: &str, folder: &Path) -> Result<Self, BlindError> {
-        let failed = |source| BlindError::Imager {
+        let failed = |reason| BlindError::Imager {
             world: name.to_owned(),
-            source: Box::new(source),
+            reason: Box::new(reason),
         };
         let instrument = Instrument::parse(text, file, &Course::TABLES).map_err(failed)?;
         let course = Course::parse(text, file, folder)?;

@@ -19,6 +19,22 @@ fn example() -> PathBuf {
     fixtures().join("example/bundle")
 }
 
+/// What a command that has to fail says; exit 2, nothing on stdout.
+fn said(command: &mut Command) -> Result<String, Box<dyn std::error::Error>> {
+    let done = command.output()?;
+    let said = String::from_utf8(done.stderr)?;
+    assert_eq!(done.status.code(), Some(2), "{said}");
+    assert!(done.stdout.is_empty(), "{said}");
+    Ok(said)
+}
+
+#[track_caller]
+fn has(said: &str, words: &[&str]) {
+    for word in words {
+        assert!(said.contains(word), "no {word:?} in: {said}");
+    }
+}
+
 /// A file in a folder, with its name as messages have it.
 fn file(dir: &Path, name: &str, text: &str) -> Result<(PathBuf, String), std::io::Error> {
     let path = dir.join(name);
@@ -50,6 +66,73 @@ rate_hz = 2.0
 "#;
 
 #[test]
+fn a_mistake_in_an_effect_is_shown_in_its_line() -> Done {
+    let dir = tempfile::tempdir()?;
+    for (from, to, line, word) in [
+        ("rolling_shutter", "roling_shutter", 8, "`rolling_shutter`"),
+        ("line_time_s", "line_tim_s", 9, "`line_time_s`"),
+        ("30e-6", "30.0", 9, "line_time_s"),
+        ("30e-6", "[1.0, 2.0]", 9, "a number"),
+        ("line_time_s = 30e-6", "", 7, "line_time_s"),
+    ] {
+        let text = MODEL.replacen(from, to, 1);
+        let (model, shown) = file(dir.path(), "model.toml", &text)?;
+        let place = format!("error: {shown}, line {line}, ");
+        let closed = said(boresight().arg("close").arg(&model).arg(example()))?;
+        has(&closed, &[&place, word]);
+        let compared = said(boresight().arg("compare").arg(&model).arg(example()))?;
+        has(&compared, &[&place, word]);
+        let (scenario, shown) = file(dir.path(), "scenario.toml", &format!("{text}{RUN}"))?;
+        let mut simulate = boresight();
+        simulate.arg("simulate").arg(&scenario).arg("--out");
+        let simulated = said(simulate.arg(dir.path().join("bundle")))?;
+        has(
+            &simulated,
+            &[&format!("error: {shown}, line {line}, "), word],
+        );
+    }
+    Ok(())
+}
+
+#[test]
+fn a_value_of_a_scenario_is_shown_in_its_line() -> Done {
+    let dir = tempfile::tempdir()?;
+    let good = format!("{MODEL}{RUN}");
+    for (from, to, line) in [
+        ("duration_s = 10.0", "duration_s = -10.0", 17),
+        ("[1.0, 0.0, 0.0]", "[0.0, 0.0, 0.0]", 13),
+        ("rate_hz = 2.0\n", "", 16),
+    ] {
+        let (scenario, shown) = file(dir.path(), "scenario.toml", &good.replacen(from, to, 1))?;
+        let mut simulate = boresight();
+        simulate.arg("simulate").arg(&scenario).arg("--out");
+        let told = said(simulate.arg(dir.path().join("bundle")))?;
+        has(&told, &[&format!("error: {shown}, line {line}, ")]);
+    }
+    let world = fs::read_to_string(fixtures().join("worlds/null_slews.toml"))?;
+    let line = world
+        .lines()
+        .position(|line| line.starts_with("duration_s"));
+    let line = 1 + line.ok_or("a duration")?;
+    let text = world.replacen("duration_s = ", "duration_s = -", 1);
+    let (world, shown) = file(dir.path(), "world.toml", &text)?;
+    let mut simulate = boresight();
+    simulate.arg("simulate").arg(&world).arg("--out");
+    let told = said(simulate.arg(dir.path().join("bundle")))?;
+    has(&told, &[&format!("error: {shown}, line {line}, ")]);
+    Ok(())
+}
+
+#[test]
+fn a_scenario_is_no_model() -> Done {
+    let dir = tempfile::tempdir()?;
+    let (scenario, shown) = file(dir.path(), "scenario.toml", &format!("{MODEL}{RUN}"))?;
+    let told = said(boresight().arg("close").arg(&scenario).arg(example()))?;
+    has(&told, &[&shown, "line 10", "a scenario", "[motion], [run]"]);
+    Ok(())
+}
+
+#[test]
 fn a_model_with_an_empirical_term_is_simulated_and_compared() -> Done {
     let dir = tempfile::tempdir()?;
     let term = "[[effect]]\nid = \"empirical\"\nvariable = \"time\"\nacts_on = \"attitude\"\nmiddle = 5.0\nhalf = 5.0\ncoefficients = [2.0, -1.0, 20.0]\n";
@@ -61,5 +144,24 @@ fn a_model_with_an_empirical_term_is_simulated_and_compared() -> Done {
     let mut simulate = boresight();
     simulate.arg("simulate").arg(&scenario).arg("--out");
     simulate.arg(dir.path().join("bundle")).assert().success();
+    Ok(())
+}
+
+#[test]
+fn a_band_beyond_the_spectrum_is_told_once() -> Done {
+    let mut fit = boresight();
+    let told = said(fit.arg("fit").arg(example()).args(["--band-hz", "5,10"]))?;
+    has(&told, &["--band-hz", "5 to 10 Hz", "1.000 Hz"]);
+    assert_eq!(told.matches("5 to 10 Hz").count(), 1, "{told}");
+    assert_eq!(told.trim_end().lines().count(), 1, "{told}");
+    Ok(())
+}
+
+#[test]
+fn nothing_left_to_fit_is_told_once() -> Done {
+    let mut fit = boresight();
+    let told = said(fit.arg("fit").arg(example()).args(["--exclude-hz", "0,10"]))?;
+    has(&told, &["--exclude-hz: fit of the residual about x"]);
+    assert_eq!(told.matches("usable").count(), 1, "{told}");
     Ok(())
 }

@@ -110,7 +110,8 @@ pub fn compare(
         .map(|model| {
             let mut said = vec![];
             let (t_s, seed) = (&residual.t_s, settings.seed);
-            let flight = Flight::new(model, bundle, &truth, t_s, seed, &mut said)?;
+            let flight = Flight::new(model, bundle, &truth, t_s, seed, &mut said)
+                .map_err(|error| error.of_model(model))?;
             Ok((flight, said))
         })
         .collect();
@@ -137,7 +138,7 @@ pub fn compare(
     let mut measured = vec![];
     for (kept, axis) in kept.iter().zip(AXES) {
         ComparisonError::check_scatter(axis, std_of(kept))?;
-        let of_spectrum = |source| ComparisonError::Spectrum { axis, source };
+        let of_spectrum = |reason| ComparisonError::Spectrum { axis, reason };
         let plan = Spectrum::new(&residual.t_s, kept).map_err(of_spectrum)?;
         measured.push(plan.of(kept).map_err(of_spectrum)?);
         plans.push(plan);

@@ -6,6 +6,7 @@ use fogm_fit::FogmError;
 use scenarios::ScenarioError;
 use spectra::SpectraError;
 use star_tracker::TrackerError;
+use telemetry::{Model, TelemetryError};
 
 /// Why no comparison came out.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -36,14 +37,14 @@ pub enum ComparisonError {
     },
     /// The reference is no series of attitudes.
     #[error("table `reference`: {0}")]
-    Reference(#[from] AttitudeError),
+    Reference(AttitudeError),
     /// No spectrum of an axis.
-    #[error("spectrum of the residual about {axis}: {source}")]
+    #[error("spectrum of the residual about {axis}: {reason}")]
     Spectrum {
         /// The axis.
         axis: &'static str,
         /// Why.
-        source: SpectraError,
+        reason: SpectraError,
     },
     /// Too few draws for a standard deviation.
     #[error("{got} draws asked for, at least 8 needed")]
@@ -61,22 +62,47 @@ pub enum ComparisonError {
     },
     /// Numbers of the model that make no camera.
     #[error("model: {0}")]
-    Camera(#[from] CameraError),
+    Camera(CameraError),
     /// Made-up stars that the model's field has no room for.
     #[error("model: {0}")]
-    Tracker(#[from] TrackerError),
+    Tracker(TrackerError),
     /// A model that cannot be flown.
     #[error("model: {0}")]
-    Scenario(#[from] ScenarioError),
+    Scenario(ScenarioError),
     /// An effect that cannot be built.
     #[error("model: {0}")]
-    Effect(#[from] EffectError),
+    Effect(EffectError),
     /// Numbers of a hybrid model outside their range.
     #[error("model: {0}")]
-    Hybrid(#[from] FogmError),
+    Hybrid(FogmError),
+    /// A model that cannot be flown, in its own line.
+    #[error(transparent)]
+    InModel(TelemetryError),
+    /// A model that cannot be flown, as a whole.
+    #[error("{model}: {reason}")]
+    OfModel {
+        /// Its file, or its title.
+        model: String,
+        /// Why.
+        reason: String,
+    },
+    /// No frequency is left to be fitted.
+    #[error(
+        "the spectrum of the residual has no frequency in {low_hz} to {high_hz} Hz: it reaches from {from_hz:.3e} to {nyquist_hz:.3} Hz, half the sample rate"
+    )]
+    EmptyBand {
+        /// Lower end of the band asked for, Hz.
+        low_hz: f64,
+        /// Its upper end.
+        high_hz: f64,
+        /// Lowest frequency there is.
+        from_hz: f64,
+        /// Highest.
+        nyquist_hz: f64,
+    },
     /// No spectrum of a draw.
     #[error("spectrum of a draw: {0}")]
-    Draw(#[from] SpectraError),
+    Draw(SpectraError),
     /// A residual that does not vary.
     #[error(
         "the residual about {axis} does not vary (standard deviation {std_arcsec:.0e} arcsec, which is rounding): there is no noise to speak of; is the reference a copy of the attitude?"
@@ -88,12 +114,12 @@ pub enum ComparisonError {
         std_arcsec: f64,
     },
     /// No fit of an axis.
-    #[error("fit of the residual about {axis}: {source}")]
+    #[error("fit of the residual about {axis}: {reason}")]
     Fit {
         /// The axis.
         axis: &'static str,
         /// Why.
-        source: FogmError,
+        reason: FogmError,
     },
 }
 
@@ -101,7 +127,57 @@ pub enum ComparisonError {
 /// 1e-10 arcsec.
 const ROUNDING_ARCSEC: f64 = 1e-7;
 
+/// The text of each of these holds that of its reason, which is therefore no `source`: it would be told
+/// twice.
+macro_rules! from {
+    ($($variant:ident: $reason:ty),* $(,)?) => {
+        $(impl From<$reason> for ComparisonError {
+            fn from(reason: $reason) -> Self {
+                Self::$variant(reason)
+            }
+        })*
+    };
+}
+
+from! {
+    Reference: AttitudeError,
+    Camera: CameraError,
+    Tracker: TrackerError,
+    Scenario: ScenarioError,
+    Effect: EffectError,
+    Hybrid: FogmError,
+    Draw: SpectraError,
+}
+
 impl ComparisonError {
+    /// The same with the name of the model, where it is one's fault.
+    pub(crate) fn of_model(self, model: &Model) -> Self {
+        let reason = match self {
+            Self::Scenario(ScenarioError::File(located)) => return Self::InModel(located),
+            Self::Camera(error) => error.to_string(),
+            Self::Tracker(error) => error.to_string(),
+            Self::Scenario(error) => error.to_string(),
+            Self::Effect(error) => error.to_string(),
+            Self::Hybrid(error) => error.to_string(),
+            other => return other,
+        };
+        let names = [Some(&model.file), model.title.as_ref()];
+        let name = names.into_iter().flatten().find(|name| !name.is_empty());
+        Self::OfModel {
+            model: name.map_or_else(|| "model".to_owned(), String::clone),
+            reason,
+        }
+    }
+
+    /// Whether it is a model's fault, and not the bundle's.
+    #[must_use]
+    pub fn is_of_model(&self) -> bool {
+        matches!(
+            self,
+            Self::InModel(_) | Self::OfModel { .. } | Self::NoNoise { .. }
+        )
+    }
+
     /// Refuses a residual of rounding.
     pub(crate) fn check_scatter(axis: &'static str, std_arcsec: f64) -> Result<(), Self> {
         // NaN has no scatter either

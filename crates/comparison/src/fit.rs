@@ -142,8 +142,8 @@ impl Started {
         settings: &FitSettings,
     ) -> Result<Self, ComparisonError> {
         let name = AXES[axis];
-        let of_spectrum = |source| ComparisonError::Spectrum { axis: name, source };
-        let of_fit = |source| ComparisonError::Fit { axis: name, source };
+        let of_spectrum = |reason| ComparisonError::Spectrum { axis: name, reason };
+        let of_fit = |reason| ComparisonError::Fit { axis: name, reason };
         let kept = residual.kept(axis);
         let std_arcsec = residual.std_arcsec(axis);
         ComparisonError::check_scatter(name, std_arcsec)?;
@@ -165,6 +165,7 @@ impl Started {
                 ..options.clone()
             };
             let fine = plan.fine(&kept).map_err(of_spectrum)?;
+            check_band(&fine, settings)?;
             fit_psd(&usable(&fine), &options).map_err(of_fit)?
         };
         let raw = plan.raw(&kept).map_err(of_spectrum)?;
@@ -181,6 +182,24 @@ impl Started {
     }
 }
 
+/// A band without a frequency of the spectrum is told as that, with what there is.
+fn check_band(fine: &Psd, settings: &FitSettings) -> Result<(), ComparisonError> {
+    let Some([low_hz, high_hz]) = settings.band_hz else {
+        return Ok(());
+    };
+    let mut there = fine.frequency_hz.iter().copied().filter(|f| *f > 0.0);
+    if there.clone().any(|f| (low_hz..=high_hz).contains(&f)) {
+        return Ok(());
+    }
+    let from_hz = there.next().unwrap_or(f64::NAN);
+    Err(ComparisonError::EmptyBand {
+        low_hz,
+        high_hz,
+        from_hz,
+        nyquist_hz: there.next_back().unwrap_or(from_hz),
+    })
+}
+
 /// Spectra of draws of the fitted processes.
 fn drawn(t_s: &[f64], started: &[Started; 3]) -> Result<[Ensemble; 3], ComparisonError> {
     let plans = [0, 1, 2].map(|i| started[i].plan.clone());
@@ -192,9 +211,9 @@ fn drawn(t_s: &[f64], started: &[Started; 3]) -> Result<[Ensemble; 3], Compariso
         } = started[i].process;
         Fogm::new(sigma_hsf_arcsec, tau_hsf_s)
             .and_then(|fogm| FogmWhite::new(fogm, sigma_tn_arcsec))
-            .map_err(|source| ComparisonError::Fit {
+            .map_err(|reason| ComparisonError::Fit {
                 axis: AXES[i],
-                source,
+                reason,
             })
     };
     let processes = [process(0)?, process(1)?, process(2)?];

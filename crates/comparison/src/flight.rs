@@ -26,7 +26,7 @@ use scenarios::{Declared, effect_parameters};
 use spectra::robust;
 use star_tracker::{Disturbance, HemState, Measured, NoiseStreams, Purpose, Rows, Scratch, stream};
 use telemetry::report::StarSource;
-use telemetry::{Bundle, EffectEntry, Model, ModelKind};
+use telemetry::{Bundle, Model, ModelKind};
 
 use crate::ComparisonError;
 use crate::stars::Stars;
@@ -71,7 +71,7 @@ impl<'a> Flight<'a> {
         let distorted = model.noise.distortion_arcsec.is_some_and(|s| s > 0.0);
         let (camera, effects, stars) = if !hybrid || distorted || !model.effects.is_empty() {
             let camera = camera(model, bundle)?;
-            let effects = built(&model.effects, bundle, &camera, t_s, notes)?;
+            let effects = built(model, bundle, &camera, t_s, notes)?;
             let max_stars = model.tracker.max_stars;
             let stars = Stars::of(bundle, &camera, truth, t_s, max_stars, seed)?;
             (camera, effects, Some(stars))
@@ -294,7 +294,7 @@ pub(crate) fn camera(model: &Model, bundle: &Bundle) -> Result<Camera, Compariso
 }
 
 fn built(
-    entries: &[EffectEntry],
+    model: &Model,
     bundle: &Bundle,
     camera: &Camera,
     t_s: &[f64],
@@ -322,8 +322,9 @@ fn built(
         frames,
     };
     let mut out: Vec<Arc<dyn Effect>> = vec![];
-    for entry in entries {
-        if effects::kind(&entry.id)?.acts_on().images {
+    for (index, entry) in model.effects.iter().enumerate() {
+        let wrong = |error| scenarios::effect_error(model, index, error);
+        if effects::kind(&entry.id).map_err(wrong)?.acts_on().images {
             notes.push(format!(
                 "effect {} acts on raw images, and is left out of the ensemble",
                 entry.id
@@ -331,7 +332,8 @@ fn built(
             continue;
         }
         let parameters = effect_parameters(entry);
-        out.push(effects::build(&entry.id, &parameters, &surroundings)?.into());
+        let built = effects::build(&entry.id, &parameters, &surroundings);
+        out.push(built.map_err(wrong)?.into());
     }
     Ok(out)
 }

@@ -2,6 +2,7 @@
 
 use focal_plane::{CameraError, CatalogueError};
 use telemetry::TelemetryError;
+use telemetry::config::Config;
 
 /// Errors of this crate.
 #[derive(Clone, Debug, thiserror::Error, PartialEq)]
@@ -67,6 +68,14 @@ pub enum ImagerError {
     /// The stars seen make no catalogue.
     #[error(transparent)]
     Catalogue(#[from] CatalogueError),
+    /// What is wrong with a file as a whole.
+    #[error("{file}: {reason}")]
+    InFile {
+        /// The file.
+        file: String,
+        /// What is wrong.
+        reason: String,
+    },
     /// The motion holds no frame, or no star was in the field.
     #[error(
         "no star was seen in {frames} frames (limiting magnitude, field, or span of the motion)"
@@ -78,6 +87,32 @@ pub enum ImagerError {
 }
 
 impl ImagerError {
+    /// The same with the file, and the line where one is to blame; `text` is the world or scenario,
+    /// `file` its name. What has a place already keeps it.
+    #[must_use]
+    pub fn in_file(self, text: &str, file: &str) -> Self {
+        let (name, value) = match &self {
+            Self::File(_) | Self::InFile { .. } => return self,
+            Self::OutOfRange { name, value, .. } => (*name, Some(*value)),
+            Self::NoNode { name, .. } | Self::NeedsNode { name } => (*name, None),
+            Self::NoStar { name, id } => (*name, Some(*id as f64)),
+            Self::Formula { .. } => ("effect.id", None),
+            Self::NoDetector => ("kind", None),
+            Self::Camera(_) => ("optics", None),
+            _ => ("", None),
+        };
+        // "reference.cant_axis (length)"
+        let path = name.split(' ').next().unwrap_or("");
+        let reason = self.to_string();
+        match Config::parse(text, file) {
+            Ok(config) if !path.is_empty() => config.error_at_value(path, value, reason).into(),
+            _ => Self::InFile {
+                file: file.to_owned(),
+                reason,
+            },
+        }
+    }
+
     pub(crate) fn check(
         name: &'static str,
         value: f64,

@@ -63,7 +63,7 @@ impl Course {
     pub fn truth(&self, rate_hz: f64) -> Result<(AttitudeSeries, Vec<f64>), ScenarioError> {
         self.run.check(telemetry::ModelKind::Pbm)?;
         let rate_hz = self.run.rate_hz.unwrap_or(rate_hz);
-        ScenarioError::check_positive("rate_hz", rate_hz)?;
+        ScenarioError::check_positive("run.rate_hz", rate_hz)?;
         truth_and_times(
             &self.motion,
             &self.run,
@@ -93,7 +93,7 @@ impl Course {
         let run = &self.run;
         run.check(telemetry::ModelKind::Pbm)?;
         let rate_hz = run.rate_hz.unwrap_or(rate_hz);
-        ScenarioError::check_positive("rate_hz", rate_hz)?;
+        ScenarioError::check_positive("run.rate_hz", rate_hz)?;
         let rng = stream(run.seed, run.draw, Purpose::Motion);
         let span_s = span_s(&self.motion, run)?;
         let truth = self.motion.long_truth(span_s, &self.folder, &rng)?;

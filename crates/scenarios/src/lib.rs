@@ -8,6 +8,7 @@ mod course;
 mod declared;
 mod error;
 mod housekeeping;
+mod located;
 mod motion;
 mod preset;
 mod reference;
@@ -20,6 +21,7 @@ pub use course::Course;
 pub use declared::{Declared, effect_parameters, hybrid_processes};
 pub use error::ScenarioError;
 pub use housekeeping::{Channel, Housekeeping, OrbitVelocity, SinusoidChannel, Thermostat};
+pub use located::{effect_error, found_effect_error};
 pub use motion::{
     ClosedLoop, Hold, Motion, PhasePlane, Pointing, Recorded, RecordedTable, Rotator, Sinusoid,
     Slew, Slews,

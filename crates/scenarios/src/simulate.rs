@@ -21,12 +21,11 @@ use rand_distr::{Distribution, StandardNormal};
 use star_tracker::{
     Disturbance, Hem, HemState, Measured, NoiseStreams, Pbm, Purpose, Rows, Scratch, Stages, stream,
 };
-use telemetry::{
-    AttitudeTable, Bundle, EffectEntry, Frames, Metadata, Model, QuaternionSigns, TrackerMeta,
-};
+use telemetry::{AttitudeTable, Bundle, Frames, Metadata, Model, QuaternionSigns, TrackerMeta};
 
 use crate::declared::{Declared, effect_parameters};
 use crate::housekeeping::Channels;
+use crate::located::effect_error;
 use crate::reference::Wander;
 use crate::run::{Reported, Run};
 use crate::sky::Seen;
@@ -98,7 +97,7 @@ pub fn simulate_with_truth(scenario: &Scenario, draw: u64) -> Result<Simulated, 
         channels: &channels.series,
         frames: channels.vectors.then_some(INERTIAL),
     };
-    let effects = build_effects(&model.effects, &surroundings)?;
+    let effects = build_effects(model, &surroundings)?;
     let mut disturbances: Vec<Arc<dyn Disturbance>> = bias(model, seed, draw).into_iter().collect();
     for effect in &effects {
         disturbances.push(effect.clone());
@@ -246,14 +245,15 @@ impl Disturbance for ConstantMisalignment {
 }
 
 fn build_effects(
-    entries: &[EffectEntry],
+    model: &Model,
     surroundings: &Surroundings<'_>,
 ) -> Result<Vec<Arc<dyn Effect>>, ScenarioError> {
+    let entries = model.effects.iter().enumerate();
     entries
-        .iter()
-        .map(|entry| {
-            let built = effects::build(&entry.id, &effect_parameters(entry), surroundings)?;
-            Ok(Arc::from(built))
+        .map(|(index, entry)| {
+            effects::build(&entry.id, &effect_parameters(entry), surroundings)
+                .map(Arc::from)
+                .map_err(|error| effect_error(model, index, error))
         })
         .collect()
 }

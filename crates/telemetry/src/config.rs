@@ -8,6 +8,7 @@
 mod culprit;
 mod entry;
 mod node;
+mod seek;
 
 use std::fmt;
 use std::ops::Range;
@@ -91,6 +92,29 @@ impl Config {
             table = inner;
         }
         located(&self.file, &self.text, span, message.as_ref())
+    }
+
+    /// An error at a value given by its path, such as `motion.slew.axis`, that was found wrong after the
+    /// file was read. Of several tables of one name it is the first that has this `value` there: a
+    /// number, or a vector of that length. As [`error_at`](Self::error_at) where there is none.
+    ///
+    /// ```
+    /// let text = "[[slew]]\naxis = [0, 0, 1]\n[[slew]]\naxis = [0, 0, 0]\n";
+    /// let config = telemetry::config::Config::parse(text, "a.toml")?;
+    /// let error = config.error_at_value("slew.axis", Some(0.0), "no direction").to_string();
+    /// assert!(error.starts_with("a.toml, line 4, column 8: no direction"));
+    /// # Ok::<(), telemetry::TelemetryError>(())
+    /// ```
+    pub fn error_at_value(
+        &self,
+        path: &str,
+        value: Option<f64>,
+        message: impl AsRef<str>,
+    ) -> TelemetryError {
+        match seek::seek(&self.root, path, value) {
+            Some(node) => located(&self.file, &self.text, node.span.clone(), message.as_ref()),
+            None => self.error_at(path, message),
+        }
     }
 
     /// Line of a byte, 1-based.

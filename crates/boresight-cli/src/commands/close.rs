@@ -4,9 +4,10 @@ use std::io::Write as _;
 use std::path::PathBuf;
 
 use anyhow::Context as _;
-use boresight::closed_loop::{Closed, Questions, close_asking};
+use boresight::closed_loop::{CloseError, Closed, Questions, close_asking};
 use boresight::comparison::{CompareSettings, Compared, compare};
 use boresight::report::{Run, html, summary};
+use boresight::scenarios::found_effect_error;
 use boresight::telemetry::report::{ComparedModel, REPORT_FORMAT};
 use boresight::telemetry::{Bundle, Model, Output};
 
@@ -45,7 +46,9 @@ pub(crate) fn run(options: &Close, console: &Console) -> anyhow::Result<()> {
             (example::model()?, example::bundle()?, title.to_owned())
         }
     };
-    let mut closed = close_asking(&model, &bundle, &questions, &|what| console.progress(what))?;
+    let progress = |what: &str| console.progress(what);
+    let mut closed = close_asking(&model, &bundle, &questions, &progress)
+        .map_err(|error| located(&model, error))?;
     let compared = (options.out.is_some() || console.json())
         .then(|| flown(&model, &bundle, &mut closed, console));
     let text = summary(&closed);
@@ -83,6 +86,15 @@ pub(crate) fn run(options: &Close, console: &Console) -> anyhow::Result<()> {
             .machine(&serde_json::to_string_pretty(&closed.report).context("the report as JSON")?);
     }
     Ok(())
+}
+
+/// A mistake in a declared effect is shown in its line of the model.
+fn located(model: &Model, error: CloseError) -> anyhow::Error {
+    let place = match &error {
+        CloseError::Effect(effect) => found_effect_error(model, effect),
+        _ => None,
+    };
+    place.map_or_else(|| error.into(), Into::into)
 }
 
 #[expect(

@@ -48,7 +48,11 @@ pub(crate) fn run(options: &Compare, console: &Console) -> anyhow::Result<()> {
     let compared = compare(&model, &others, &bundle, &settings, &|what| {
         console.progress(what);
     })
-    .with_context(|| options.bundle.display().to_string())?;
+    .map_err(|error| match error.is_of_model() {
+        // it has the model's name, and the bundle is not to blame
+        true => error.into(),
+        false => anyhow::Error::from(error).context(options.bundle.display().to_string()),
+    })?;
     let json = serde_json::to_string_pretty(&compared.report).context("the comparison as JSON")?;
     let text = compare_summary(&compared.report);
     if let Some(dir) = &options.out {

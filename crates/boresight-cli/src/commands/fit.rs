@@ -3,7 +3,7 @@
 use std::io::Write as _;
 
 use anyhow::Context as _;
-use boresight::comparison::{FitSettings, fit};
+use boresight::comparison::{ComparisonError, FitSettings, fit};
 use boresight::report::fit_summary;
 use boresight::telemetry::{Bundle, write_file};
 
@@ -18,18 +18,24 @@ pub(crate) fn run(options: &Fit, console: &Console) -> anyhow::Result<()> {
     console.progress("reading");
     let bundle = Bundle::read(&options.bundle)?;
     console.progress("fitting");
+    let name = options.bundle.display().to_string();
     let settings = FitSettings {
         band_hz: options.band_hz,
         lines_hz: options.exclude_hz.clone(),
     };
-    let fitted = fit(&bundle, &settings).with_context(|| options.bundle.display().to_string())?;
+    let fitted = fit(&bundle, &settings).map_err(|error| {
+        let place = match error {
+            ComparisonError::EmptyBand { .. } => format!("{name}, --band-hz"),
+            _ => name.clone(),
+        };
+        anyhow::Error::from(error).context(place)
+    })?;
     if let Some(out) = &options.out {
         let text = fitted.model.to_toml();
         write_file(out, |to| to.write_all(text.as_bytes()))?;
     }
     console.say(&format!(
-        "Input     {}\n{}",
-        options.bundle.display(),
+        "Input     {name}\n{}",
         fit_summary(&fitted.report)
     ));
     if console.json() {

@@ -2,7 +2,6 @@
 
 use std::path::Path;
 
-use anyhow::Context as _;
 use boresight::imager::{self, Instrument, Run, WORLD_FORMAT};
 use boresight::scenarios::{Course, Scenario, hipparcos};
 use boresight::telemetry::BundleWriter;
@@ -10,7 +9,7 @@ use boresight::telemetry::config::Config;
 
 use crate::arguments::Simulate;
 use crate::commands::close::interrupted;
-use crate::commands::simulate::refuse_inputs;
+use crate::commands::simulate::{Input, refuse_inputs};
 use crate::console::Console;
 
 /// Frames per second where neither run nor model says.
@@ -19,43 +18,40 @@ const RATE_HZ: f64 = 2.0;
 const YEAR: f64 = 2000.0;
 
 /// Whether a file is a world.
-pub(crate) fn is_world(path: &Path) -> anyhow::Result<bool> {
-    let text = read(path)?;
+pub(crate) fn is_world(input: &Input) -> bool {
     // a file that cannot be parsed is refused by whoever reads it
-    let Ok(config) = Config::parse(&text, &path.display().to_string()) else {
-        return Ok(false);
+    let Ok(config) = Config::parse(&input.text, &input.file) else {
+        return false;
     };
     let format = config.root().require("format");
-    Ok(format.is_ok_and(|format| format.text().is_ok_and(|text| text == WORLD_FORMAT)))
-}
-
-fn read(path: &Path) -> anyhow::Result<String> {
-    std::fs::read_to_string(path).with_context(|| format!("{}: cannot read", path.display()))
+    format.is_ok_and(|format| format.text().is_ok_and(|text| text == WORLD_FORMAT))
 }
 
 /// A world file.
 pub(crate) fn world(
-    path: &Path,
+    input: &Input,
     out: &Path,
     options: &Simulate,
     console: &Console,
 ) -> anyhow::Result<()> {
     console.progress("reading the world");
-    let (text, file) = (read(path)?, path.display().to_string());
-    let folder = path.parent().unwrap_or(Path::new(""));
-    let instrument = Instrument::parse(&text, &file, &Course::TABLES)?;
-    let course = Course::parse(&text, &file, folder)?;
-    render(&instrument, &course, RATE_HZ, out, options, console)
+    let (text, file) = (&input.text, &input.file);
+    let instrument = Instrument::parse(text, file, &Course::TABLES)
+        .map_err(|error| error.in_file(text, file))?;
+    let course = Course::parse(text, file, &input.folder)?;
+    render(input, &instrument, &course, RATE_HZ, out, options, console)
 }
 
 /// A scenario, whose tracker and reference are taken as they are.
 pub(crate) fn scenario(
+    input: &Input,
     scenario: &Scenario,
     out: &Path,
     options: &Simulate,
     console: &Console,
 ) -> anyhow::Result<()> {
-    let mut instrument = Instrument::of_model(&scenario.model)?;
+    let mut instrument = Instrument::of_model(&scenario.model)
+        .map_err(|error| error.in_file(&input.text, &input.file))?;
     instrument.reference = scenario
         .reference
         .as_ref()
@@ -71,6 +67,7 @@ pub(crate) fn scenario(
         });
     let rate_hz = scenario.model.tracker.update_rate_hz.unwrap_or(RATE_HZ);
     render(
+        input,
         &instrument,
         &Course::from(scenario),
         rate_hz,
@@ -81,6 +78,7 @@ pub(crate) fn scenario(
 }
 
 fn render(
+    input: &Input,
     instrument: &Instrument,
     course: &Course,
     rate_hz: f64,
@@ -90,7 +88,9 @@ fn render(
 ) -> anyhow::Result<()> {
     refuse_inputs(options, &course.motion, &course.folder, out)?;
     let settings = &course.run;
-    let (truth, first_s, frames) = course.long_truth(rate_hz)?;
+    let (truth, first_s, frames) = course
+        .long_truth(rate_hz)
+        .map_err(|error| error.in_file(&input.text, &input.file))?;
     let year = settings.epoch.map_or(YEAR, |epoch| epoch.julian_year(0.0));
     let run = Run {
         title: settings.title.clone(),
@@ -117,7 +117,8 @@ fn render(
         &run,
         writer,
         &progress,
-    )?;
+    )
+    .map_err(|error| error.in_file(&input.text, &input.file))?;
     let out = out.display();
     console.say(&format!(
         "{} frames, {} star rows rendered to {out}, {} windows without a star",

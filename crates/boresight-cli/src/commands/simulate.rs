@@ -28,24 +28,22 @@ pub(crate) fn run(options: &Simulate, console: &Console) -> anyhow::Result<()> {
     if !options.force {
         targets::refuse_measured(out)?;
     }
-    if let Some(path) = &options.scenario
-        && options.fidelity != Some(Fidelity::Model)
-        && render::is_world(path)?
-    {
-        return render::world(path, out, options, console);
+    let input = Input::of(options)?;
+    if options.fidelity != Some(Fidelity::Model) && render::is_world(&input) {
+        return render::world(&input, out, options, console);
     }
     console.progress("reading the scenario");
-    let scenario = match (&options.preset, &options.scenario) {
-        (Some(name), _) => preset(name)?.scenario()?,
-        (None, Some(path)) => Scenario::read(path)?,
-        (None, None) => anyhow::bail!("a scenario file or --preset is needed"),
+    let scenario = Scenario {
+        folder: input.folder.clone(),
+        ..Scenario::parse(&input.text, &input.file)?
     };
     if options.fidelity == Some(Fidelity::Pixel) {
-        return render::scenario(&scenario, out, options, console);
+        return render::scenario(&input, &scenario, out, options, console);
     }
     console.progress("simulating");
     refuse_inputs(options, &scenario.motion, &scenario.folder, out)?;
-    let simulated = simulate_with_truth(&scenario, scenario.run.draw)?;
+    let simulated = simulate_with_truth(&scenario, scenario.run.draw)
+        .map_err(|error| error.in_file(&input.text, &input.file))?;
     let bundle = &simulated.bundle;
     console.progress("writing the bundle");
     bundle.write(out, options.tables.format())?;
@@ -65,6 +63,37 @@ pub(crate) fn run(options: &Simulate, console: &Console) -> anyhow::Result<()> {
             .to_string(),
     );
     Ok(())
+}
+
+/// The file that says what is simulated.
+pub(crate) struct Input {
+    pub(crate) text: String,
+    /// What messages call it.
+    pub(crate) file: String,
+    /// Folder at which relative paths start.
+    pub(crate) folder: PathBuf,
+}
+
+impl Input {
+    fn of(options: &Simulate) -> anyhow::Result<Self> {
+        match (&options.preset, &options.scenario) {
+            (Some(name), _) => {
+                let preset = preset(name)?;
+                Ok(Self {
+                    text: preset.text.to_owned(),
+                    file: format!("preset {}", preset.name),
+                    folder: PathBuf::new(),
+                })
+            }
+            (None, Some(path)) => Ok(Self {
+                text: std::fs::read_to_string(path)
+                    .with_context(|| format!("{}: cannot read", path.display()))?,
+                file: path.display().to_string(),
+                folder: path.parent().unwrap_or(Path::new("")).to_owned(),
+            }),
+            (None, None) => anyhow::bail!("a scenario file or --preset is needed"),
+        }
+    }
 }
 
 /// Neither the scenario nor the recording that it names is written over.
