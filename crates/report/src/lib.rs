@@ -11,6 +11,7 @@ mod compare_text;
 mod fit_text;
 mod html;
 mod number;
+mod order;
 mod scene_figures;
 mod set_aside;
 mod text;

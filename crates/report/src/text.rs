@@ -7,6 +7,7 @@ use closed_loop::Closed;
 use telemetry::report::{Dependence, Errors, RefusedSize, Report, Selector, Verdict, listed};
 
 use crate::number::number;
+use crate::order::by_number;
 use crate::set_aside;
 
 /// The findings of a run in words and numbers, some 20 lines of at most 100 columns.
@@ -70,7 +71,7 @@ fn verdict(out: &mut String, closed: &Closed) {
 fn figures(out: &mut String, report: &Report) {
     line!(
         out,
-        "{:<28}{:>12}{:>12}{:>10}",
+        "{:<28} {:>11} {:>11} {:>9}",
         "",
         "before",
         "after",
@@ -96,7 +97,7 @@ fn figures(out: &mut String, report: &Report) {
         for (k, axis) in ["X", "Y", "Z"].into_iter().enumerate() {
             line!(
                 out,
-                "{:<28}{:>12.3}{:>12.3}",
+                "{:<28} {:>11.3} {:>11.3}",
                 format!("log-PSD cost {axis}"),
                 b[k],
                 a[k]
@@ -111,7 +112,7 @@ fn figures(out: &mut String, report: &Report) {
         ("log-likelihood per frame", |e| e.loglik_per_frame),
     ] {
         if let (Some(b), Some(a)) = (get(before), get(after)) {
-            line!(out, "{name:<28}{b:>12.4}{a:>12.4}");
+            line!(out, "{name:<28} {b:>11.4} {a:>11.4}");
         }
     }
     line!(out);
@@ -121,7 +122,7 @@ fn figure(out: &mut String, name: &str, before: f64, after: f64) {
     let digits = if before < 1.0 { 4 } else { 3 };
     line!(
         out,
-        "{name:<28}{before:>12.digits$}{after:>12.digits$}{:>10.3}",
+        "{name:<28} {before:>11.digits$} {after:>11.digits$} {:>9.3}",
         after / before
     );
 }
@@ -134,7 +135,7 @@ fn effects(out: &mut String, report: &Report) {
             effect.id,
             selectors(&effect.selectors)
         );
-        for (name, estimate) in &effect.parameters {
+        for (name, estimate) in by_number(&effect.parameters) {
             let unit = if estimate.unit.is_empty() {
                 String::new()
             } else {
@@ -250,9 +251,9 @@ fn rivals(out: &mut String, closed: &Closed) {
     for rival in &closed.rivals {
         let mut row = format!("  {:<50}", rival.what);
         for rms in &rival.rms_arcsec {
-            let _ = write!(row, "{rms:>9.4}");
+            let _ = write!(row, " {rms:>8.4}");
         }
-        line!(out, "{row}{:>12.1}", rival.delta_loglik);
+        line!(out, "{row} {:>11.1}", rival.delta_loglik);
     }
     line!(out);
 }
@@ -294,7 +295,7 @@ fn considered(out: &mut String, report: &Report) {
                 _ => String::new(),
             };
             let gain = c.delta_loglik.map_or("-".to_owned(), |g| format!("{g:.1}"));
-            line!(out, "  {:<26}{gain:>9}   {size}", c.id);
+            line!(out, "  {:<26} {gain:>8}   {size}", c.id);
             if let Some(why) = &c.against {
                 line!(out, "    not named: {why}");
             }
@@ -321,7 +322,7 @@ fn leftover(out: &mut String, report: &Report) {
         return;
     }
     let noise = &left.noise_depends_on;
-    if left.depends_on != *noise {
+    if !left.depends_on.is_empty() && left.depends_on != *noise {
         line!(
             out,
             "What is left follows (share of its variance, out of fold):"
@@ -332,16 +333,83 @@ fn leftover(out: &mut String, report: &Report) {
         line!(out, "The noise level follows (rms change of its variance):");
         follows(out, noise);
     }
+    let list = |values: &[f64]| -> String {
+        let texts: Vec<String> = values.iter().copied().map(number).collect();
+        texts.join(", ")
+    };
+    if !left.lines_hz.is_empty() {
+        let lines = format!("Lines in its spectrum, Hz: {}", list(&left.lines_hz));
+        wrapped(out, "", &lines);
+    }
+    if !left.jumps_s.is_empty() {
+        wrapped(out, "", &format!("Jumps, at s: {}", list(&left.jumps_s)));
+    }
 }
 
 fn follows(out: &mut String, list: &[Dependence]) {
     for d in list.iter().filter(|d| d.variance_explained > 0.0).take(5) {
         line!(
             out,
-            "  {:<34}{:>7.1} %   p = {:.1e}",
+            "  {:<34} {:>6.1} %   p = {:.1e}",
             d.variable,
             100.0 * d.variance_explained,
             d.p_value
+        );
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use telemetry::report::{REPORT_FORMAT, Rows, Unattributed};
+
+    fn report() -> Report {
+        Report {
+            format: REPORT_FORMAT.to_owned(),
+            verdict: Verdict::Unexplained,
+            folds: 5,
+            rows: Rows {
+                used: 100,
+                outliers: 0,
+                outside_reference: 0,
+            },
+            before: Errors::default(),
+            after: Errors::default(),
+            effects: vec![],
+            considered: vec![],
+            hypotheses: vec![],
+            unattributed: Unattributed::default(),
+        }
+    }
+
+    #[test]
+    fn large_numbers_stand_apart() {
+        let mut report = report();
+        report.before.star_rms_arcsec = Some([123_456_789.5; 2]);
+        report.after = Errors {
+            loglik_per_frame: Some(-123_456_789.5),
+            ..report.before.clone()
+        };
+        report.before.loglik_per_frame = Some(-987_654_321.5);
+        let mut out = String::new();
+        figures(&mut out, &report);
+        let words: Vec<&str> = out.split_whitespace().collect();
+        for word in ["123456789.500", "-987654321.5000", "-123456789.5000"] {
+            assert!(words.contains(&word), "no {word} in:\n{out}");
+        }
+    }
+
+    #[test]
+    fn lines_and_jumps_that_are_left_are_told() {
+        let mut report = report();
+        report.unattributed.present = true;
+        report.unattributed.lines_hz = vec![0.0125, 0.25];
+        report.unattributed.jumps_s = vec![812.5];
+        let mut out = String::new();
+        leftover(&mut out, &report);
+        assert_eq!(
+            out,
+            "Lines in its spectrum, Hz: 0.0125, 0.25\nJumps, at s: 812.5\n"
         );
     }
 }

@@ -6,6 +6,7 @@ use telemetry::report::{ConsideredEffect, Dependence, Errors, Estimate, FoundEff
 use super::Page;
 use super::write::{Cell, datum, escaped, step};
 use crate::number::{change, hertz, percent, probability, short, with_sigma};
+use crate::order::by_number;
 use crate::text::{of_size, selectors};
 
 /// Chance below which an effect counts as seen.
@@ -18,9 +19,8 @@ pub(super) fn in_a_line_each(page: &mut Page, report: &Report) {
     }
     page.raw("<ul>");
     for effect in &report.effects {
-        let sizes: Vec<String> = effect
-            .parameters
-            .iter()
+        let sizes: Vec<String> = by_number(&effect.parameters)
+            .into_iter()
             .map(|(name, estimate)| format!("{name} = {}", size(estimate)))
             .collect();
         page.raw(&format!(
@@ -181,9 +181,8 @@ pub(super) fn effects(page: &mut Page, report: &Report) {
 }
 
 fn row_of(k: usize, effect: &FoundEffect) -> Vec<Cell> {
-    let parameters: Vec<String> = effect
-        .parameters
-        .iter()
+    let parameters: Vec<String> = by_number(&effect.parameters)
+        .into_iter()
         .map(|(name, e)| {
             format!(
                 "<span class=\"v\">{} = {}</span>",
