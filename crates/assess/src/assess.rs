@@ -43,6 +43,40 @@ pub struct Options {
     pub window_s: Option<f64>,
 }
 
+impl Options {
+    /// What is given must act: a number that the method passes over would seem to be in the result.
+    fn check_used(&self, method: AssessMethod) -> Result<(), AssessError> {
+        let rotator = AssessMethod::RigidRotator;
+        for (given, there, needs) in [
+            ("inertia", self.inertia.is_some(), rotator),
+            ("alignment", self.alignment.is_some(), rotator),
+            (
+                "gyro_walk",
+                self.gyro_walk_arcsec_rt_s.is_some(),
+                AssessMethod::Gyro,
+            ),
+        ] {
+            if there && needs != method {
+                let [needs, method] = [needs, method].map(name);
+                return Err(AssessError::NotUsed {
+                    given,
+                    needs,
+                    method,
+                });
+            }
+        }
+        Ok(())
+    }
+}
+
+fn name(method: AssessMethod) -> &'static str {
+    match method {
+        AssessMethod::RigidRotator => "rigid_rotator",
+        AssessMethod::Gyro => "gyro",
+        AssessMethod::Reference => "reference",
+    }
+}
+
 /// A requirement against what was found.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct RequirementCheck {
@@ -147,6 +181,7 @@ pub fn assess(
         } => AssessMethod::Reference,
         _ => AssessMethod::RigidRotator,
     });
+    options.check_used(method)?;
     tell("cleaning");
     let mut observed = Observed::new(&attitude.t_s, &attitude.q)?;
     let mut out = match method {

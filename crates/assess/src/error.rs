@@ -18,6 +18,16 @@ pub enum AssessError {
         /// The table.
         table: &'static str,
     },
+    /// Something is given that the method has no use for.
+    #[error("{given} is used by method {needs} alone, and the method here is {method}")]
+    NotUsed {
+        /// What is given: `inertia`, `alignment` or `gyro_walk`.
+        given: &'static str,
+        /// The method that uses it.
+        needs: &'static str,
+        /// The method that was asked for, or that the bundle's tables give.
+        method: &'static str,
+    },
     /// Too few frames.
     #[error("{got} frames that can be used, at least {need} are needed{why}")]
     TooFew {

@@ -165,3 +165,16 @@ fn nothing_left_to_fit_is_told_once() -> Done {
     assert_eq!(told.matches("usable").count(), 1, "{told}");
     Ok(())
 }
+
+#[test]
+fn an_option_that_does_nothing_is_refused() -> Done {
+    let mut command = boresight();
+    command.arg("assess").arg(example());
+    let told = said(command.args(["--inertia", "1,1,2"]))?;
+    has(&told, &["--inertia", "--method rigid_rotator", "reference"]);
+    let mut command = boresight();
+    command.arg("assess").arg(example());
+    let told = said(command.args(["--method", "reference", "--gyro-walk", "0.1"]))?;
+    has(&told, &["--gyro-walk", "--method gyro"]);
+    Ok(())
+}

@@ -3,7 +3,7 @@
 use std::io::Write as _;
 
 use anyhow::Context as _;
-use boresight::assess::{Assessment, Options, assess};
+use boresight::assess::{AssessError, Assessment, Options, assess};
 use boresight::report::{assess_figures, assess_summary};
 use boresight::telemetry::report::AssessMethod;
 use boresight::telemetry::{Bundle, Output};
@@ -42,8 +42,8 @@ pub(crate) fn run(options: &Assess, console: &Console) -> anyhow::Result<()> {
         window_s: options.window,
     };
     let name = options.bundle.display().to_string();
-    let found =
-        assess(&bundle, &settings, &|what| console.progress(what)).with_context(|| name.clone())?;
+    let found = assess(&bundle, &settings, &|what| console.progress(what))
+        .map_err(|error| by_option(error).context(name.clone()))?;
     let text = assess_summary(&found);
     let json = serde_json::to_string_pretty(&found.document()).context("the assessment as JSON")?;
     if let Some(dir) = &options.out {
@@ -55,6 +55,23 @@ pub(crate) fn run(options: &Assess, console: &Console) -> anyhow::Result<()> {
     console.say(&format!("Input     {name}\n{text}"));
     console.machine(&json);
     Ok(())
+}
+
+/// An option that does nothing is told as one, with what would make it act.
+fn by_option(error: AssessError) -> anyhow::Error {
+    match error {
+        AssessError::NotUsed {
+            given,
+            needs,
+            method,
+        } => {
+            let option = given.replace('_', "-");
+            anyhow::anyhow!(
+                "--{option} is used by --method {needs} alone, and the method here is {method}; leave the option out, or give --method {needs}"
+            )
+        }
+        other => other.into(),
+    }
 }
 
 fn write(found: &Assessment, text: &str, json: &str, output: &Output) -> anyhow::Result<()> {
