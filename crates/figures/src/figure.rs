@@ -109,13 +109,19 @@ impl Figure {
             );
         }
         legend(&mut out, &legend_rows, [EDGE, below_title], None);
+        // panels stay comparable: all of them show as much more as the one that needs it most
+        let factors = self.panels.iter().map(|panel| {
+            let frame = placed(panel, [EDGE, head], self.panel_px, !shared);
+            widening(panel, &frame)
+        });
+        let factor = factors.fold(1.0, f64::max);
         for (k, panel) in self.panels.iter().enumerate() {
             let (column, row) = (k % self.columns, k / self.columns);
             let corner = [
                 EDGE + column as f64 * self.panel_px[0],
                 head + row as f64 * self.panel_px[1],
             ];
-            draw(&mut out, panel, corner, self.panel_px, !shared);
+            draw(&mut out, panel, corner, self.panel_px, !shared, factor);
         }
         for (k, line) in note.iter().enumerate() {
             let y = height - EDGE - (note.len() - 1 - k) as f64 * NOTE - 2.0;
@@ -151,18 +157,22 @@ impl Figure {
     }
 }
 
-fn draw(out: &mut String, panel: &Panel, corner: [f64; 2], size: [f64; 2], own_legend: bool) {
-    let bar = panel.marks.iter().find_map(|mark| match &mark.shape {
-        Shape::Cells { scale, label, .. } => Some((*scale, label.as_str())),
-        _ => None,
-    });
-    let legend_rows = if own_legend {
+/// Marks of the legend of a panel that has one of its own.
+fn legend_of(panel: &Panel, size: [f64; 2], own_legend: bool) -> Vec<Vec<&Mark>> {
+    if own_legend {
         rows_of(&panel.marks, size[0] - LEFT - RIGHT)
     } else {
         vec![]
-    };
-    let room_right = RIGHT + if bar.is_some() { BAR } else { 0.0 };
-    let above = ABOVE + legend_rows.len() as f64 * LEGEND;
+    }
+}
+
+/// Where the frame of a panel is, with its axes.
+fn placed(panel: &Panel, corner: [f64; 2], size: [f64; 2], own_legend: bool) -> Frame {
+    let cells = |mark: &Mark| matches!(mark.shape, Shape::Cells { .. });
+    let bar = panel.marks.iter().any(cells);
+    let room_right = RIGHT + if bar { BAR } else { 0.0 };
+    let legend_rows = legend_of(panel, size, own_legend).len();
+    let above = ABOVE + legend_rows as f64 * LEGEND;
     let mut at = [corner[0] + LEFT, corner[1] + above];
     let mut px = [size[0] - LEFT - room_right, size[1] - above - BELOW];
     let mut x = Laid::new(&panel.x, panel.data(0), [0.0, px[0]]);
@@ -173,6 +183,47 @@ fn draw(out: &mut String, panel: &Panel, corner: [f64; 2], size: [f64; 2], own_l
         at[0] += 0.5 * (px[0] - wanted[0]);
         px = wanted;
     }
+    x = Laid::new(&panel.x, panel.data(0), [at[0], at[0] + px[0]]).with_ends(x.ends());
+    y = Laid::new(&panel.y, panel.data(1), [at[1] + px[1], at[1]]).with_ends(y.ends());
+    Frame { at, px, x, y }
+}
+
+/// How much wider the axes of a panel have to be for whole arrows.
+fn widening(panel: &Panel, frame: &Frame) -> f64 {
+    let arrows = panel.marks.iter();
+    let factors = arrows.filter_map(|mark| Some(Arrows::of(mark, frame)?.widening(mark, frame)));
+    factors.fold(1.0, f64::max)
+}
+
+/// Makes the axes wider, both alike; gives the corners of what was shown before.
+fn widen(frame: &mut Frame, factor: f64) -> [[f64; 2]; 2] {
+    let [fx, fy] = frame.at;
+    let [hx, hy] = frame.px.map(|px| 0.5 * px);
+    for laid in [&mut frame.x, &mut frame.y] {
+        let [low, high] = laid.ends();
+        let (middle, half) = (0.5 * (low + high), 0.5 * (high - low) * factor);
+        *laid = laid.clone().with_ends([middle - half, middle + half]);
+    }
+    let (cx, cy) = (fx + hx, fy + hy);
+    let (rx, ry) = (hx / factor, hy / factor);
+    [[cx - rx, cy - ry], [cx + rx, cy + ry]]
+}
+
+/// Paints a panel; the axes of arrows are made wider by `factor`.
+fn draw(
+    out: &mut String,
+    panel: &Panel,
+    corner: [f64; 2],
+    size: [f64; 2],
+    own_legend: bool,
+    factor: f64,
+) {
+    let bar = panel.marks.iter().find_map(|mark| match &mark.shape {
+        Shape::Cells { scale, label, .. } => Some((*scale, label.as_str())),
+        _ => None,
+    });
+    let legend_rows = legend_of(panel, size, own_legend);
+    let mut frame = placed(panel, corner, size, own_legend);
     let _ = write!(
         out,
         r#"<text x="{:.1}" y="{:.1}" font-size="12" font-weight="bold">{}</text>"#,
@@ -180,10 +231,8 @@ fn draw(out: &mut String, panel: &Panel, corner: [f64; 2], size: [f64; 2], own_l
         corner[1] + 17.0,
         escaped(&panel.title)
     );
-    x = Laid::new(&panel.x, panel.data(0), [at[0], at[0] + px[0]]).with_ends(x.ends());
-    y = Laid::new(&panel.y, panel.data(1), [at[1] + px[1], at[1]]).with_ends(y.ends());
-    let frame = Frame { at, px, x, y };
     let arrows = panel.marks.iter().find_map(|mark| Arrows::of(mark, &frame));
+    let inner = (arrows.is_some() && factor > 1.0).then(|| widen(&mut frame, factor));
     legend(
         out,
         &legend_rows,
@@ -197,6 +246,12 @@ fn draw(out: &mut String, panel: &Panel, corner: [f64; 2], size: [f64; 2], own_l
         out,
         r#"<svg x="{fx:.1}" y="{fy:.1}" width="{fw:.1}" height="{fh:.1}" viewBox="{fx:.1} {fy:.1} {fw:.1} {fh:.1}" overflow="hidden">"#
     );
+    if let Some([[x0, y0], [x1, y1]]) = inner.filter(|_| panel.edged) {
+        let _ = write!(
+            out,
+            r##"<path d="M{x0:.1} {y0:.1}H{x1:.1}V{y1:.1}H{x0:.1}Z" fill="none" stroke="#60666e" stroke-dasharray="2 3"/>"##
+        );
+    }
     for mark in &panel.marks {
         paint::mark(out, mark, &frame);
     }
@@ -448,6 +503,53 @@ mod tests {
         assert_eq!(count(vec![panel("mean"), panel("mean")]), 1);
         assert_eq!(count(vec![panel("mean"), panel("other")]), 1);
         assert_eq!(count(vec![panel("mean"), panel("other"), panel("mean")]), 2);
+    }
+
+    /// Arrows that point outwards at the edge of the detector, one of them far longer than the others.
+    #[test]
+    fn whole_arrows_are_inside_the_frame() {
+        let side: Vec<f64> = (0..12).map(|k| 2.0 * f64::from(k) - 11.0).collect();
+        let at = |n: usize| -> [Vec<f64>; 2] {
+            let of = |k: usize| side[k * 11 / n];
+            let places = (0..=n).flat_map(|i| (0..=n).map(move |j| [of(i), of(j)]));
+            let places: Vec<[f64; 2]> = places.collect();
+            [0, 1].map(|axis| places.iter().map(|p| p[axis]).collect())
+        };
+        for (n, size) in [
+            (11, [540.0, 560.0]),
+            (2, [270.0, 300.0]),
+            (1, [270.0, 300.0]),
+        ] {
+            let [x, y] = at(n);
+            let mut d = [x.clone(), y.clone()];
+            d.iter_mut().for_each(|d| d[0] *= 9.0);
+            let mark = Mark::arrows([&x, &y], [&d[0], &d[1]], "arcsec", Colour::INK);
+            let panel = Panel::focal_plane("p", [12.0; 2]).with(mark);
+            let svg = Figure::new("f", vec![panel]).sized(size).svg();
+            let (head, inside) = svg.split_once(r#"overflow="hidden">"#).unwrap();
+            let frame = head.rsplit_once("viewBox=\"").unwrap().1;
+            let [fx, fy, fw, fh] = numbers(frame)[..] else {
+                unreachable!("four numbers make a viewBox")
+            };
+            let arrows = inside
+                .split("<path")
+                .find(|p| p.contains(r#"stroke-width="1.1""#));
+            let d = arrows.unwrap().split('"').nth(1).unwrap();
+            let points = numbers(d);
+            assert!(points.len() >= 4 * (n + 1) * (n + 1), "all are drawn");
+            for p in points.chunks(2) {
+                let inside = (fx..=fx + fw).contains(&p[0]) && (fy..=fy + fh).contains(&p[1]);
+                assert!(inside, "{n}: {p:?} in {fx} {fy} {fw} {fh}");
+            }
+            assert!(inside.contains("stroke-dasharray"), "the edge is drawn");
+        }
+    }
+
+    /// The numbers of a text.
+    fn numbers(text: &str) -> Vec<f64> {
+        text.split(|c: char| !(c.is_ascii_digit() || c == '.' || c == '-'))
+            .filter_map(|word| word.parse().ok())
+            .collect()
     }
 
     /// Arrows a tenth as long have the key of the longer ones when drawn to their scale, and a key of

@@ -29,6 +29,13 @@ impl Frame {
     }
 }
 
+/// The longest arrow, in lengths of a long one.
+const LONGEST: f64 = 2.0;
+/// Room beyond the tip of an arrow: half the width of its head.
+const HEAD_PX: f64 = 3.0;
+/// Axes are made wider by this at most.
+const WIDEST: f64 = 3.0;
+
 /// How long arrows are.
 #[derive(Clone, Debug)]
 pub(crate) struct Arrows {
@@ -54,9 +61,14 @@ impl Arrows {
         let mut lengths: Vec<f64> = dx.iter().zip(dy).map(|(a, b)| a.hypot(*b)).collect();
         lengths.retain(|l| l.is_finite() && *l > 0.0);
         lengths.sort_by(f64::total_cmp);
-        let long = long.or_else(|| lengths.get(lengths.len() * 9 / 10).copied())?;
+        let own = lengths.get(lengths.len() * 9 / 10).copied();
+        let longest = lengths.last().copied().unwrap_or(0.0);
+        // one arrow far longer than the others must not fill the frame
+        let long = long.or_else(|| own.map(|own| own.max(longest / LONGEST)))?;
         let spacing = (frame.px[0] * frame.px[1] / x.len() as f64).sqrt();
-        let px_per_unit = spacing.clamp(14.0, 34.0) / long;
+        // short enough for the longest to be inside a small frame
+        let most = (frame.px[0].min(frame.px[1]) / 8.0).clamp(14.0, 34.0);
+        let px_per_unit = spacing.clamp(14.0, most) / long;
         // the key is the longest round number that fits into its place in the legend
         let key = nice_below(26.0 / px_per_unit);
         Some(Self {
@@ -64,6 +76,30 @@ impl Arrows {
             key,
             unit: unit.clone(),
         })
+    }
+
+    /// How much wider the axes of `frame` have to be for whole arrows to be inside, heads and all.
+    pub(crate) fn widening(&self, mark: &Mark, frame: &Frame) -> f64 {
+        let Shape::Arrows { x, y, dx, dy, .. } = &mark.shape else {
+            return 1.0;
+        };
+        let mut factor: f64 = 1.0;
+        for k in 0..x.len() {
+            let from = frame.place(x[k], y[k]);
+            let step = [dx[k] * self.px_per_unit, -dy[k] * self.px_per_unit];
+            for axis in 0..2 {
+                let half = 0.5 * frame.px[axis];
+                let off = from[axis] - (frame.at[axis] + half);
+                // what begins outside is not the frame's to hold
+                if off.abs() > half || !step[axis].is_finite() {
+                    continue;
+                }
+                // centre + off / factor + step has to be inside; a step alone may be too long for that
+                let room = (half - HEAD_PX - step[axis] * off.signum()).max(half / WIDEST);
+                factor = factor.max(off.abs() / room);
+            }
+        }
+        factor.min(WIDEST)
     }
 
     pub(crate) fn key_text(&self) -> String {

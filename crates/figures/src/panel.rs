@@ -13,6 +13,8 @@ pub struct Panel {
     pub(crate) marks: Vec<Mark>,
     /// One unit is as long on both axes.
     pub(crate) equal: bool,
+    /// The ends of the axes are an edge, which is drawn where more than that is shown.
+    pub(crate) edged: bool,
 }
 
 impl Panel {
@@ -25,6 +27,7 @@ impl Panel {
             y,
             marks: vec![],
             equal: false,
+            edged: false,
         }
     }
 
@@ -46,6 +49,7 @@ impl Panel {
     pub fn focal_plane(title: &str, half: [f64; 2]) -> Self {
         Self {
             equal: true,
+            edged: true,
             ..Self::new(
                 title,
                 Axis::linear("x, px").over(-half[0], half[0]),

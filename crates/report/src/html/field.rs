@@ -114,16 +114,24 @@ fn size(bins: &FieldBins) -> f64 {
     rms(bins.dx.iter().zip(&bins.dy).map(|(x, y)| x.hypot(*y)))
 }
 
-/// The length that nine of ten arrows stay below.
-fn long<'a>(fields: impl Iterator<Item = &'a FieldBins>) -> f64 {
-    let mut lengths: Vec<f64> = fields
-        .flat_map(|f| f.dx.iter().zip(&f.dy).map(|(x, y)| x.hypot(*y)))
-        .collect();
-    lengths.sort_by(f64::total_cmp);
-    lengths
-        .get(lengths.len() * 9 / 10)
-        .copied()
-        .unwrap_or(f64::NAN)
+/// The longest arrow, in lengths of a long one: beyond it whole arrows would need too wide a frame.
+const LONGEST: f64 = 2.0;
+
+/// The length that nine of ten arrows before stay below; more where one, also after, is far longer.
+fn long<'a>(fields: impl Iterator<Item = &'a Field>) -> f64 {
+    let length = |f: &FieldBins| -> Vec<f64> {
+        let pairs = f.dx.iter().zip(&f.dy);
+        pairs.map(|(x, y)| x.hypot(*y)).collect()
+    };
+    let (mut before, mut longest) = (vec![], 0.0);
+    for field in fields {
+        before.extend(length(&field.before));
+        longest = length(&field.after).into_iter().fold(longest, f64::max);
+    }
+    before.sort_by(f64::total_cmp);
+    let longest = before.iter().copied().fold(longest, f64::max);
+    let usual = before.get(before.len() * 9 / 10);
+    usual.map_or(f64::NAN, |usual| usual.max(longest / LONGEST))
 }
 
 fn arrows(panel: Panel, bins: &FieldBins, scale: f64, colour: Colour) -> Panel {
@@ -135,7 +143,7 @@ fn arrows(panel: Panel, bins: &FieldBins, scale: f64, colour: Colour) -> Panel {
 }
 
 fn over_the_detector(page: &mut Page, field: &Field, half: [f64; 2], added: bool) {
-    let scale = long(std::iter::once(&field.before));
+    let scale = long(std::iter::once(field));
     let [before, after] = field.rms();
     let n = field.before.x.len();
     let mut panels = vec![arrows(
@@ -201,7 +209,7 @@ fn star_by_star(page: &mut Page, stars: &StarResiduals, at: &[Vec<f64>; 2], adde
         page.paragraph("Not drawn: no star has enough rows.");
         return;
     }
-    let scale = long(list.iter().map(|(_, field, _)| &field.before));
+    let scale = long(list.iter().map(|(_, field, _)| field));
     let panel = |star: i64, what: &str, [x, y]: [[f64; 2]; 2]| {
         Panel::map(&format!("star {star}{what}"))
             .x_over(x[0], x[1])
