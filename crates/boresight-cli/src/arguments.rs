@@ -7,7 +7,7 @@ use clap::{Args, Parser, Subcommand};
 
 /// Star tracker error models that close the loop with measured data.
 #[derive(Debug, Parser)]
-#[command(name = "boresight", version, about, propagate_version = true)]
+#[command(name = "boresight", version, propagate_version = true)]
 #[command(
     after_help = "Example:\n  boresight close                 the whole loop on the example inside the binary"
 )]
@@ -29,26 +29,31 @@ pub(crate) struct Arguments {
 pub(crate) enum Command {
     /// Find what the model misses, add it, and report the error before and after
     #[command(
+        display_name = "boresight",
         after_help = "Examples:\n  boresight close\n  boresight close fixtures/models/aa-str.toml telemetry/ --out results/\n  boresight close model.toml telemetry/ --test rolling_shutter --test exposure_smear"
     )]
     Close(Close),
     /// Make the bundle that a tracker would have sent
     #[command(
+        display_name = "boresight",
         after_help = "Examples:\n  boresight simulate fixtures/scenarios/example.toml --out bundle/\n  boresight simulate --preset iht --out bundle/\n  boresight simulate --print-preset pitt > my.toml\n  boresight simulate fixtures/worlds/null_slews.toml --fidelity pixel --out bundle/"
     )]
     Simulate(Simulate),
     /// Fly models along the measured motion, and hold their spectra against the measured ones
     #[command(
+        display_name = "boresight",
         after_help = "Examples:\n  boresight compare model.toml telemetry/ --out figures/\n  boresight compare pbm.toml telemetry/ --with hem.toml --out figures/ --draws 200"
     )]
     Compare(Compare),
     /// Fit white noise and a Gauss-Markov process to each axis: a hybrid empirical model
     #[command(
+        display_name = "boresight",
         after_help = "Examples:\n  boresight fit telemetry/\n  boresight fit telemetry/ --out hem.toml --exclude-hz 0.03,0.04"
     )]
     Fit(Fit),
     /// On-orbit noise without a model: total and inherent 1 sigma of each axis
     #[command(
+        display_name = "boresight",
         after_help = "Examples:\n  boresight assess telemetry/\n  boresight assess telemetry/ --inertia 14710.5,14688.8,29041.9 --requirement 360 --out results/"
     )]
     Assess(Assess),
@@ -82,7 +87,7 @@ pub(crate) struct Simulate {
     /// A scenario of the paper: iht, iht-distance, ict1, ict2, pitt, st2-iht, st2-iht-distance, st2-ict1, st2-ict2, image, eo1
     #[arg(long, value_name = "NAME", conflicts_with = "scenario")]
     pub(crate) preset: Option<String>,
-    /// Print the file of a preset, to be edited, and do nothing else
+    /// Print the file of a preset, to be edited, and do nothing else; beside --preset without a name
     #[arg(long, value_name = "NAME", num_args = 0..=1, default_missing_value = "", conflicts_with = "scenario")]
     pub(crate) print_preset: Option<String>,
     /// How measurements are made [default: what the file's format asks for]
@@ -113,8 +118,8 @@ pub(crate) struct Compare {
     /// Folder for compare.json, psd.csv, draws.csv and the figures; nothing is written without it
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
-    /// Draws of each model
-    #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u64).range(8..))]
+    /// Draws of each model, at least 8
+    #[arg(long, value_name = "N", default_value_t = 100, value_parser = draws)]
     pub(crate) draws: u64,
     /// Seed of all random numbers
     #[arg(long, value_name = "N", default_value_t = 1)]
@@ -223,6 +228,13 @@ fn threads(text: &str) -> Result<usize, String> {
     match text.parse() {
         Ok(0) | Err(_) => Err("a whole number of at least 1 is needed".to_owned()),
         Ok(n) => Ok(n),
+    }
+}
+
+fn draws(text: &str) -> Result<u64, String> {
+    match text.parse() {
+        Ok(n) if n >= 8 => Ok(n),
+        _ => Err("a whole number of at least 8 is needed".to_owned()),
     }
 }
 

@@ -515,7 +515,7 @@ fn a_comparison_that_cannot_be_leaves_nothing() -> Done {
             .arg(&out)
             .output()
     };
-    for (draws, word) in [("8", "rolling_shutter"), ("3", "8..")] {
+    for (draws, word) in [("8", "rolling_shutter"), ("3", "at least 8")] {
         let done = run(draws)?;
         let message = String::from_utf8(done.stderr)?;
         assert_eq!(done.status.code(), Some(2), "{message}");

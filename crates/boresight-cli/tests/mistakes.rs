@@ -132,6 +132,7 @@ fn a_scenario_is_no_model() -> Done {
     Ok(())
 }
 
+/// As docs/formats/model.md promises: what `close --add-empirical` writes is read by all.
 #[test]
 fn a_model_with_an_empirical_term_is_simulated_and_compared() -> Done {
     let dir = tempfile::tempdir()?;
@@ -157,6 +158,7 @@ fn a_band_beyond_the_spectrum_is_told_once() -> Done {
     Ok(())
 }
 
+/// Every frequency left out: fitted to nothing, and that said once.
 #[test]
 fn nothing_left_to_fit_is_told_once() -> Done {
     let mut fit = boresight();
@@ -176,5 +178,22 @@ fn an_option_that_does_nothing_is_refused() -> Done {
     command.arg("assess").arg(example());
     let told = said(command.args(["--method", "reference", "--gyro-walk", "0.1"]))?;
     has(&told, &["--gyro-walk", "--method gyro"]);
+    Ok(())
+}
+
+#[test]
+fn usage_is_told_in_words() -> Done {
+    let help = boresight().arg("--help").output()?.stdout;
+    let help = String::from_utf8(help)?;
+    assert!(help.starts_with("Star tracker error models"), "{help}");
+    let version = boresight().args(["close", "--version"]).output()?.stdout;
+    assert!(String::from_utf8(version)?.starts_with("boresight 0"));
+    let told = said(boresight().args(["close", "--test", "rolling_shuter"]))?;
+    has(&told, &["the nearest is `rolling_shutter`", "outliers"]);
+    let mut compare = boresight();
+    let told = said(compare.args(["compare", "a.toml", "b", "--draws", "1"]))?;
+    has(&told, &["at least 8"]);
+    let told = said(boresight().args(["simulate", "--print-preset"]))?;
+    has(&told, &["--print-preset needs the name of a preset"]);
     Ok(())
 }

@@ -162,6 +162,7 @@ fn inputs_are_not_written_over() -> Done {
     Ok(())
 }
 
+/// A run without stars after one with them, in the same folder.
 #[test]
 fn results_of_an_earlier_run_do_not_stay() -> Done {
     let dir = tempfile::tempdir()?;

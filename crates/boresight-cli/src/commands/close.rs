@@ -8,6 +8,7 @@ use boresight::closed_loop::{CloseError, Closed, Questions, close_asking};
 use boresight::comparison::{CompareSettings, Compared, compare};
 use boresight::report::{Run, html, summary};
 use boresight::scenarios::found_effect_error;
+use boresight::telemetry::config::nearest;
 use boresight::telemetry::report::{ComparedModel, REPORT_FORMAT};
 use boresight::telemetry::{Bundle, Model, Output};
 
@@ -28,7 +29,9 @@ const RESULTS: [&str; 7] = [
 ];
 
 pub(crate) fn run(options: &Close, console: &Console) -> anyhow::Result<()> {
-    let questions = Questions::about(&options.tests)?.adding_empirical(options.add_empirical);
+    let questions = Questions::about(&options.tests)
+        .map_err(with_nearest)?
+        .adding_empirical(options.add_empirical);
     if let Some(dir) = &options.out {
         let bundle = options.bundle.iter().flat_map(|b| targets::of_bundle(b));
         let inputs: Vec<PathBuf> = options.model.iter().cloned().chain(bundle).collect();
@@ -86,6 +89,19 @@ pub(crate) fn run(options: &Close, console: &Console) -> anyhow::Result<()> {
             .machine(&serde_json::to_string_pretty(&closed.report).context("the report as JSON")?);
     }
     Ok(())
+}
+
+/// A misspelt effect is answered with the nearest, too.
+fn with_nearest(error: CloseError) -> anyhow::Error {
+    if let CloseError::UnknownHypothesis { id, known } = &error {
+        let names: Vec<&str> = known.split(", ").collect();
+        if let Some(near) = nearest(id, &names) {
+            return anyhow::anyhow!(
+                "--test: no effect `{id}` in the catalogue; the nearest is `{near}` (all: {known})"
+            );
+        }
+    }
+    error.into()
 }
 
 /// A mistake in a declared effect is shown in its line of the model.

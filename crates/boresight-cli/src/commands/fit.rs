@@ -24,10 +24,13 @@ pub(crate) fn run(options: &Fit, console: &Console) -> anyhow::Result<()> {
         lines_hz: options.exclude_hz.clone(),
     };
     let fitted = fit(&bundle, &settings).map_err(|error| {
-        let place = match error {
-            ComparisonError::EmptyBand { .. } => format!("{name}, --band-hz"),
-            _ => name.clone(),
+        // too few frequencies are the doing of the options that choose them
+        let by = match error {
+            ComparisonError::EmptyBand { .. } => ", --band-hz",
+            ComparisonError::Fit { .. } => chosen_by(options),
+            _ => "",
         };
+        let place = format!("{name}{by}");
         anyhow::Error::from(error).context(place)
     })?;
     if let Some(out) = &options.out {
@@ -42,4 +45,13 @@ pub(crate) fn run(options: &Fit, console: &Console) -> anyhow::Result<()> {
         console.machine(&serde_json::to_string_pretty(&fitted.report).context("the fit as JSON")?);
     }
     Ok(())
+}
+
+fn chosen_by(options: &Fit) -> &'static str {
+    match (options.band_hz.is_some(), options.exclude_hz.is_empty()) {
+        (true, true) => ", --band-hz",
+        (false, false) => ", --exclude-hz",
+        (true, false) => ", --band-hz and --exclude-hz",
+        (false, true) => "",
+    }
 }

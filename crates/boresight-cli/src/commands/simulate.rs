@@ -21,7 +21,12 @@ pub(crate) fn run(options: &Simulate, console: &Console) -> anyhow::Result<()> {
         } else {
             Some(name)
         };
-        console.text(preset(name.context("--print-preset needs a name")?)?.text);
+        console.text(
+            preset(
+                name.context("--print-preset needs the name of a preset, or --preset beside it")?,
+            )?
+            .text,
+        );
         return Ok(());
     }
     let out = options.out.as_ref().context("--out needs a folder")?;
