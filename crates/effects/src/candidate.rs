@@ -218,8 +218,8 @@ pub trait Candidate: Debug + Send + Sync {
     fn stands_for(&self) -> f64 {
         1.0
     }
-    /// Middle and half-width, px, of the square of the detector outside which it does nothing; `None`: it acts
-    /// everywhere.
+    /// Middle and half-width, px, of the square of the detector outside which it does nothing, where stars pass by it;
+    /// `None`: it acts everywhere, or on the same stars all the time.
     fn reach_px(&self) -> Option<([f64; 2], f64)> {
         None
     }

@@ -68,6 +68,7 @@ impl EffectKind for Kind {
             HotPixel {
                 at,
                 half_width_px,
+                passed: true,
                 stands_for: 1.0,
             },
             vec![strength],
@@ -77,13 +78,14 @@ impl EffectKind for Kind {
         let Some(warm) = scene.warm.filter(|_| scene.has_stars) else {
             return Vec::new();
         };
-        let stands_for = warm.looked_at as f64 / warm.middles.len().max(1) as f64;
-        let proposed = warm.middles.iter();
+        let stands_for = warm.looked_at as f64 / warm.proposed.len().max(1) as f64;
+        let proposed = warm.proposed.iter();
         proposed
-            .map(|&at| {
+            .map(|pixel| {
                 ShiftCandidate::boxed(HotPixel {
-                    at,
+                    at: pixel.middle,
                     half_width_px: HALF_WIDTH_PX,
+                    passed: pixel.passed,
                     stands_for,
                 })
             })
@@ -96,6 +98,7 @@ pub fn hot_pixel_at(at: Pixel) -> Box<dyn Candidate> {
     ShiftCandidate::boxed(HotPixel {
         at,
         half_width_px: HALF_WIDTH_PX,
+        passed: true,
         stands_for: 1.0,
     })
 }
@@ -117,6 +120,8 @@ pub(crate) fn middle_of(camera: &Camera, pixel: [i64; 2]) -> Pixel {
 struct HotPixel {
     at: Pixel,
     half_width_px: f64,
+    /// Whether stars pass by.
+    passed: bool,
     /// How many that were looked at it is proposed for.
     stands_for: f64,
 }
@@ -154,7 +159,8 @@ impl Shift for HotPixel {
         self.stands_for
     }
     fn reach_px(&self) -> Option<([f64; 2], f64)> {
-        Some(([self.at.x, self.at.y], self.half_width_px))
+        self.passed
+            .then_some(([self.at.x, self.at.y], self.half_width_px))
     }
     fn parameters(&self, values: &[f64]) -> Vec<Parameter> {
         vec![

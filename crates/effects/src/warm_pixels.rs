@@ -40,10 +40,19 @@ const NEAR: [[i64; 2]; 9] = [
 /// The pixels that are proposed, best first.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct WarmPixels {
-    /// Middles.
-    pub(crate) middles: Vec<Pixel>,
+    /// Those that are proposed.
+    pub(crate) proposed: Vec<WarmPixel>,
     /// How many were looked at.
     pub(crate) looked_at: usize,
+}
+
+/// A pixel that may be warm.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct WarmPixel {
+    pub(crate) middle: Pixel,
+    /// Whether stars pass by it: for half of what is seen near it by stars that are elsewhere for half of their time.
+    /// What pulls at a star that rests is a constant of that star's own.
+    pub(crate) passed: bool,
 }
 
 /// Weighted sums over the rows of one star near one pixel.
@@ -108,9 +117,19 @@ impl WarmPixels {
             .map(|own| look.sums(own, &pixels, &index))
             .collect();
         let mut whole = vec![[Sums::default(); 2]; pixels.len()];
-        for (p, own) in sums.iter().flatten() {
-            whole[*p][0].join(own);
-            whole[*p][1].join(&own.centred());
+        // near each pixel: all, and of stars that pass by
+        let mut seen = vec![[0.0; 2]; pixels.len()];
+        for (visits, of_star) in each.iter().zip(&sums) {
+            let rows = visits.iter().flat_map(|visit| visit.rows);
+            let all: f64 = rows.map(|&i| weight[i] * weight[i]).sum();
+            for (p, own) in of_star {
+                whole[*p][0].join(own);
+                whole[*p][1].join(&own.centred());
+                seen[*p][0] += own.weight;
+                if own.weight <= 0.5 * all {
+                    seen[*p][1] += own.weight;
+                }
+            }
         }
         let mut ranked: Vec<(f64, usize)> = whole
             .iter()
@@ -125,10 +144,13 @@ impl WarmPixels {
             b.0.total_cmp(&a.0).then(longer).then(a.1.cmp(&b.1))
         });
         Self {
-            middles: ranked
+            proposed: ranked
                 .iter()
                 .take(MOST_PIXELS)
-                .map(|(_, k)| middle_of(camera, pixels[*k].0))
+                .map(|(_, k)| WarmPixel {
+                    middle: middle_of(camera, pixels[*k].0),
+                    passed: seen[*k][1] >= 0.5 * seen[*k][0],
+                })
                 .collect(),
             looked_at: pixels.len(),
         }
@@ -304,10 +326,13 @@ mod tests {
     fn a_warm_pixel_is_looked_at_first_however_short_its_visit() {
         let [found, pushed] = looked(0.05, 0.02);
         assert!(found.looked_at > 1000, "{}", found.looked_at);
-        assert_eq!(found.middles.len(), MOST_PIXELS);
-        assert_eq!(found.middles[0], WARM, "{:?}", &found.middles[..4]);
+        assert_eq!(found.proposed.len(), MOST_PIXELS);
+        let first = found.proposed[0];
+        assert_eq!(first.middle, WARM, "{:?}", &found.proposed[..4]);
+        assert!(first.passed, "stars drift by");
         // a pixel that pushes is none
-        assert!(!pushed.middles[..8].contains(&WARM));
+        let is_warm = |p: &WarmPixel| p.middle == WARM;
+        assert!(!pushed.proposed[..8].iter().any(is_warm));
     }
 
     /// Four rows fall in each pixel, twelve within its half-width: enough for a pull of 0.06 of up to 1.5 px,
@@ -315,6 +340,6 @@ mod tests {
     #[test]
     fn rows_around_a_pixel_count_not_those_in_it() {
         let [found, _] = looked(0.25, 0.06);
-        assert_eq!(found.middles[0], WARM, "{:?}", &found.middles[..4]);
+        assert_eq!(found.proposed[0].middle, WARM, "{:?}", &found.proposed[..4]);
     }
 }

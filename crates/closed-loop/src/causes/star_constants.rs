@@ -112,27 +112,32 @@ impl<'a> Constants<'a> {
         let means = Means::of(self.level, &shifts, &self.left);
         let mut standing: Vec<usize> = (0..shifts.len()).collect();
         let mut disputed = Vec::new();
+        let margin = |beside: &[usize], of: &[usize]| {
+            let each = of.iter();
+            let paid = each.map(|&e| paid[places[e]] + price(&shifts[e].columns));
+            let spared = if means.are_noise(beside) { UNSEEN } else { 0.0 };
+            means.gain(beside, of) + spared - paid.sum::<f64>()
+        };
         while !standing.is_empty() {
-            let spared = if means.are_noise(&standing) {
-                UNSEEN
-            } else {
-                0.0
-            };
-            let margin = |of: &[usize]| {
-                let each = of.iter();
-                let paid = each.map(|&e| paid[places[e]] + price(&shifts[e].columns));
-                means.gain(&standing, of) + spared - paid.sum::<f64>()
-            };
-            let margins: Vec<f64> = standing.iter().map(|&e| margin(&[e])).collect();
-            // of those alike the one that was added last
-            let least = (0..standing.len()).rev();
-            let Some(least) = least.min_by(|&a, &b| margins[a].total_cmp(&margins[b])) else {
-                break;
-            };
-            if margins[least] >= 0.0 && margin(&standing) >= 0.0 {
-                break;
+            let mut doubted = standing.clone();
+            doubted.retain(|&e| margin(&standing, &[e]) < 0.0);
+            if doubted.is_empty() {
+                if margin(&standing, &standing) >= 0.0 {
+                    break;
+                }
+                doubted.clone_from(&standing);
             }
-            disputed.push(places[standing.remove(least)]);
+            // where little is left of the stars all are doubted, and the one goes without which the rest is worth most; of
+            // those alike the one that was added last
+            let rest = |e: usize| {
+                let rest = without(&standing, &[e]);
+                margin(&rest, &rest)
+            };
+            let worst = doubted.into_iter().rev();
+            let worst = worst.max_by(|&a, &b| rest(a).total_cmp(&rest(b)).then(a.cmp(&b)));
+            let Some(worst) = worst else { break };
+            standing.retain(|&e| e != worst);
+            disputed.push(places[worst]);
         }
         disputed
     }
