@@ -359,7 +359,7 @@ fn warm_pixels_are_named(count: usize) {
     let mut case = Case::new(Path::Nods, 7);
     case.duration_s = 1200.0;
     let (_, bundle) = case.make();
-    let stars = bundle.stars.as_ref().unwrap();
+    let stars = bundle.stars.as_ref().expect("it has some");
     let mut visits = std::collections::BTreeMap::<[i32; 2], Vec<usize>>::new();
     for frame in 0..stars.frames() {
         for row in stars.rows_of(frame) {
@@ -393,7 +393,7 @@ fn warm_pixels_are_named(count: usize) {
         assert_eq!(effect.id, "hot_pixel");
         let there = |at: &[f64; 2]| (of("x_px") - at[0]).hypot(of("y_px") - at[1]) < 1e-9;
         assert!(warm.iter().any(there), "{effect:?} of {warm:?}");
-        let sigma = effect.parameters["strength"].sigma.unwrap();
+        let sigma = effect.parameters["strength"].sigma.expect("it has one");
         assert!((of("strength") - 0.06).abs() < 4.0 * sigma, "{effect:?}");
     }
 }
