@@ -28,6 +28,8 @@ use crate::star::frame_rotation::rotation_row;
 
 /// Parts of the run that are summed side by side.
 const PARTS: usize = 16;
+/// Frames whose columns are held at once.
+const AT_ONCE: usize = 1024;
 /// Singular values below this share of the largest are none.
 const SINGULAR: f64 = 1e-6;
 /// Chance below which stars have constants of their own.
@@ -396,7 +398,16 @@ struct Design<'a> {
 }
 
 impl Design<'_> {
+    /// Some frames at a time: the distortion alone has more than a hundred columns.
     fn sums(&self, frames: Range<usize>) -> Sums {
+        let mut sums = self.sums_at_once(frames.start..(frames.start + AT_ONCE).min(frames.end));
+        for start in (frames.start + AT_ONCE..frames.end).step_by(AT_ONCE) {
+            sums += self.sums_at_once(start..(start + AT_ONCE).min(frames.end));
+        }
+        sums
+    }
+
+    fn sums_at_once(&self, frames: Range<usize>) -> Sums {
         let data = self.level.data;
         let rows = data.frames.first_row[frames.start]..data.frames.first_row[frames.end];
         let mut weight: Vec<f64> = rows.clone().map(|row| self.weight_of(row)).collect();
