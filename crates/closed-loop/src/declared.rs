@@ -13,7 +13,7 @@
 use std::sync::Arc;
 
 use centroid::{CentroidError, GAUSS_HERMITE_5, Triangle};
-use effects::{Effect, ParameterValue, Parameters};
+use effects::{Effect, EffectError, ParameterValue, Parameters};
 use focal_plane::Pixel;
 use star_tracker::StarView;
 use telemetry::{EffectValue, Model};
@@ -94,8 +94,9 @@ fn centroid_error(model: &Model) -> CentroidError {
 pub(crate) fn effects(situation: &Situation<'_>) -> Result<Vec<Arc<dyn Effect>>, CloseError> {
     let surroundings = situation.surroundings();
     let mut built = Vec::new();
-    for entry in &situation.model.effects {
-        let acts = effects::kind(&entry.id)?.acts_on();
+    for (index, entry) in situation.model.effects.iter().enumerate() {
+        let wrong = |error| in_line(situation.model, index, error);
+        let acts = effects::kind(&entry.id).map_err(wrong)?.acts_on();
         if acts.images {
             continue;
         }
@@ -104,19 +105,20 @@ pub(crate) fn effects(situation: &Situation<'_>) -> Result<Vec<Arc<dyn Effect>>,
             let value = match value {
                 EffectValue::Number(number) => ParameterValue::Number(*number),
                 EffectValue::Text(text) => ParameterValue::Text(text.clone()),
-                EffectValue::Numbers(numbers) => ParameterValue::Text(
-                    numbers
-                        .iter()
-                        .map(f64::to_string)
-                        .collect::<Vec<_>>()
-                        .join(","),
-                ),
+                EffectValue::Numbers(numbers) => ParameterValue::list(numbers),
             };
             parameters.insert(name.clone(), value);
         }
-        built.push(effects::build(&entry.id, &parameters, &surroundings)?.into());
+        let effect = effects::build(&entry.id, &parameters, &surroundings);
+        built.push(effect.map_err(wrong)?.into());
     }
     Ok(built)
+}
+
+/// An error of a declared effect, in its line where the model came from a file.
+fn in_line(model: &Model, index: usize, error: EffectError) -> CloseError {
+    let located = model.effect_error_in_line(index, error.key(), &error.to_string());
+    located.map_or_else(|| error.into(), Into::into)
 }
 
 /// Refuses a declared effect on raw images where these are there: to go on as if it were not declared
@@ -125,8 +127,10 @@ pub(crate) fn refuse_on_images(situation: &Situation<'_>) -> Result<(), CloseErr
     if situation.bundle.images.is_none() || situation.bundle.stars.is_none() {
         return Ok(());
     }
-    for entry in &situation.model.effects {
-        if effects::kind(&entry.id)?.acts_on().images {
+    for (index, entry) in situation.model.effects.iter().enumerate() {
+        let kind = effects::kind(&entry.id);
+        let kind = kind.map_err(|error| in_line(situation.model, index, error))?;
+        if kind.acts_on().images {
             let id = entry.id.clone();
             return Err(CloseError::DeclaredOnImages { id });
         }

@@ -97,3 +97,19 @@ pub enum EffectError {
         effect: &'static str,
     },
 }
+
+impl EffectError {
+    /// The key whose value is to blame, `id` for the effect itself; empty where it is the whole entry.
+    #[must_use]
+    pub fn key(&self) -> &str {
+        match self {
+            Self::UnknownEffect { .. } | Self::ActsOnImages { .. } => "id",
+            Self::UnknownParameter { name, .. }
+            | Self::Conflicting { name, .. }
+            | Self::WrongType { name, .. }
+            | Self::OutOfRange { name, .. } => name,
+            Self::NoChannel { .. } | Self::WrongChannel { .. } => "channel",
+            _ => "",
+        }
+    }
+}

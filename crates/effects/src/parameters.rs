@@ -38,6 +38,15 @@ pub enum ParameterValue {
     Text(String),
 }
 
+impl ParameterValue {
+    /// Several numbers: a text with commas, which an effect that takes one number refuses.
+    #[must_use]
+    pub fn list(numbers: &[f64]) -> Self {
+        let texts: Vec<String> = numbers.iter().map(f64::to_string).collect();
+        Self::Text(texts.join(","))
+    }
+}
+
 impl From<f64> for ParameterValue {
     fn from(value: f64) -> Self {
         Self::Number(value)

@@ -68,14 +68,6 @@ pub enum ImagerError {
     /// The stars seen make no catalogue.
     #[error(transparent)]
     Catalogue(#[from] CatalogueError),
-    /// What is wrong with a file as a whole.
-    #[error("{file}: {reason}")]
-    InFile {
-        /// The file.
-        file: String,
-        /// What is wrong.
-        reason: String,
-    },
     /// The motion holds no frame, or no star was in the field.
     #[error(
         "no star was seen in {frames} frames (limiting magnitude, field, or span of the motion)"
@@ -92,7 +84,7 @@ impl ImagerError {
     #[must_use]
     pub fn in_file(self, text: &str, file: &str) -> Self {
         let (name, value) = match &self {
-            Self::File(_) | Self::InFile { .. } => return self,
+            Self::File(_) => return self,
             Self::OutOfRange { name, value, .. } => (*name, Some(*value)),
             Self::NoNode { name, .. } | Self::NeedsNode { name } => (*name, None),
             Self::NoStar { name, id } => (*name, Some(*id as f64)),
@@ -103,14 +95,7 @@ impl ImagerError {
         };
         // "reference.cant_axis (length)"
         let path = name.split(' ').next().unwrap_or("");
-        let reason = self.to_string();
-        match Config::parse(text, file) {
-            Ok(config) if !path.is_empty() => config.error_at_value(path, value, reason).into(),
-            _ => Self::InFile {
-                file: file.to_owned(),
-                reason,
-            },
-        }
+        Config::blame(text, file, path, value, self.to_string()).into()
     }
 
     pub(crate) fn check(

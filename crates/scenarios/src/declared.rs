@@ -106,17 +106,12 @@ fn hybrid(model: &Model, pbm: &Pbm) -> Result<Hem, ScenarioError> {
 }
 
 /// What an `[[effect]]` of a model gives the effect to be built with.
-///
-/// Several numbers are a text with commas, which an effect that takes one number refuses.
 pub fn effect_parameters(entry: &EffectEntry) -> Parameters {
     let value = |(name, value): (&String, &EffectValue)| {
         let value = match value {
             EffectValue::Number(number) => ParameterValue::Number(*number),
             EffectValue::Text(text) => ParameterValue::Text(text.clone()),
-            EffectValue::Numbers(numbers) => {
-                let texts: Vec<String> = numbers.iter().map(f64::to_string).collect();
-                ParameterValue::Text(texts.join(","))
-            }
+            EffectValue::Numbers(numbers) => ParameterValue::list(numbers),
         };
         (name.clone(), value)
     };

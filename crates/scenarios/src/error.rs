@@ -60,14 +60,6 @@ pub enum ScenarioError {
         /// The table.
         table: &'static str,
     },
-    /// What is wrong with a file as a whole.
-    #[error("{file}: {reason}")]
-    InFile {
-        /// The file.
-        file: String,
-        /// What is wrong.
-        reason: String,
-    },
     /// Nothing came out: no frame has a star.
     #[error(
         "no star was seen in {frames} frames (limiting magnitude, field, or span of the recording)"

@@ -21,7 +21,7 @@ pub use course::Course;
 pub use declared::{Declared, effect_parameters, hybrid_processes};
 pub use error::ScenarioError;
 pub use housekeeping::{Channel, Housekeeping, OrbitVelocity, SinusoidChannel, Thermostat};
-pub use located::{effect_error, found_effect_error};
+pub use located::effect_error;
 pub use motion::{
     ClosedLoop, Hold, Motion, PhasePlane, Pointing, Recorded, RecordedTable, Rotator, Sinusoid,
     Slew, Slews,

@@ -3,8 +3,8 @@
 //! Not physics: messages.
 
 use effects::EffectError;
+use telemetry::Model;
 use telemetry::config::Config;
-use telemetry::{EffectEntry, EffectValue, Model, TelemetryError};
 
 use crate::ScenarioError;
 
@@ -22,7 +22,7 @@ impl ScenarioError {
     #[must_use]
     pub fn in_file(self, text: &str, file: &str) -> Self {
         let (path, value) = match &self {
-            Self::File(_) | Self::NoPreset { .. } | Self::InFile { .. } => return self,
+            Self::File(_) | Self::NoPreset { .. } => return self,
             Self::OutOfRange { name, value, .. } => (key(name), Some(*value)),
             Self::Missing { name } => (key(name), None),
             Self::NoCentroids => ("run.tables", None),
@@ -33,14 +33,7 @@ impl ScenarioError {
             Self::Distortion(_) => ("noise.distortion_arcsec", None),
             _ => ("", None),
         };
-        let reason = self.to_string();
-        match Config::parse(text, file) {
-            Ok(config) if !path.is_empty() => config.error_at_value(path, value, reason).into(),
-            _ => Self::InFile {
-                file: file.to_owned(),
-                reason,
-            },
-        }
+        Config::blame(text, file, path, value, self.to_string()).into()
     }
 }
 
@@ -55,89 +48,8 @@ fn key(name: &str) -> &str {
 /// An error of an `[[effect]]` of a model, shown in its line where the model came from a file.
 #[must_use]
 pub fn effect_error(model: &Model, index: usize, error: EffectError) -> ScenarioError {
-    let key = parameter(&error);
-    let entry = model.effects.get(index);
-    // line 0: the model was made in memory
-    if entry.is_none_or(|entry| entry.at.line(key) == 0) {
-        return error.into();
-    }
-    model.effect_error(index, key, &error.to_string()).into()
-}
-
-/// An error of an effect of this model whose entry is not known, shown in the line that it is probably
-/// about; none where no entry is.
-///
-/// ```
-/// use effects::EffectError;
-/// let text = "format = \"boresight-model/1\"\n[[effect]]\nid = \"outliers\"\n[[effect]]\nid = \"roling\"\n";
-/// let model = telemetry::Model::parse(text, "a.toml", &[])?;
-/// let error = effects::kind("roling").err().and_then(|e| scenarios::found_effect_error(&model, &e));
-/// assert!(error.is_some_and(|e| e.to_string().starts_with("a.toml, line 5,")));
-/// # Ok::<(), telemetry::TelemetryError>(())
-/// ```
-#[must_use]
-pub fn found_effect_error(model: &Model, error: &EffectError) -> Option<TelemetryError> {
-    let of_kind = |entry: &&EffectEntry| entry.id == id(error);
-    let says = |entry: &&EffectEntry| of_kind(entry) && says(entry, error);
-    let entries = &model.effects;
-    let entry = entries.iter().find(says);
-    let entry = entry.or_else(|| entries.iter().find(of_kind))?;
-    let index = entries
-        .iter()
-        .position(|other| std::ptr::eq(other, entry))?;
-    Some(model.effect_error(index, parameter(error), &error.to_string()))
-}
-
-/// Whether an entry holds what the error names.
-fn says(entry: &EffectEntry, error: &EffectError) -> bool {
-    let given = entry.parameters.get(parameter(error));
-    match error {
-        EffectError::OutOfRange { value, .. } => match given {
-            Some(EffectValue::Number(number)) => number.total_cmp(value).is_eq(),
-            _ => false,
-        },
-        EffectError::NoChannel { channel, .. } | EffectError::WrongChannel { channel, .. } => {
-            let texts = entry.parameters.values().map(|value| match value {
-                EffectValue::Text(text) => text.as_str(),
-                _ => "",
-            });
-            texts
-                .into_iter()
-                .any(|text| text.ends_with(channel.as_str()))
-        }
-        EffectError::MissingParameter { name, .. } => !entry.parameters.contains_key(*name),
-        _ => given.is_some(),
-    }
-}
-
-/// The effect that an error is about.
-fn id(error: &EffectError) -> &str {
-    match error {
-        EffectError::UnknownEffect { id, .. } => id,
-        EffectError::UnknownParameter { effect, .. }
-        | EffectError::MissingParameter { effect, .. }
-        | EffectError::Conflicting { effect, .. }
-        | EffectError::WrongType { effect, .. }
-        | EffectError::OutOfRange { effect, .. }
-        | EffectError::NoChannel { effect, .. }
-        | EffectError::WrongChannel { effect, .. }
-        | EffectError::NoFrames { effect, .. }
-        | EffectError::ActsOnImages { effect } => effect,
-        _ => "",
-    }
-}
-
-/// The key whose value is to blame; the whole entry where none is.
-fn parameter(error: &EffectError) -> &str {
-    match error {
-        EffectError::UnknownEffect { .. } | EffectError::ActsOnImages { .. } => "id",
-        EffectError::UnknownParameter { name, .. }
-        | EffectError::Conflicting { name, .. }
-        | EffectError::WrongType { name, .. }
-        | EffectError::OutOfRange { name, .. } => name,
-        EffectError::NoChannel { .. } | EffectError::WrongChannel { .. } => "channel",
-        _ => "",
-    }
+    let located = model.effect_error_in_line(index, error.key(), &error.to_string());
+    located.map_or_else(|| error.into(), Into::into)
 }
 
 #[cfg(test)]

@@ -117,6 +117,24 @@ impl Config {
         }
     }
 
+    /// As [`error_at_value`](Self::error_at_value) in the `text` of a file that was read before, of the file as a
+    /// whole where the path is empty.
+    pub fn blame(
+        text: &str,
+        file: &str,
+        path: &str,
+        value: Option<f64>,
+        reason: String,
+    ) -> TelemetryError {
+        match Self::parse(text, file) {
+            Ok(config) if !path.is_empty() => config.error_at_value(path, value, reason),
+            _ => TelemetryError::InFile {
+                file: file.to_owned(),
+                reason,
+            },
+        }
+    }
+
     /// Line of a byte, 1-based.
     fn line(&self, byte: usize) -> usize {
         line_of(&self.text, byte)

@@ -103,6 +103,14 @@ pub enum TelemetryError {
     /// A TOML file with a mistake.
     #[error(transparent)]
     Toml(#[from] Box<TomlError>),
+    /// What is wrong with a file as a whole.
+    #[error("{file}: {reason}")]
+    InFile {
+        /// The file.
+        file: String,
+        /// What is wrong.
+        reason: String,
+    },
     /// A cell with a mistake.
     #[error(transparent)]
     Cell(#[from] Box<CellError>),

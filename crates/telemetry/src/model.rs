@@ -214,17 +214,25 @@ impl Model {
     /// An error in an effect, shown at the value of its key (`id`, a parameter) if the model came
     /// from a file: for what only the effects catalogue can judge.
     pub fn effect_error(&self, index: usize, key: &str, message: &str) -> TelemetryError {
-        let place = self.effects.get(index).map(|effect| &effect.at);
-        let spot = place.and_then(|at| at.keys.get(key).or(at.head.as_ref()));
-        match spot {
-            Some(spot) => TelemetryError::Toml(Box::new(TomlError {
-                message: message.into(),
-                ..spot.clone()
-            })),
-            None => TelemetryError::Inconsistent {
+        self.effect_error_in_line(index, key, message)
+            .unwrap_or_else(|| TelemetryError::Inconsistent {
                 table: "model",
                 reason: format!("effect {}: {message}", index + 1),
-            },
-        }
+            })
+    }
+
+    /// The same where the model came from a file, and none where it was made in memory.
+    pub fn effect_error_in_line(
+        &self,
+        index: usize,
+        key: &str,
+        message: &str,
+    ) -> Option<TelemetryError> {
+        let at = &self.effects.get(index)?.at;
+        let spot = at.keys.get(key).or(at.head.as_ref())?;
+        Some(TelemetryError::Toml(Box::new(TomlError {
+            message: message.into(),
+            ..spot.clone()
+        })))
     }
 }

@@ -7,7 +7,6 @@ use anyhow::Context as _;
 use boresight::closed_loop::{CloseError, Closed, Questions, close_asking};
 use boresight::comparison::{CompareSettings, Compared, compare};
 use boresight::report::{Run, html, summary};
-use boresight::scenarios::found_effect_error;
 use boresight::telemetry::config::nearest;
 use boresight::telemetry::report::{ComparedModel, REPORT_FORMAT};
 use boresight::telemetry::{Bundle, Model, Output};
@@ -50,8 +49,7 @@ pub(crate) fn run(options: &Close, console: &Console) -> anyhow::Result<()> {
         }
     };
     let progress = |what: &str| console.progress(what);
-    let mut closed = close_asking(&model, &bundle, &questions, &progress)
-        .map_err(|error| located(&model, error))?;
+    let mut closed = close_asking(&model, &bundle, &questions, &progress)?;
     let compared = (options.out.is_some() || console.json())
         .then(|| flown(&model, &bundle, &mut closed, console));
     let text = summary(&closed);
@@ -102,15 +100,6 @@ fn with_nearest(error: CloseError) -> anyhow::Error {
         }
     }
     error.into()
-}
-
-/// A mistake in a declared effect is shown in its line of the model.
-fn located(model: &Model, error: CloseError) -> anyhow::Error {
-    let place = match &error {
-        CloseError::Effect(effect) => found_effect_error(model, effect),
-        _ => None,
-    };
-    place.map_or_else(|| error.into(), Into::into)
 }
 
 #[expect(
