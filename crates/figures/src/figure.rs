@@ -110,18 +110,18 @@ impl Figure {
         }
         legend(&mut out, &legend_rows, [EDGE, below_title], None);
         // panels stay comparable: all of them show as much more as the one that needs it most
-        let factors = self.panels.iter().map(|panel| {
-            let frame = placed(panel, [EDGE, head], self.panel_px, !shared);
-            widening(panel, &frame)
-        });
-        let factor = factors.fold(1.0, f64::max);
-        for (k, panel) in self.panels.iter().enumerate() {
+        let each = self.panels.iter().enumerate().map(|(k, panel)| {
             let (column, row) = (k % self.columns, k / self.columns);
             let corner = [
                 EDGE + column as f64 * self.panel_px[0],
                 head + row as f64 * self.panel_px[1],
             ];
-            draw(&mut out, panel, corner, self.panel_px, !shared, factor);
+            Placed::new(panel, corner, self.panel_px, !shared)
+        });
+        let each: Vec<Placed<'_>> = each.collect();
+        let factor = each.iter().map(Placed::widening).fold(1.0, f64::max);
+        for placed in each {
+            draw(&mut out, placed, factor);
         }
         for (k, line) in note.iter().enumerate() {
             let y = height - EDGE - (note.len() - 1 - k) as f64 * NOTE - 2.0;
@@ -157,42 +157,51 @@ impl Figure {
     }
 }
 
-/// Marks of the legend of a panel that has one of its own.
-fn legend_of(panel: &Panel, size: [f64; 2], own_legend: bool) -> Vec<Vec<&Mark>> {
-    if own_legend {
-        rows_of(&panel.marks, size[0] - LEFT - RIGHT)
-    } else {
-        vec![]
-    }
+/// A panel at its place.
+struct Placed<'a> {
+    panel: &'a Panel,
+    corner: [f64; 2],
+    /// Marks of the legend, where it has one of its own.
+    legend: Vec<Vec<&'a Mark>>,
+    frame: Frame,
 }
 
-/// Where the frame of a panel is, with its axes.
-fn placed(panel: &Panel, corner: [f64; 2], size: [f64; 2], own_legend: bool) -> Frame {
-    let cells = |mark: &Mark| matches!(mark.shape, Shape::Cells { .. });
-    let bar = panel.marks.iter().any(cells);
-    let room_right = RIGHT + if bar { BAR } else { 0.0 };
-    let legend_rows = legend_of(panel, size, own_legend).len();
-    let above = ABOVE + legend_rows as f64 * LEGEND;
-    let mut at = [corner[0] + LEFT, corner[1] + above];
-    let mut px = [size[0] - LEFT - room_right, size[1] - above - BELOW];
-    let mut x = Laid::new(&panel.x, panel.data(0), [0.0, px[0]]);
-    let mut y = Laid::new(&panel.y, panel.data(1), [px[1], 0.0]);
-    if panel.equal {
-        let scale = x.px_per_unit().min(y.px_per_unit());
-        let wanted = [&x, &y].map(|laid| scale * (laid.ends()[1] - laid.ends()[0]));
-        at[0] += 0.5 * (px[0] - wanted[0]);
-        px = wanted;
+impl<'a> Placed<'a> {
+    fn new(panel: &'a Panel, corner: [f64; 2], size: [f64; 2], own_legend: bool) -> Self {
+        let legend = if own_legend {
+            rows_of(&panel.marks, size[0] - LEFT - RIGHT)
+        } else {
+            vec![]
+        };
+        let cells = |mark: &Mark| matches!(mark.shape, Shape::Cells { .. });
+        let bar = panel.marks.iter().any(cells);
+        let room_right = RIGHT + if bar { BAR } else { 0.0 };
+        let above = ABOVE + legend.len() as f64 * LEGEND;
+        let mut at = [corner[0] + LEFT, corner[1] + above];
+        let mut px = [size[0] - LEFT - room_right, size[1] - above - BELOW];
+        let mut x = Laid::new(&panel.x, panel.data(0), [0.0, px[0]]);
+        let mut y = Laid::new(&panel.y, panel.data(1), [px[1], 0.0]);
+        if panel.equal {
+            let scale = x.px_per_unit().min(y.px_per_unit());
+            let wanted = [&x, &y].map(|laid| scale * (laid.ends()[1] - laid.ends()[0]));
+            at[0] += 0.5 * (px[0] - wanted[0]);
+            px = wanted;
+        }
+        x = Laid::new(&panel.x, panel.data(0), [at[0], at[0] + px[0]]).with_ends(x.ends());
+        y = Laid::new(&panel.y, panel.data(1), [at[1] + px[1], at[1]]).with_ends(y.ends());
+        Self {
+            panel,
+            corner,
+            legend,
+            frame: Frame { at, px, x, y },
+        }
     }
-    x = Laid::new(&panel.x, panel.data(0), [at[0], at[0] + px[0]]).with_ends(x.ends());
-    y = Laid::new(&panel.y, panel.data(1), [at[1] + px[1], at[1]]).with_ends(y.ends());
-    Frame { at, px, x, y }
-}
 
-/// How much wider the axes of a panel have to be for whole arrows.
-fn widening(panel: &Panel, frame: &Frame) -> f64 {
-    let arrows = panel.marks.iter();
-    let factors = arrows.filter_map(|mark| Some(Arrows::of(mark, frame)?.widening(mark, frame)));
-    factors.fold(1.0, f64::max)
+    /// How much wider the axes have to be for whole arrows.
+    fn widening(&self) -> f64 {
+        let of = |mark| Some(Arrows::of(mark, &self.frame)?.widening(mark, &self.frame));
+        self.panel.marks.iter().filter_map(of).fold(1.0, f64::max)
+    }
 }
 
 /// Makes the axes wider, both alike; gives the corners of what was shown before.
@@ -210,20 +219,17 @@ fn widen(frame: &mut Frame, factor: f64) -> [[f64; 2]; 2] {
 }
 
 /// Paints a panel; the axes of arrows are made wider by `factor`.
-fn draw(
-    out: &mut String,
-    panel: &Panel,
-    corner: [f64; 2],
-    size: [f64; 2],
-    own_legend: bool,
-    factor: f64,
-) {
+fn draw(out: &mut String, placed: Placed<'_>, factor: f64) {
+    let Placed {
+        panel,
+        corner,
+        legend: legend_rows,
+        mut frame,
+    } = placed;
     let bar = panel.marks.iter().find_map(|mark| match &mark.shape {
         Shape::Cells { scale, label, .. } => Some((*scale, label.as_str())),
         _ => None,
     });
-    let legend_rows = legend_of(panel, size, own_legend);
-    let mut frame = placed(panel, corner, size, own_legend);
     let _ = write!(
         out,
         r#"<text x="{:.1}" y="{:.1}" font-size="12" font-weight="bold">{}</text>"#,

@@ -38,4 +38,5 @@ pub use bins::{Envelope, FieldBins, PhaseBins};
 pub use colour::{Colour, Scale};
 pub use figure::Figure;
 pub use mark::{Mark, Shape};
+pub use paint::long_arrow;
 pub use panel::Panel;

@@ -36,6 +36,15 @@ const HEAD_PX: f64 = 3.0;
 /// Axes are made wider by this at most.
 const WIDEST: f64 = 3.0;
 
+/// The length of a long arrow: that which nine of ten stay below, or more where one, perhaps of another panel, is far
+/// longer and would fill the frame. `None` without arrows.
+#[must_use]
+pub fn long_arrow(mut lengths: Vec<f64>, longest: f64) -> Option<f64> {
+    lengths.sort_by(f64::total_cmp);
+    let usual = lengths.get(lengths.len() * 9 / 10)?;
+    Some(usual.max(longest / LONGEST))
+}
+
 /// How long arrows are.
 #[derive(Clone, Debug)]
 pub(crate) struct Arrows {
@@ -60,11 +69,8 @@ impl Arrows {
         };
         let mut lengths: Vec<f64> = dx.iter().zip(dy).map(|(a, b)| a.hypot(*b)).collect();
         lengths.retain(|l| l.is_finite() && *l > 0.0);
-        lengths.sort_by(f64::total_cmp);
-        let own = lengths.get(lengths.len() * 9 / 10).copied();
-        let longest = lengths.last().copied().unwrap_or(0.0);
-        // one arrow far longer than the others must not fill the frame
-        let long = long.or_else(|| own.map(|own| own.max(longest / LONGEST)))?;
+        let longest = lengths.iter().copied().fold(0.0, f64::max);
+        let long = long.or_else(|| long_arrow(lengths, longest))?;
         let spacing = (frame.px[0] * frame.px[1] / x.len() as f64).sqrt();
         // short enough for the longest to be inside a small frame
         let most = (frame.px[0].min(frame.px[1]) / 8.0).clamp(14.0, 34.0);

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use figures::{Colour, FieldBins, Figure, Mark, Panel, PhaseBins};
+use figures::{Colour, FieldBins, Figure, Mark, Panel, PhaseBins, long_arrow};
 use telemetry::StarResiduals;
 
 use super::data::{View, rms};
@@ -114,9 +114,6 @@ fn size(bins: &FieldBins) -> f64 {
     rms(bins.dx.iter().zip(&bins.dy).map(|(x, y)| x.hypot(*y)))
 }
 
-/// The longest arrow, in lengths of a long one: beyond it whole arrows would need too wide a frame.
-const LONGEST: f64 = 2.0;
-
 /// The length that nine of ten arrows before stay below; more where one, also after, is far longer.
 fn long<'a>(fields: impl Iterator<Item = &'a Field>) -> f64 {
     let length = |f: &FieldBins| -> Vec<f64> {
@@ -128,10 +125,8 @@ fn long<'a>(fields: impl Iterator<Item = &'a Field>) -> f64 {
         before.extend(length(&field.before));
         longest = length(&field.after).into_iter().fold(longest, f64::max);
     }
-    before.sort_by(f64::total_cmp);
     let longest = before.iter().copied().fold(longest, f64::max);
-    let usual = before.get(before.len() * 9 / 10);
-    usual.map_or(f64::NAN, |usual| usual.max(longest / LONGEST))
+    long_arrow(before, longest).unwrap_or(f64::NAN)
 }
 
 fn arrows(panel: Panel, bins: &FieldBins, scale: f64, colour: Colour) -> Panel {
