@@ -26,10 +26,11 @@ use crate::error::CloseError;
 use crate::figures;
 use crate::noise_effects;
 use crate::search::empirical::Empirical;
+use crate::search::group::open_beside;
 use crate::search::misplaced::{MISPLACED, piled};
 use crate::search::refusal::{Refusal, Refused};
 use crate::search::selection::{columns_of, costs};
-use crate::search::{Found, borrowed, family, fit_beside, joined};
+use crate::search::{Found, borrowed, family, fit_beside, joined, without};
 use crate::star::evidence::StarEvidence;
 use crate::star::landing::Elsewhere;
 use crate::star::search::{Attempt, Searched, attempt, declared_noise};
@@ -425,7 +426,7 @@ fn judged_alone(mut found: Found, refused: &mut Refused) -> Found {
 fn best_beside(found: &Found, may: &[bool]) -> f64 {
     let groups = &found.fitted.groups;
     let chosen = &found.selection.chosen;
-    let new = |g: usize| chosen.iter().all(|&c| !groups[c].excludes(&groups[g]));
+    let new = |g: usize| open_beside(groups, chosen, g);
     let judged = found.selection.judged.iter().zip(may).enumerate();
     let open = judged.filter(|(g, (j, may))| **may && j.credible && j.observable && new(*g));
     open.map(|(_, (j, _))| j.delta_loglik).fold(0.0, f64::max)
@@ -503,7 +504,7 @@ fn worse(
     }
     let mut families = Vec::new();
     for g in chosen {
-        let others: Vec<usize> = chosen.iter().copied().filter(|c| c != g).collect();
+        let others = without(chosen, &[*g]);
         if all > WORSE * power(&others)? {
             families.push(family(found.candidates[*g].as_ref()));
         }

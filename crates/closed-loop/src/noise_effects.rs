@@ -208,8 +208,7 @@ fn declared_outliers(situation: &Situation<'_>) -> Result<Option<[f64; 2]>, Clos
 /// Largest noise of a rate that nature makes, arcsec/(deg/s): of a spot that is smeared over the longest exposure any
 /// point, a uniform spread.
 fn most_rate(situation: &Situation<'_>, data: &StarData) -> f64 {
-    let step_s = median_step(&data.frames.t_s).unwrap_or(f64::INFINITY);
-    let longest_s = longest_exposure_s(step_s, situation.exposure_s());
+    let longest_s = longest_exposure_s(median_step(&data.frames.t_s), situation.exposure_s());
     3600.0 * longest_s / 12.0_f64.sqrt()
 }
 

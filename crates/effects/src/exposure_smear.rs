@@ -33,11 +33,11 @@ const TYPICAL_S: f64 = 0.1;
 /// Longest exposure of frames that are close to each other, s.
 const LONGEST_S: f64 = 2.0;
 
-/// Longest exposure that a tracker may have whose frames are `step_s` apart (infinite for one frame): 2 s, the
-/// step, or what is declared, s.
-pub fn longest_exposure_s(step_s: f64, declared_s: Option<f64>) -> f64 {
-    let step_s = if step_s.is_finite() { step_s } else { 0.0 };
-    step_s.max(LONGEST_S).max(declared_s.unwrap_or(0.0))
+/// Longest exposure that a tracker may have: 2 s, the time between its frames, where it has several, or what is
+/// declared, s.
+pub fn longest_exposure_s(between_s: Option<f64>, declared_s: Option<f64>) -> f64 {
+    let told = between_s.into_iter().chain(declared_s);
+    told.fold(LONGEST_S, f64::max)
 }
 
 /// The kind.
@@ -74,7 +74,7 @@ impl EffectKind for Kind {
             return Vec::new();
         }
         let about_s = scene.exposure_s.unwrap_or(TYPICAL_S);
-        let longest_s = longest_exposure_s(scene.step_s, scene.exposure_s);
+        let longest_s = longest_exposure_s(scene.between_s(), scene.exposure_s);
         vec![Box::new(SmearCandidate::about(about_s, longest_s))]
     }
 }

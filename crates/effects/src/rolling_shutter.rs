@@ -65,11 +65,8 @@ impl EffectKind for Kind {
         if !scene.has_stars {
             return Vec::new();
         }
-        let frame_s = if scene.step_s.is_finite() {
-            scene.step_s / f64::from(scene.surroundings.camera.pixels()[1])
-        } else {
-            0.0
-        };
+        let lines = f64::from(scene.surroundings.camera.pixels()[1]);
+        let frame_s = scene.between_s().map_or(0.0, |s| s / lines);
         let most_s = frame_s.clamp(MOST_S, LARGEST_S);
         vec![Box::new(ShutterCandidate::about(0.0, most_s))]
     }

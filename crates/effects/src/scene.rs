@@ -97,6 +97,11 @@ pub struct Scene<'a> {
 }
 
 impl Scene<'_> {
+    /// Time between frames, s; none of one frame.
+    pub(crate) fn between_s(&self) -> Option<f64> {
+        Some(self.step_s).filter(|s| s.is_finite())
+    }
+
     /// Whether a rotation of the whole tracker shows: against a reference only, because otherwise every
     /// frame's attitude is free.
     pub fn sees_misalignment(&self) -> bool {

@@ -61,11 +61,8 @@ impl EffectKind for Kind {
         if !(scene.has_stars || scene.has_attitude && scene.has_reference) {
             return Vec::new();
         }
-        let most_s = if scene.step_s.is_finite() {
-            MOST_S.max(MOST_FRAMES * scene.step_s)
-        } else {
-            MOST_S
-        };
+        let frames_s = scene.between_s().map_or(0.0, |s| MOST_FRAMES * s);
+        let most_s = MOST_S.max(frames_s);
         vec![Box::new(OffsetCandidate::about(0.0, most_s))]
     }
 }

@@ -40,12 +40,13 @@ use crate::error::CloseError;
 use crate::evidence::Evidence;
 use crate::figures;
 use crate::search::empirical::EMPIRICAL;
+use crate::search::group::open_beside;
 use crate::search::refusal::{Refusal, Refused};
 use crate::search::selection::{
     FAMILY_ALPHA, Judgement, SLOW_PRICE, Selection, WIDENING, columns_of, costs, price,
 };
 use crate::search::{
-    Fitted, Found, amplitudes, borrowed, family, first_column, fit, fit_design, polish,
+    Fitted, Found, amplitudes, borrowed, family, first_column, fit, fit_design, polish, without,
 };
 
 /// The effects that a change of stars looks like, and stars that come by again.
@@ -340,7 +341,7 @@ impl<'a, 'd> Trial<'a, 'd> {
         let mut ranked: Vec<usize> = (0..self.candidates.len())
             .filter(|g| !chosen.contains(g) && !banned[*g] && judged[*g].stands())
             .filter(|&g| self.candidates[g].id() != EMPIRICAL)
-            .filter(|&g| chosen.iter().all(|&c| !groups[c].excludes(&groups[g])))
+            .filter(|&g| open_beside(groups, chosen, g))
             .collect();
         ranked.sort_by(|&a, &b| score(b).total_cmp(&score(a)));
         ranked
@@ -379,7 +380,7 @@ impl<'a, 'd> Trial<'a, 'd> {
         if group.columns.is_empty() {
             return Judgement::UNSEEN;
         }
-        let others: Vec<usize> = chosen.iter().copied().filter(|&c| c != g).collect();
+        let others = without(chosen, &[g]);
         let mut set = others.clone();
         set.push(g);
         let scores = if others.len() == chosen.len() {
@@ -520,7 +521,7 @@ impl<'a, 'd> Trial<'a, 'd> {
             return false;
         };
         chosen.iter().all(|g| {
-            let others: Vec<usize> = chosen.iter().copied().filter(|c| c != g).collect();
+            let others = without(chosen, &[*g]);
             error(&others).is_some_and(|e| 0.5 * self.plain.scalars * (e / all).ln() > LITTLE)
         })
     }

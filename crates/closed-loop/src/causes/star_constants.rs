@@ -18,6 +18,7 @@
 //!
 //! Source: empirical Bayes by the largest likelihood of a variance (Efron and Morris 1973).
 
+use nalgebra::DVector;
 use telemetry::report::{Dependence, Unattributed};
 
 use crate::causes::commonness::IN_TIME;
@@ -48,6 +49,8 @@ const STAR: &str = "star";
 pub(crate) struct Constants<'a> {
     level: &'a StarEvidence<'a>,
     found: &'a Found,
+    /// Estimates of the chosen, in the order of their columns.
+    values: DVector<f64>,
     left: Left<'a>,
 }
 
@@ -68,6 +71,7 @@ impl<'a> Constants<'a> {
         Some(Self {
             level,
             found,
+            values,
             left: Left {
                 inside,
                 distortion: level.nuisance.distortion_of(&nuisance),
@@ -78,14 +82,10 @@ impl<'a> Constants<'a> {
     /// Places among the chosen of those that give stars constants, and what they do: what turns the camera does not, and
     /// of what acts on attitudes nothing is seen where the reference's noise turns every frame.
     fn shifting(&self) -> (Vec<usize>, Vec<Shift<'a>>) {
-        let groups = &self.found.fitted.groups;
         let chosen = &self.found.selection.chosen;
         let (mut places, mut shifts) = (Vec::new(), Vec::new());
-        let Some(estimate) = self.found.fitted.fits.estimate(&columns_of(groups, chosen)) else {
-            return (places, shifts);
-        };
         let restless = !self.level.data.free_attitude && means::turns_freely(self.level);
-        let mut values = estimate.value.iter().copied();
+        let mut values = self.values.iter().copied();
         for (place, &group) in chosen.iter().enumerate() {
             let candidate = self.found.candidates[group].as_ref();
             let columns = self.found.own_columns(group);

@@ -17,8 +17,8 @@ use telemetry::report::{FoundEffect, Selector, listed};
 
 use crate::figures::{amplitudes_of, most_alike};
 use crate::questions::manoeuvre::{Flown, Pair, recommend};
-use crate::search::Found;
 use crate::search::selection::columns_of;
+use crate::search::{Found, without};
 
 /// Pairs of effects: which effect, which of its confusable ones, and the columns of both among those
 /// of `candidates`.
@@ -48,7 +48,7 @@ pub(crate) fn compare<'a>(found: &'a Found, effects: &mut [FoundEffect]) -> Conf
     let mut width = 0;
     let mut firsts: Vec<usize> = Vec::new();
     for (k, (&g, effect)) in chosen.iter().zip(effects.iter_mut()).enumerate() {
-        let others: Vec<usize> = chosen.iter().copied().filter(|&c| c != g).collect();
+        let others = without(chosen, &[g]);
         let without = columns_of(&found.fitted.groups, &others);
         let base = fits.out_of_fold(&without).map(|o| o.total_loglik());
         let (amplitudes, _) = amplitudes_of(found, g, &set, &estimate);

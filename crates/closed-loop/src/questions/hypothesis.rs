@@ -23,7 +23,7 @@ use telemetry::report::{ConsideredEffect, FoundEffect, Hypothesis, HypothesisSiz
 use crate::error::CloseError;
 use crate::figures::told;
 use crate::search::selection::{FAMILY_ALPHA, columns_of};
-use crate::search::{Found, first_column};
+use crate::search::{Found, first_column, without};
 
 /// Sigmas that a size takes to be seen.
 const SEEN: f64 = 5.0;
@@ -172,25 +172,19 @@ impl Grounds<'_> {
             ..Hypothesis::default()
         };
         let fits = &found.fitted.fits;
-        let others: Vec<usize> = found
-            .selection
-            .chosen
-            .iter()
-            .copied()
-            .filter(|&c| c != g)
-            .collect();
-        let without = columns_of(&found.fitted.groups, &others);
-        let mut with = without.clone();
+        let others = without(&found.selection.chosen, &[g]);
+        let beside = columns_of(&found.fitted.groups, &others);
+        let mut with = beside.clone();
         with.extend(&found.fitted.groups[g].columns);
         let (Some(estimate), Some(e0), Some(e1), Some(variance)) = (
             fits.estimate(&with),
-            fits.error(&without),
+            fits.error(&beside),
             fits.error(&with),
             fits.variance(&with),
         ) else {
             return answer;
         };
-        let own = without.len();
+        let own = beside.len();
         let taken = (e0 - e1).max(0.0);
         let p = with.len() - own;
         let widening = (own..with.len())

@@ -47,6 +47,11 @@ impl Group {
     }
 }
 
+/// Whether group `g` may be chosen beside these.
+pub(crate) fn open_beside(groups: &[Group], chosen: &[usize], g: usize) -> bool {
+    chosen.iter().all(|&c| !groups[c].excludes(&groups[g]))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

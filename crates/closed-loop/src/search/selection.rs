@@ -42,8 +42,9 @@ use std::ops::Range;
 use block_regression::{Fits, OutOfFold};
 use rayon::prelude::*;
 
-use super::group::Group;
+use super::group::{Group, open_beside};
 use super::misplaced::{piled, stars_of};
+use super::without;
 
 /// Chance that a bundle which follows its model gets any effect at all.
 pub(crate) const FAMILY_ALPHA: f64 = 0.01;
@@ -203,7 +204,7 @@ impl Trials<'_> {
         let mut tried: Vec<Tried> = (0..groups.len())
             .into_par_iter()
             .filter(|&g| may[g] && !chosen.contains(&g))
-            .filter(|&g| chosen.iter().all(|&c| !groups[c].excludes(&groups[g])))
+            .filter(|&g| open_beside(groups, chosen, g))
             .filter_map(|g| {
                 // what gains nothing cannot stand, whatever its errors
                 let gain = self.gain(chosen, g, &base).filter(|gain| *gain > 0.0)?;
@@ -256,11 +257,11 @@ impl Trials<'_> {
         let family = |g: usize| groups[g].family.as_str();
         let mut swapped: Vec<Vec<usize>> = Vec::new();
         for (at, &g) in chosen.iter().enumerate() {
-            let others = chosen.iter().filter(|&&c| c != g);
-            let open = |c: usize| others.clone().all(|&o| !groups[o].excludes(&groups[c]));
+            let others = without(chosen, &[g]);
+            let form = |c: usize| c != g && family(c) == family(g);
             let forms = all
                 .iter()
-                .filter(|&&c| c != g && family(c) == family(g) && open(c));
+                .filter(|&&c| form(c) && open_beside(groups, &others, c));
             swapped.extend(forms.map(|&form| {
                 let mut set = chosen.to_vec();
                 set[at] = form;
@@ -272,7 +273,7 @@ impl Trials<'_> {
         let mut better: Vec<(f64, Vec<usize>)> = swapped
             .into_par_iter()
             .flat_map_iter(|set| {
-                let other = |h: &&usize| set.iter().all(|&c| !groups[c].excludes(&groups[**h]));
+                let other = |h: &&usize| open_beside(groups, &set, **h);
                 let more = all.iter().filter(other).map(|&h| [&set[..], &[h]].concat());
                 let sets = std::iter::once(set.clone()).chain(more);
                 let fits = sets.filter_map(|set| Some((self.fit(&set)?, set)));
@@ -302,13 +303,8 @@ impl Trials<'_> {
         let family = |g: usize| self.groups[g].family.as_str();
         let mut out = Vec::new();
         for &g in chosen {
-            let others: Vec<usize> = chosen.iter().copied().filter(|&c| c != g).collect();
-            let excluded = |h: usize| {
-                others
-                    .iter()
-                    .any(|&c| self.groups[c].excludes(&self.groups[h]))
-            };
-            let open = |h: &&usize| **h != g && !excluded(**h);
+            let others = without(chosen, &[g]);
+            let open = |h: &&usize| **h != g && open_beside(self.groups, &others, **h);
             let alone: Vec<(f64, usize)> = all
                 .par_iter()
                 .filter(open)
@@ -387,7 +383,7 @@ impl Trials<'_> {
 
     /// Standing of a group of `set` beside the others; `None` if these cannot be told apart.
     pub(crate) fn within(&self, set: &[usize], g: usize) -> Option<Judgement> {
-        let others: Vec<usize> = set.iter().copied().filter(|&c| c != g).collect();
+        let others = without(set, &[g]);
         let base = self.out_of_fold(&others)?;
         let gain = self.gain(&others, g, &base);
         let standing = gain.and_then(|gain| self.standing(&others, g, gain));

@@ -143,10 +143,11 @@ pub(crate) fn search(
     };
     out.bin_hz = 1.0 / (last - first);
     out.apart_s = NEAR_STEPS * median_step(&data.frames.t_s).unwrap_or(0.0);
+    let apart = LazyCell::new(|| Lines::of(&by_itself, *beside_rotation, last - first));
     let line_in = |series: &[Own]| {
         let lines = Lines::of(series, freedom, last - first)?;
         let (k, found) = lines.best(series)?;
-        let apart = Lines::of(&by_itself, *beside_rotation, last - first)?;
+        let apart = apart.as_ref()?;
         (k < apart.grid.bins && apart.at(k).0 < ALPHA_ALONE).then_some(found)
     };
     let step_in = |series: &[Own]| {
@@ -429,12 +430,16 @@ impl Own {
         Some(self.running.iter().map(square).sum())
     }
 
-    /// Squares that a sinusoid of this frequency takes of both axes, in units of the noise.
-    fn power_at(&self, f: f64) -> f64 {
+    /// A cosine and a sine of this frequency, at the points.
+    fn phasors(&self, f: f64) -> Vec<[f64; 2]> {
         let omega = std::f64::consts::TAU * f;
         let each = self.t_s.iter().map(|t| omega * (t - self.t_s[0]));
-        let at: Vec<[f64; 2]> = each.map(|phase| [phase.cos(), phase.sin()]).collect();
-        self.sums(&at).squares()
+        each.map(|phase| [phase.cos(), phase.sin()]).collect()
+    }
+
+    /// Squares that a sinusoid of this frequency takes of both axes, in units of the noise.
+    fn power_at(&self, f: f64) -> f64 {
+        self.sums(&self.phasors(f)).squares()
     }
 
     /// Sums of two functions of time, at the points.
@@ -470,12 +475,7 @@ impl Own {
     /// Squares that a sinusoid takes of both axes, in units of the noise, at the frequencies of
     /// `grid`. Phasors of all points are turned from one frequency to the next.
     fn powers(&self, grid: &Grid) -> Vec<f64> {
-        let phasor = |f: f64| -> Vec<[f64; 2]> {
-            let omega = std::f64::consts::TAU * f;
-            let each = self.t_s.iter().map(|t| omega * (t - self.t_s[0]));
-            each.map(|phase| [phase.cos(), phase.sin()]).collect()
-        };
-        let (mut at, by) = (phasor(grid.first_hz), phasor(grid.step_hz));
+        let (mut at, by) = (self.phasors(grid.first_hz), self.phasors(grid.step_hz));
         (0..grid.bins)
             .map(|_| {
                 let squares = self.sums(&at).squares();
