@@ -17,7 +17,7 @@ use comparison::Compared;
 use telemetry::Bundle;
 use telemetry::report::Verdict;
 
-use crate::text::sentence;
+use crate::verdict::sentence;
 use write::{Page, escaped};
 
 /// What a page is about.

@@ -15,6 +15,7 @@ mod order;
 mod scene_figures;
 mod set_aside;
 mod text;
+mod verdict;
 
 pub use assess_figures::assess_figures;
 pub use assess_text::assess_summary;

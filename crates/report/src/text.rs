@@ -4,11 +4,12 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use closed_loop::Closed;
-use telemetry::report::{Dependence, Errors, RefusedSize, Report, Selector, Verdict, listed};
+use telemetry::report::{Dependence, Errors, RefusedSize, Report, Selector, listed};
 
 use crate::number::number;
 use crate::order::by_number;
 use crate::set_aside;
+use crate::verdict::sentence;
 
 /// The findings of a run in words and numbers, some 20 lines of at most 100 columns.
 #[must_use]
@@ -29,25 +30,6 @@ pub fn summary(closed: &Closed) -> String {
 macro_rules! line {
     ($out:expr) => { $out.push('\n') };
     ($out:expr, $($arg:tt)*) => {{ let _ = writeln!($out, $($arg)*); }};
-}
-
-/// The verdict as a sentence.
-pub(crate) fn sentence(report: &Report) -> String {
-    let causes = report.effects.iter().filter(|e| e.id != "empirical");
-    let names: Vec<&str> = causes.map(|e| e.id.as_str()).collect();
-    match report.verdict {
-        Verdict::Consistent => {
-            "the data follows the declared model; nothing is left to explain".to_owned()
-        }
-        Verdict::Explained => format!("explained by {}; nothing is left", names.join(" + ")),
-        Verdict::PartlyExplained => format!(
-            "partly explained by {}; something is left",
-            names.join(" + ")
-        ),
-        Verdict::Unexplained => {
-            "something is left that no effect of the catalogue explains".to_owned()
-        }
-    }
 }
 
 fn verdict(out: &mut String, closed: &Closed) {
@@ -366,7 +348,7 @@ mod tests {
     fn report() -> Report {
         Report {
             format: REPORT_FORMAT.to_owned(),
-            verdict: Verdict::Unexplained,
+            verdict: telemetry::report::Verdict::Unexplained,
             folds: 5,
             rows: Rows {
                 used: 100,
