@@ -8,21 +8,21 @@
 mod bound;
 mod error;
 mod floor;
-mod nulls;
 mod page;
 mod residual;
 mod run;
 mod score;
 mod settings;
+mod simulated;
 mod tally;
 mod trial;
 
 pub use bound::bounds;
 pub use error::BlindError;
 pub use floor::Floor;
-pub use nulls::nulls;
 pub use page::{differences, first, page};
 pub use run::{Done, Plan, run};
 pub use score::{Claim, Drawn, Score, score};
+pub use simulated::simulated;
 pub use tally::{ParameterRow, Tally};
 pub use trial::{Trial, worlds};

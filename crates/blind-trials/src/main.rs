@@ -15,14 +15,14 @@ use std::path::Path;
 use std::process::ExitCode;
 
 use blind_trials::{
-    BlindError, Plan, Tally, Trial, bounds, differences, first, nulls, page, run, worlds,
+    BlindError, Plan, Tally, Trial, bounds, differences, first, page, run, simulated, worlds,
 };
 
 /// Seeds of a trial where nobody says.
 const SEEDS: u64 = 12;
 const USAGE: &str = "usage: blind-trials [--seeds N] [--jobs J] [--only NAME]... [--each] [--keep FOLDER] [--check] WORLDS PAGE\n\n  \
     --seeds N    bundles of each world, 12 where left out; a quarter of them where windows are sent, four times\n               \
-    as many of simulated nulls\n  \
+    as many of simulated ones\n  \
     --jobs J     threads; all that there are where left out\n  \
     --only NAME  this world alone; its page is printed, none is written\n  \
     --each       prints what every single report says, too\n  \
@@ -79,7 +79,7 @@ fn go(arguments: &Arguments) -> Result<bool, String> {
     let said = |e: BlindError| e.to_string();
     let [folder, file] = [0, 1].map(|k| arguments.places[k].as_str());
     let mut trials = worlds(Path::new(folder)).map_err(said)?;
-    trials.extend(nulls().map_err(said)?);
+    trials.extend(simulated().map_err(said)?);
     let trials = chosen(trials, &arguments.only).map_err(said)?;
     let seeds = if arguments.check {
         1

@@ -22,7 +22,11 @@ pub fn page(trials: &[Trial], done: &[Done], tallies: &[Tally], command: &str) -
             .collect()
     };
     let acts = |t: &Trial| !t.truth.effect.is_empty() && t.truth.outside.is_empty();
-    let (pixel_nulls, model_nulls) = (of(|t| is_null(t) && !is_model(t)), of(is_model));
+    let (pixel_nulls, model_nulls) = (
+        of(|t| is_null(t) && !is_model(t)),
+        of(|t| is_model(t) && !has_size(t)),
+    );
+    let distorted = of(|t| is_model(t) && has_size(t));
     let known: Vec<_> = all
         .iter()
         .copied()
@@ -36,7 +40,13 @@ pub fn page(trials: &[Trial], done: &[Done], tallies: &[Tally], command: &str) -
          the loop is given the bundle and the model alone. Nothing here is tuned, and no seed is left out. \
          How the counts are made stands at the end.\n\n"
     );
-    text.push_str(&summary(&pixel_nulls, &model_nulls, &known, &outside));
+    text.push_str(&summary(
+        &pixel_nulls,
+        &model_nulls,
+        &known,
+        &distorted,
+        &outside,
+    ));
     text.push_str("## Nothing acts\n\nWritten: effects found that do not act, and how often. The design rate is 1 %.\n\n");
     text.push_str("| bundles | of them with a false effect | which | left over although nothing is | c/e/p/u |\n|---|---|---|---|---|\n");
     for (trial, tally) in pixel_nulls.iter().chain(&model_nulls) {
@@ -54,24 +64,11 @@ pub fn page(trials: &[Trial], done: &[Done], tallies: &[Tally], command: &str) -
             verdicts(tally)
         ));
     }
-    text.push_str(
-        "\n## Effects of the catalogue act\n\n\
-         | world | bundles | right one first | all found | these and no other | others named | a value off by 5σ | c/e/p/u | before, after over floor |\n\
-         |---|---|---|---|---|---|---|---|---|\n",
-    );
-    for (trial, tally) in &known {
-        text.push_str(&format!(
-            "| `{}` | {} | {} | {} | {} | {} | {} | {} | {} |\n",
-            trial.name,
-            tally.runs,
-            tally.first,
-            tally.all,
-            tally.exact,
-            counted(&tally.extra),
-            tally.off,
-            verdicts(tally),
-            over(tally)
-        ));
+    text.push_str("\n## Effects of the catalogue act\n\n");
+    text.push_str(&effects(&known));
+    if !distorted.is_empty() {
+        text.push_str("\n## Effects act beside a declared distortion\n\n");
+        text.push_str(&effects(&distorted));
     }
     text.push_str(
         "\n## Something acts that is in no catalogue\n\n\
@@ -95,7 +92,7 @@ pub fn page(trials: &[Trial], done: &[Done], tallies: &[Tally], command: &str) -
          | world | parameter | unit | truth | in | mean | scatter | bound | scatter/bound | rms z |\n\
          |---|---|---|---|---|---|---|---|---|---|\n",
     );
-    for (trial, tally) in &known {
+    for (trial, tally) in known.iter().chain(&distorted) {
         for row in &tally.parameters {
             let ratio = row.bound.map(|bound| row.scatter / bound);
             text.push_str(&format!(
@@ -129,13 +126,42 @@ pub fn page(trials: &[Trial], done: &[Done], tallies: &[Tally], command: &str) -
 const HOW: &str = "\n## How the counts are made\n\n\
 - **c/e/p/u**: verdicts *consistent*, *explained*, *partly explained*, *unexplained*.\n\
 - **Right**: the id, and every selector of the truth (channel, star). Each effect that acts answers for one found; a second of its kind counts among others. In pairs either may be first.\n\
-- **Seeds**: a new detector, new noise and, where it is random, a new motion each. Worlds with windows, on which the loop takes twenty times as long, have a quarter of the seeds, at least one; simulated nulls have four times as many. The same seed of `model_hold_*` or of `model_slews_*` has the same noise of the stars, so that one alarm is often seen in several.\n\
+- **Seeds**: a new detector, new noise and, where it is random, a new motion each. Worlds with windows, on which the loop takes twenty times as long, have a quarter of the seeds, at least one; simulated bundles have four times as many. The same seed of `model_hold_*` or of `model_slews_*` has the same noise of the stars, so that one alarm is often seen in several.\n\
 - **A value off by 5σ**: |estimate − truth| over the σ that the report gives, of parameters that the world's truth names. **rms z** is the root mean square of the same ratio: 1 if the σ's are honest, with a scatter of 1/√(2n). An instant has an interval in place of a σ: it holds the truth or not. Effects near the limit are found where noise helps them, so that those few found are too large.\n\
 - **scatter**: rms of estimate − truth over the bundles in which it was found. In all: the root mean square of its ratio to the bound, of those parameters that have one, and 1/√(2n).\n\
 - **bound**: Cramér–Rao, from differences of runs rendered without noise with the instrument's setting ± 10 %, the noise of each star's centroids and the reference's declared white error, for somebody who knows which effects act and estimates the truth's parameters and a constant misalignment (`crates/blind-trials/src/bound.rs::bounds`). It shares no regressor with the loop. A loop that also fits what is 0 (a third axis, k2, the decentring) must lie above it; an instant, a frequency or a pixel has none.\n\
 - **floor**: what perfect knowledge of everything but the noise leaves: the same bundle less the same run rendered without noise, less a constant misalignment (without a reference: less every frame's own rotation), over the rows in the loop's own figures. *After over floor* should be 0 within 2 %. Where positions are fitted to windows it may be below: such a fit has less noise than the centroids.\n\
 - **honest**: something is left, its first variable is one that the truth allows, and nothing is named that does not act.\n\
-- **Simulated nulls** (`model_*`): the tracker of the papers with all its declared errors, by the physics-based model; the declared temporal noise is 0.8 or 1.2 of the true one, or the reference has 0.5″ of white error or wanders by 0.5″ with 60 s; where it wanders, `reference_error` is right.\n";
+- **Simulated nulls** (`model_*`): the tracker of the papers with all its declared errors, by the physics-based model; the declared temporal noise is 0.8 or 1.2 of the true one, or the reference has 0.5″ of white error or wanders by 0.5″ with 60 s; where it wanders, `reference_error` is right.\n\
+- **Beside a declared distortion** (`distorted_*`): the same tracker, each seed with a distortion of its own by the declared law; acts what a distortion imitates, at some six to ten standard errors, most of which the distortion makes. The effect itself is simulated by the same formulas as it is sought with; what is tried is the law of what is declared, on which every σ hangs here.\n";
+
+/// One row a world of what was found where effects act.
+fn effects(rows: &Rows<'_>) -> String {
+    let mut text = String::from(
+        "| world | bundles | right one first | all found | these and no other | others named | a value off by 5σ | c/e/p/u | before, after over floor |\n\
+         |---|---|---|---|---|---|---|---|---|\n",
+    );
+    for (trial, tally) in rows {
+        text.push_str(&format!(
+            "| `{}` | {} | {} | {} | {} | {} | {} | {} | {} |\n",
+            trial.name,
+            tally.runs,
+            tally.first,
+            tally.all,
+            tally.exact,
+            counted(&tally.extra),
+            tally.off,
+            verdicts(tally),
+            over(tally)
+        ));
+    }
+    text
+}
+
+/// Whether an effect of a known size acts.
+fn has_size(trial: &Trial) -> bool {
+    trial.truth.effect.iter().any(|e| !e.values.is_empty())
+}
 
 fn is_model(trial: &Trial) -> bool {
     trial.world().is_none()
@@ -147,7 +173,13 @@ fn is_null(trial: &Trial) -> bool {
 
 type Rows<'a> = [(&'a Trial, &'a Tally)];
 
-fn summary(pixel: &Rows<'_>, model: &Rows<'_>, known: &Rows<'_>, outside: &Rows<'_>) -> String {
+fn summary(
+    pixel: &Rows<'_>,
+    model: &Rows<'_>,
+    known: &Rows<'_>,
+    distorted: &Rows<'_>,
+    outside: &Rows<'_>,
+) -> String {
     let sum = |rows: &Rows<'_>, of: &dyn Fn(&Tally) -> usize| -> usize {
         rows.iter().map(|(_, tally)| of(tally)).sum()
     };
@@ -188,15 +220,13 @@ fn summary(pixel: &Rows<'_>, model: &Rows<'_>, known: &Rows<'_>, outside: &Rows<
             share(sum(&rows, &|t| t.exact), n),
         );
     }
+    let rms_z = |rows: &Rows<'_>| {
+        let sum = |(s, n), (_, t): &(_, &Tally)| (s + t.z.0, n + t.z.1);
+        let (squares, n) = rows.iter().fold((0.0, 0), sum);
+        format!("{} ({n} values)", fixed((squares / n as f64).sqrt()))
+    };
     if !known.is_empty() {
-        let (squares, n) = known
-            .iter()
-            .fold((0.0, 0), |(s, n), (_, t)| (s + t.z.0, n + t.z.1));
-        let z = (squares / n as f64).sqrt();
-        line(
-            "rms z of all parameters",
-            format!("{} ({n} values)", fixed(z)),
-        );
+        line("rms z of all parameters", rms_z(known));
         let bounded = known.iter().flat_map(|(_, t)| &t.parameters);
         let (squares, n) = bounded
             .filter_map(|row| Some((row.count as f64, row.scatter / row.bound?)))
@@ -221,6 +251,18 @@ fn summary(pixel: &Rows<'_>, model: &Rows<'_>, known: &Rows<'_>, outside: &Rows<
             "after within 2 % of perfect knowledge",
             share(within[0], within[1]),
         );
+    }
+    if !distorted.is_empty() {
+        let n = sum(distorted, &|t| t.runs);
+        line(
+            "beside a declared distortion: the right one first",
+            share(sum(distorted, &|t| t.first), n),
+        );
+        line(
+            "beside a declared distortion: it and no other named",
+            share(sum(distorted, &|t| t.exact), n),
+        );
+        line("beside a declared distortion: rms z", rms_z(distorted));
     }
     if !outside.is_empty() {
         let n = sum(outside, &|t| t.runs);
@@ -354,7 +396,8 @@ fn number(value: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Claim, nulls};
+    use crate::Claim;
+    use crate::simulated::nulls;
     use imager::Acting;
     use telemetry::report::Verdict;
 
@@ -447,6 +490,28 @@ mod tests {
             "{changed:?}"
         );
         assert_eq!(differences("", &trials, &done).len(), 2);
+    }
+
+    /// Effects beside a declared distortion are counted by themselves, not among the rendered worlds or the nulls.
+    #[test]
+    fn effects_beside_a_distortion_have_a_section() {
+        let mut trials = crate::simulated().unwrap();
+        trials.retain(|t| t.name == "distorted_scan_rolling_shutter");
+        let right = scored(
+            Verdict::Explained,
+            &[("rolling_shutter", Some(0))],
+            vec![true],
+        );
+        let done = vec![vec![right]];
+        let tally = Tally::of(&trials[0], &done[0], &BTreeMap::new());
+        let text = page(&trials, &done, &[tally], "make it");
+        for line in [
+            "| beside a declared distortion: the right one first | 1 of 1 (100 %) |",
+            "| `distorted_scan_rolling_shutter` | 1 | 1 | 1 | 1 | – | 0 | 0/1/0/0 | +10.00 %, +0.00 % |",
+        ] {
+            assert_eq!(text.matches(line).count(), 1, "{line}: {text}");
+        }
+        assert!(!text.contains("simulated nulls |") && !text.contains("one effect"));
     }
 
     /// A right effect in a rendered world stands in the tables of effects and parameters.

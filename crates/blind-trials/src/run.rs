@@ -19,7 +19,7 @@ use crate::{BlindError, Floor, Score, Trial, score};
 /// How much is done.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Plan<'a> {
-    /// Seeds of a trial; one with windows has a quarter, at least one, and a simulated null four times as
+    /// Seeds of a trial; one with windows has a quarter, at least one, and a simulated one four times as
     /// many: what happens once in a hundred has to be counted.
     pub seeds: u64,
     /// Threads.

@@ -159,7 +159,8 @@ pub(crate) fn at_least(k: usize, n: usize, p: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Claim, Drawn, nulls};
+    use crate::simulated::nulls;
+    use crate::{Claim, Drawn};
     use imager::Acting;
 
     fn a_score() -> Score {

@@ -1,4 +1,4 @@
-//! Where bundles come from: the world files, and simulated nulls.
+//! Where bundles come from: the world files, and simulations.
 //!
 //! Not physics: reading files.
 
