@@ -481,20 +481,21 @@ pub(crate) fn best_empirical(
     unattributed: &Unattributed,
     surroundings: &Surroundings<'_>,
 ) -> Option<usize> {
-    unattributed
-        .depends_on
-        .iter()
-        .filter(|d| certain(d))
-        .find_map(|d| {
-            let g = (0..found.candidates.len()).find(|&g| {
-                let candidate = found.candidates[g].as_ref();
-                candidate.id() == EMPIRICAL
-                    && candidate.selectors().get("variable") == Some(&d.variable)
-            })?;
-            let candidate = found.candidates[g].as_ref();
-            let one = vec![1.0; candidate.coefficients().len()];
-            candidate.realise(&one, surroundings).is_ok().then_some(g)
-        })
+    let certain = unattributed.depends_on.iter().filter(|d| certain(d));
+    certain.filter_map(|d| term_of(found, d)).find(|&g| {
+        let candidate = found.candidates[g].as_ref();
+        let one = vec![1.0; candidate.coefficients().len()];
+        candidate.realise(&one, surroundings).is_ok()
+    })
+}
+
+/// The term of `found` in that variable.
+pub(crate) fn term_of(found: &Found, dependence: &Dependence) -> Option<usize> {
+    (0..found.candidates.len()).find(|&g| {
+        let candidate = found.candidates[g].as_ref();
+        candidate.id() == EMPIRICAL
+            && candidate.selectors().get("variable") == Some(&dependence.variable)
+    })
 }
 
 /// The finding in one word; empirical terms never count as explanation.

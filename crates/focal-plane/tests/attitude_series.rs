@@ -70,7 +70,13 @@ fn largest_errors(series: &AttitudeSeries) -> [f64; 2] {
 
 /// Halving the step divides the error by 2^order, up to the next order: at steps of 0.1 to 0.4 s
 /// and frequencies near 1 rad/s its relative size is below (omega h) = 0.4, worth 0.3 in the order.
-fn assert_orders(with_rates: bool, of_attitude: f64, of_rate: f64) -> Result<(), AttitudeError> {
+/// `ends`: what a slope at an end, of an order more but a larger factor, may add where it still outweighs the rest.
+fn assert_orders(
+    with_rates: bool,
+    of_attitude: f64,
+    of_rate: f64,
+    ends: f64,
+) -> Result<(), AttitudeError> {
     let errors = [30, 60, 120]
         .map(|steps| sampled(grid(steps), with_rates).map(|series| largest_errors(&series)));
     let [coarse, middle, fine] = errors;
@@ -79,7 +85,7 @@ fn assert_orders(with_rates: bool, of_attitude: f64, of_rate: f64) -> Result<(),
         for (k, order) in [of_attitude, of_rate].into_iter().enumerate() {
             let got = (big[k] / small[k]).log2();
             assert!(
-                (got - order).abs() < 0.3,
+                got > order - 0.3 && got < order + ends + 0.3,
                 "order {got}, theory {order}: {big:?} {small:?}"
             );
         }
@@ -89,12 +95,12 @@ fn assert_orders(with_rates: bool, of_attitude: f64, of_rate: f64) -> Result<(),
 
 #[test]
 fn error_falls_as_h4_with_rates() -> Result<(), AttitudeError> {
-    assert_orders(true, 4.0, 3.0)
+    assert_orders(true, 4.0, 3.0, 0.0)
 }
 
 #[test]
-fn error_falls_as_h3_with_slopes_from_neighbours() -> Result<(), AttitudeError> {
-    assert_orders(false, 3.0, 2.0)
+fn error_falls_as_h4_with_slopes_from_neighbours() -> Result<(), AttitudeError> {
+    assert_orders(false, 4.0, 3.0, 1.0)
 }
 
 /// About one axis the rotation vector is a scalar, and the error of a cubic Hermite is at most
@@ -128,9 +134,9 @@ fn one_axis_meets_the_bound_of_hermite_interpolation() -> Result<(), AttitudeErr
 }
 
 /// The slope at zero of the polynomial through zero and n points at `t_k` errs by
-/// `f^(n+1)/(n+1)! prod(-t_k)`: by `h^4/30 f^(5)` between two neighbours on each side, by `h^3/12 f^(4)` next
-/// to an end, and at the ends themselves, where a parabola is one-sided, by `-h^2/3 f'''`. Next order: below
-/// `w h` of it.
+/// `f^(n+1)/(n+1)! prod(-t_k)`: of four neighbours by `h^4/30 f^(5)` with two on each side, by `-h^4/20 f^(5)` with
+/// one before and three behind, and at the ends themselves, where all lie on one side, by `h^4/5 f^(5)`. Next order:
+/// below `w h` of it, and next to and at an end, where the neighbours reach three and four steps, below `4 w h`.
 #[test]
 fn rates_from_neighbours_have_the_error_of_their_polynomial() -> Result<(), AttitudeError> {
     let (w, h) = (0.48_f64, 0.5_f64);
@@ -139,19 +145,17 @@ fn rates_from_neighbours_have_the_error_of_their_polynomial() -> Result<(), Atti
     let series = AttitudeSeries::new(t_s.clone(), t_s.iter().map(|&t| truth(t)).collect(), None)?;
     for (k, &t) in t_s.iter().enumerate() {
         let got = series.rate_rad_s(t).unwrap_or_default();
-        let (sin, cos) = (w * t).sin_cos();
-        let (size, off) = match k.min(8 - k) {
-            0 => (h.powi(2) * w.powi(3) / 3.0, -cos),
-            // mirrored at the other end
-            1 => (
-                h.powi(3) * w.powi(4) / 12.0,
-                if k == 1 { sin } else { -sin },
-            ),
-            _ => (h.powi(4) * w.powi(5) / 30.0, cos),
+        let cos = (w * t).cos();
+        let (share, next) = match k.min(8 - k) {
+            0 => (1.0 / 5.0, 4.0),
+            1 => (-1.0 / 20.0, 4.0),
+            _ => (1.0 / 30.0, 1.0),
         };
-        let expected = 1e-3 * (-w * cos + size * off);
+        let size = 1e-3 * h.powi(4) * w.powi(5);
+        // the fifth derivative of a sine is w^5 cos, and the rate is minus the slope
+        let expected = -1e-3 * w * cos + share * size * cos;
         assert!(
-            (got.y - expected).abs() < 1e-3 * w * h * size,
+            (got.y - expected).abs() < next * w * h * share.abs() * size,
             "at {t}: {} against {expected}",
             got.y
         );

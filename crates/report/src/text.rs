@@ -304,7 +304,7 @@ fn leftover(out: &mut String, report: &Report) {
         return;
     }
     let noise = &left.noise_depends_on;
-    if !left.depends_on.is_empty() && left.depends_on != *noise {
+    if left.depends_on.iter().any(is_certain) && left.depends_on != *noise {
         line!(
             out,
             "What is left follows (share of its variance, out of fold):"
@@ -328,8 +328,13 @@ fn leftover(out: &mut String, report: &Report) {
     }
 }
 
+/// Whether that is beyond chance: where nothing is, what comes nearest is listed in the report.
+pub(crate) fn is_certain(d: &Dependence) -> bool {
+    d.p_value < 0.01 && d.variance_explained > 0.0
+}
+
 fn follows(out: &mut String, list: &[Dependence]) {
-    for d in list.iter().filter(|d| d.variance_explained > 0.0).take(5) {
+    for d in list.iter().filter(|d| is_certain(d)).take(5) {
         line!(
             out,
             "  {:<34} {:>6.1} %   p = {:.1e}",

@@ -61,7 +61,9 @@ pub use error::SpectraError;
 pub use gaps::{continuous_runs, finite_runs, whole};
 pub use lines::{Line, f_test_ln_p};
 pub use log_chi::{log_bias, log_variance};
-pub use lomb_scargle::{LombScargle, LombScargleScratch, LombScargleSettings, mean_rate_hz};
+pub use lomb_scargle::{
+    LombScargle, LombScargleScratch, LombScargleSettings, is_on_a_grid, mean_rate_hz,
+};
 pub use multitaper::{Multitaper, MultitaperScratch, MultitaperSettings, TaperWeights};
 pub use psd::Psd;
 pub use slepian::Slepian;

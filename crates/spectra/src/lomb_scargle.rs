@@ -27,6 +27,13 @@ mod chirp;
 
 use chirp::{Chirp, ChirpScratch, Regular};
 
+/// Whether samples at these times, s, are those of a regular grid with holes, one place in eight taken at least:
+/// then a spectrum takes (N + M) ln(N + M).
+#[must_use]
+pub fn is_on_a_grid(t_s: &[f64]) -> bool {
+    Regular::of(t_s).is_some()
+}
+
 /// What a plan is made of.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LombScargleSettings {

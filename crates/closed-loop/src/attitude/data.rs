@@ -16,6 +16,7 @@ use coloured_noise::Coloured;
 use effects::{AttitudeRows, Candidate};
 use focal_plane::{ARCSEC_PER_RAD, AttitudeResidual, AttitudeSeries, AttitudeSource, VectorsMut};
 use nalgebra::{DMatrix, DVector, UnitQuaternion, Vector3};
+use spectra::robust::median_step;
 
 use crate::bins::{Bins, MOST};
 use crate::evidence::{Amplitudes, Evidence, Residuals};
@@ -92,6 +93,14 @@ impl AttitudeData {
                 .map(|rows| kept(rows) as f64)
                 .collect()
         });
+    }
+
+    /// How many bins there are at most where a line at this frequency survives the means.
+    pub(crate) fn bins_for(&self, frequency_hz: f64) -> usize {
+        let step = median_step(&self.t_s).unwrap_or(f64::INFINITY);
+        // a little finer than the Nyquist frequency
+        let rows = (0.45 / (frequency_hz * step)).floor().max(1.0);
+        (self.t_s.len() as f64 / rows).ceil() as usize
     }
 
     /// Means over the bins of one axis of a series of rows; 0 where nothing counts.

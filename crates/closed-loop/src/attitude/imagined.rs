@@ -29,8 +29,13 @@ use star_tracker::{Purpose, stream};
 
 /// Skies and fields.
 const DRAWS: u64 = 48;
-/// Most frames that are gone through: a part of a longer run is as good as the whole.
+/// Most frames that are gone through. Of a longer run every few for slow lines; for fast ones all of some stretches,
+/// of which that counts in which the line is largest, for the motion may come late and go early.
 const MOST_FRAMES: usize = 6_000;
+/// Those stretches.
+const STRETCHES: usize = 6;
+/// Cycles between frames above which a line is fast.
+const FAST: f64 = 0.25;
 /// Stars at the edge of the field are faster than those in the middle by some hundredths, and each has its line:
 /// points to both sides, and what share of a frequency they are apart at least.
 const NEAR: i32 = 4;
@@ -54,13 +59,21 @@ pub(crate) struct Imagined {
     /// Times of the frames, and the turn to each from the one before, rad, tracker axes.
     pub(crate) t_s: Vec<f64>,
     pub(crate) turn: Vec<Vector3<f64>>,
-    /// Drawn when it is asked for: the first frames, and some of all.
-    pub(crate) drawn: OnceLock<Vec<Errors>>,
+    /// Drawn when it is asked for: frames evenly over all, all frames of some stretches, and means over all.
+    pub(crate) even: OnceLock<Vec<Stretch>>,
+    pub(crate) stretches: OnceLock<Vec<Stretch>>,
     pub(crate) sampled: OnceLock<Vec<Errors>>,
 }
 
 /// Errors of one sky and field, arcsec per axis, frame by frame.
 pub(crate) type Errors = [Vec<f64>; 3];
+
+/// Errors of all skies and fields at some times.
+#[derive(Debug)]
+pub(crate) struct Stretch {
+    t_s: Vec<f64>,
+    drawn: Vec<Errors>,
+}
 
 impl Imagined {
     /// Whether a line at `f`, Hz, of this amplitude about an axis, arcsec, is more than the declared model and noise
@@ -77,33 +90,39 @@ impl Imagined {
 
     /// a(f) about an axis, arcsec.
     fn line_arcsec(&self, f: f64, axis: usize) -> f64 {
-        let drawn = self.drawn.get_or_init(|| {
-            let frames = self.turn.len().min(MOST_FRAMES);
-            self.all(&self.turn[..frames], Place::Heap)
-        });
-        let frames = self.t_s.len().min(MOST_FRAMES);
-        let waves: Vec<[f64; 3]> = self.t_s[..frames]
+        let stride = self.turn.len().div_ceil(MOST_FRAMES).max(1);
+        let step = self.span_s() / self.turn.len().max(1) as f64;
+        let among = if stride == 1 || f * step * (stride as f64) < FAST {
+            self.even.get_or_init(|| vec![self.every(stride)])
+        } else {
+            self.stretches.get_or_init(|| self.in_stretches())
+        };
+        among
             .iter()
-            .map(|t| {
-                let (sin, cos) = (TAU * f * (t - self.t_s[0])).sin_cos();
-                [1.0, cos, sin]
+            .map(|stretch| stretch.line_arcsec(f, axis))
+            .fold(0.0, f64::max)
+    }
+
+    /// Every frame of so many.
+    fn every(&self, stride: usize) -> Stretch {
+        let turn: Vec<Vector3<f64>> = (self.turn.chunks(stride).map(|c| c.iter().sum())).collect();
+        let last = |c: &[f64]| c.last().copied();
+        Stretch {
+            t_s: self.t_s.chunks(stride).filter_map(last).collect(),
+            drawn: self.all(&turn, Place::Heap),
+        }
+    }
+
+    /// All frames of some stretches, evenly from the first to the last.
+    fn in_stretches(&self) -> Vec<Stretch> {
+        let frames = (MOST_FRAMES / STRETCHES).min(self.turn.len());
+        let starts = (0..STRETCHES).map(|k| k * (self.turn.len() - frames) / (STRETCHES - 1));
+        starts
+            .map(|start| Stretch {
+                t_s: self.t_s[start..start + frames].to_vec(),
+                drawn: self.all(&self.turn[start..start + frames], Place::Heap),
             })
-            .collect();
-        let normal: Matrix3<f64> = waves
-            .iter()
-            .map(|w| Vector3::from(*w) * Vector3::from(*w).transpose())
-            .sum();
-        let Some(inverse) = normal.try_inverse() else {
-            return 0.0;
-        };
-        let square = |theta: &Errors| -> f64 {
-            let all = waves.iter().zip(&theta[axis]);
-            let score: Vector3<f64> = all.map(|(w, v)| Vector3::from(*w) * *v).sum();
-            let size = inverse * score;
-            size.y * size.y + size.z * size.z
-        };
-        let n = drawn.len().max(1) as f64;
-        (drawn.iter().map(square).sum::<f64>() / n).sqrt()
+            .collect()
     }
 
     /// Means of the errors of every draw over bins of frames. In a long run, over some frames of each.
@@ -185,6 +204,32 @@ impl Imagined {
     }
 }
 
+impl Stretch {
+    /// a(f) about an axis, arcsec.
+    fn line_arcsec(&self, f: f64, axis: usize) -> f64 {
+        let wave = |t: &f64| {
+            let (sin, cos) = (TAU * f * (t - self.t_s[0])).sin_cos();
+            [1.0, cos, sin]
+        };
+        let waves: Vec<[f64; 3]> = self.t_s.iter().map(wave).collect();
+        let normal: Matrix3<f64> = waves
+            .iter()
+            .map(|w| Vector3::from(*w) * Vector3::from(*w).transpose())
+            .sum();
+        let Some(inverse) = normal.try_inverse() else {
+            return 0.0;
+        };
+        let square = |theta: &Errors| -> f64 {
+            let all = waves.iter().zip(&theta[axis]);
+            let score: Vector3<f64> = all.map(|(w, v)| Vector3::from(*w) * *v).sum();
+            let size = inverse * score;
+            size.y * size.y + size.z * size.z
+        };
+        let n = self.drawn.len().max(1) as f64;
+        (self.drawn.iter().map(square).sum::<f64>() / n).sqrt()
+    }
+}
+
 /// Where in the field stars stand.
 #[derive(Clone, Copy, Debug)]
 enum Place {
@@ -216,7 +261,8 @@ pub(super) mod tests {
             centroid: CentroidError::Triangle(centroid::Triangle::from_peak(peak_arcsec)),
             turn: std::iter::once(Vector3::zeros()).chain(turn).collect(),
             t_s,
-            drawn: OnceLock::new(),
+            even: OnceLock::new(),
+            stretches: OnceLock::new(),
             sampled: OnceLock::new(),
         }
     }

@@ -7,6 +7,7 @@ use std::sync::Arc;
 use block_regression::Folds;
 use coloured_noise::{Coloured, Foreknown};
 use effects::{Candidate, Scene};
+use focal_plane::AttitudeSource as _;
 
 use crate::attitude::data::{AttitudeData, AttitudeEvidence};
 use crate::attitude::declared_effects;
@@ -50,6 +51,8 @@ const WIDER: f64 = 2.0;
 /// Share of runs in which chance makes a line as likely as the least that is worth a search with it: that holds it
 /// against more of the noise, pays for all frequencies, and costs little.
 const LIKELY: f64 = 0.5;
+/// Most bins of a search with a fast line; one that needs more is described.
+const FINEST: usize = 20_000;
 /// Fewest frames from which an effect and its noise can both be had.
 const MIN_FRAMES: usize = 20;
 
@@ -124,6 +127,7 @@ pub(crate) fn run(
         (found, noise, refused, series, _) = search(&data, motion, &[])?;
     }
     let line = series.as_ref().and_then(|s| s.shared_line(LIKELY));
+    let line = line.filter(|line| data.bins_for(line.frequency_hz) <= FINEST);
     let jump = series.as_ref().and_then(Series::shared_jump);
     let mut put_forward: Vec<_> = line
         .map(|line| line.candidate(&scene))
@@ -141,7 +145,8 @@ pub(crate) fn run(
     if !put_forward.is_empty() {
         progress("searching again with the line, jump or orbit that is left");
         if line.is_some_and(|line| !data.bins.resolve(line.frequency_hz)) {
-            data.rebin(&folds, leftover::MOST_POINTS);
+            let fine = line.map_or(0, |line| data.bins_for(line.frequency_hz));
+            data.rebin(&folds, fine.max(leftover::MOST_POINTS));
         }
         let again = search(&data, motion, &put_forward)?;
         let rivals = search::rivals(
@@ -448,18 +453,62 @@ fn column_lengths(evidence: &AttitudeEvidence<'_>, found: &Found) -> Vec<f64> {
         .collect()
 }
 
-/// Squared residual beyond the white noise of each axis, arcsec^2.
+/// Squared residual beyond the white noise of the axes on which it stands out of that, arcsec^2. Each by itself:
+/// the noise about the boresight would hide what the others hold.
 fn beyond_white(data: &AttitudeData, residual: &Residuals) -> Option<f64> {
     let noise = fit_noise(data, residual);
-    let (mut excess, mut scatter) = (0.0, 0.0);
+    let mut whole = None;
     for axis in 0..3 {
         let rows: f64 = data.count[axis].iter().sum();
         let white = noise[axis].white * noise[axis].white;
         let square = figures::rms(&residual.axes[axis], &data.outlier[axis])?.powi(2);
-        excess += (rows * (square - white)).max(0.0);
-        scatter += rows * white * white;
+        if let Some(excess) = hypothesis::beyond(rows * (square - white), white, rows) {
+            *whole.get_or_insert(0.0) += excess;
+        }
     }
-    hypothesis::beyond(excess, scatter.sqrt(), 1.0)
+    whole
+}
+
+/// Tells what the variables that the leftover follows explain of it in arcsec^2, each axis by its own: no more than
+/// `own` by the square, arcsec, about any axis is what the declared model makes, and not left over. `left`: share of
+/// the before variance that is left.
+fn by_axes(
+    data: &AttitudeData,
+    found: &Found,
+    plain: &Residuals,
+    with: &dyn Fn(usize) -> Result<Residuals, CloseError>,
+    own: [f64; 3],
+    left: f64,
+    unattributed: &mut Unattributed,
+) -> Result<(), CloseError> {
+    let squares = |r: &Residuals| -> [f64; 3] {
+        std::array::from_fn(|a| {
+            figures::rms(&r.axes[a], &data.outlier[a]).map_or(0.0, |rms| rms * rms)
+        })
+    };
+    let before = squares(plain);
+    let whole: f64 = before.iter().sum();
+    let (mut kept, mut most) = (Vec::new(), 0.0);
+    for mut entry in std::mem::take(&mut unattributed.depends_on) {
+        let term = figures::certain(&entry)
+            .then(|| figures::term_of(found, &entry))
+            .flatten();
+        if let Some(g) = term {
+            let after = squares(&with(g)?);
+            let gain: [f64; 3] = std::array::from_fn(|a| (before[a] - after[a]).max(0.0));
+            if (0..3).all(|a| gain[a] <= own[a] * own[a]) {
+                continue;
+            }
+            entry.variance_explained = gain.iter().sum::<f64>() / whole;
+            most = f64::max(most, entry.variance_explained);
+        }
+        kept.push(entry);
+    }
+    kept.sort_by(|a, b| b.variance_explained.total_cmp(&a.variance_explained));
+    unattributed.present = most > 0.0;
+    unattributed.variance_fraction = Some(most * left);
+    unattributed.depends_on = kept;
+    Ok(())
 }
 
 fn finish(
@@ -494,6 +543,10 @@ fn finish(
     }
     // what is left is judged before a term without a cause is added
     let mut unattributed = figures::unattributed(found, last / whole);
+    let with = |g: usize| residuals(&evidence, folds, found, &[chosen.as_slice(), &[g]].concat());
+    let own = changes.map_or([0.0; 3], |c| c.slow_arcsec);
+    let share = last / whole;
+    by_axes(data, found, &after, &with, own, share, &mut unattributed)?;
     let (surroundings, questions) = (situation.surroundings(), situation.questions);
     let mut added = chosen.clone();
     let plain = after;
@@ -514,7 +567,10 @@ fn finish(
         data.t_s.first(),
     ) {
         let sigma = evidence.constant_sigma;
-        confusion.tell(&mut effects, start, UnitQuaternion::identity(), &|flown| {
+        // a velocity is seen from where the tracker points
+        let looking = situation.reference.as_ref().and_then(|r| r.attitude(start));
+        let looking = looking.unwrap_or_else(UnitQuaternion::identity);
+        confusion.tell(&mut effects, start, looking, &|flown| {
             fly(flown, &confusion.candidates, step, sigma, noise)
         });
     }
@@ -528,13 +584,9 @@ fn finish(
     )?;
     let mut model = situation.model.clone();
     model.effects.extend(entries);
-    if let Some(changes) = changes {
-        let own: f64 = changes.slow_arcsec.iter().map(|s| s * s).sum();
-        unattributed.present &= unattributed.variance_fraction.unwrap_or(0.0) * whole > own;
-    }
     let declared = match &situation.model.hem {
         Some(hem) => [&hem.x, &hem.y, &hem.z].map(|axis| WIDER * axis.sigma_hsf_arcsec),
-        None => changes.map_or([0.0; 3], |c| c.slow_arcsec),
+        None => own,
     };
     // what acts in one fold alone is predicted by no other, and would be slow noise out of fold
     let inside = in_sample(&evidence, data.t_s.len(), found);

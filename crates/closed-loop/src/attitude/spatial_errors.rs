@@ -36,8 +36,9 @@ use crate::situation::Situation;
 const USUAL_STARS: u32 = 10;
 /// See the header.
 const WIDER: f64 = 2.0;
-/// Stretches of the motion; a jitter faster than that changes no stars for long.
-const STRETCHES: usize = 24;
+/// Stretches of the motion; a jitter faster than that changes no stars for long. In no number of whole periods of
+/// one motion are all of these: it would be none.
+const STRETCHES: [usize; 3] = [24, 29, 37];
 
 /// What changes of stars do to an attitude.
 #[derive(Clone, Debug)]
@@ -70,18 +71,8 @@ impl SpatialErrors {
         let half = x.max(y) / situation.camera.focal_length_px()[0];
         let jump = WIDER * std::f64::consts::SQRT_2 * star / n;
         let error = WIDER * star / n.sqrt();
-        let mut moved = 0.0;
-        let mut last = None;
-        for k in 0..=STRETCHES {
-            let Some(q) = reference.attitude(t_s[k * (t_s.len() - 1) / STRETCHES]) else {
-                continue;
-            };
-            if let Some(last) = last {
-                let turn: Vector3<f64> = rotation_vector(&q, &last);
-                moved += turn.xy().norm() / (2.0 * half) + turn.z.abs() / 4.0;
-            }
-            last = Some(q);
-        }
+        let moved = STRETCHES.map(|stretches| moved(reference, t_s, stretches, half));
+        let moved = moved.into_iter().fold(0.0, f64::max);
         let crossed = moved * 2.0 * x.max(y) > 1.0;
         let slow_arcsec = [error, error, error / (half * (2.0_f64 / 3.0).sqrt())];
         (star > 0.0).then_some(Self {
@@ -113,7 +104,8 @@ impl SpatialErrors {
             centroid: CentroidError::Triangle(Triangle::from_peak(peak)),
             t_s: t_s.to_vec(),
             turn: std::iter::once(Vector3::zeros()).chain(turn).collect(),
-            drawn: OnceLock::new(),
+            even: OnceLock::new(),
+            stretches: OnceLock::new(),
             sampled: OnceLock::new(),
         }))
     }
@@ -156,6 +148,23 @@ impl SpatialErrors {
         let one = ChiSquared::new(freedom).map_or(1.0, |law| law.sf(square));
         (one * self.expected).min(1.0)
     }
+}
+
+/// By how many fields, of this half size in rad, stars move from stretch to stretch.
+fn moved(reference: &AttitudeSeries, t_s: &[f64], stretches: usize, half: f64) -> f64 {
+    let mut moved = 0.0;
+    let mut last = None;
+    for k in 0..=stretches {
+        let Some(q) = reference.attitude(t_s[k * (t_s.len() - 1) / stretches]) else {
+            continue;
+        };
+        if let Some(last) = last {
+            let turn: Vector3<f64> = rotation_vector(&q, &last);
+            moved += turn.xy().norm() / (2.0 * half) + turn.z.abs() / 4.0;
+        }
+        last = Some(q);
+    }
+    moved
 }
 
 #[cfg(test)]

@@ -463,7 +463,7 @@ fn finding(h: &Hypothesis, against: Option<&str>, others: bool) -> String {
     }
     if let Some(most) = h.variance_share_at_most {
         said.push(format!(
-            "it accounts for at most {} % of the squared residual",
+            "it accounts for at most {} % of the squared residual in units of the noise",
             short(100.0 * most)
         ));
     }

@@ -233,8 +233,8 @@ pub(crate) fn finish(
         constants.tell(f.described, last / whole, &mut unattributed);
     }
     noise_left.tell(&mut unattributed);
-    let excess = excess(f, last);
-    let mut considered = figures::considered(f.found, excess, f.refused, &surroundings);
+    let weighed = weighed_excess(f, &plain).map_or(0.0, |(excess, _)| excess);
+    let mut considered = figures::considered(f.found, weighed, f.refused, &surroundings);
     if let Some(orbit) = &f.orbit {
         orbit.tell(&mut considered);
     }
@@ -244,8 +244,7 @@ pub(crate) fn finish(
         }
     }
     considered.retain(|c| !effects.iter().any(|e| e.id == c.id));
-    let unit = f.level.noise.map_or(1.0, |n| n.centroid);
-    let squares = excess * unit * unit;
+    let squares = excess(f, last);
     noise.need(f.situation, f.data, squares)?;
     noise.tell(&mut considered);
     if let Some(wander) = reference_wander::consider(f.data, &plain.axes, squares) {
@@ -275,8 +274,8 @@ pub(crate) fn finish(
             found: f.found,
             surroundings,
             information: &|c| fits.information(c),
-            alone: remarkable(f, whole),
-            left: remarkable(f, last),
+            alone: remarkable(f, &f.settled.before),
+            left: remarkable(f, &plain),
             resolved: f.level.resolved,
             effects: &effects,
             considered: &considered,
@@ -369,7 +368,13 @@ fn tell_apart(f: &Finish<'_>, effects: &mut [FoundEffect]) {
     let set = columns_of(&f.found.fitted.groups, &f.found.selection.chosen);
     let sky = f.found.fitted.fits.variance(&set).and_then(|variance| {
         let noise = f.wander.filter(|_| f.level.noise.is_some());
-        let sky = Sky::of(f.data, f.situation.model, variance, noise.map(|w| w.noise))?;
+        let sky = Sky::of(
+            f.data,
+            f.situation.model,
+            &f.level.weight,
+            variance,
+            noise.map(|w| w.noise),
+        )?;
         Some(sky.drawn(f.level.drawn))
     });
     if let (Some(sky), Some(&start)) = (sky, f.data.frames.t_s.first())
@@ -381,20 +386,35 @@ fn tell_apart(f: &Finish<'_>, effects: &mut [FoundEffect]) {
     }
 }
 
-/// Squared residual over what the declared noise accounts for, in the unit of the
-/// fit's scalars (arcsec, or the centroids' noise where they are whitened); 0 where no noise is declared.
+/// Squared residual over what the declared noise accounts for, arcsec^2; 0 where no noise is declared.
 fn excess(f: &Finish<'_>, power: f64) -> f64 {
     let rows = f.data.counted() as f64;
     f.situation.model.noise.temporal_arcsec.map_or(0.0, |s| {
-        let unit = f.level.noise.map_or(1.0, |n| n.centroid);
-        (rows * power - 0.5 * s * s * f.found.fitted.scalars).max(0.0) / (unit * unit)
+        (rows * power - 0.5 * s * s * f.found.fitted.scalars).max(0.0)
     })
 }
 
-/// [`excess`] where it stands out of the noise.
-fn remarkable(f: &Finish<'_>, power: f64) -> Option<f64> {
+/// The same of the fit's scalars, in their unit: rows count by the noise of their stars there, as they do in the
+/// columns that it is held against. With the variance of a scalar.
+fn weighed_excess(f: &Finish<'_>, residual: &Residuals) -> Option<(f64, f64)> {
     let sigma = f.situation.model.noise.temporal_arcsec?;
-    let unit = f.level.noise.map_or(1.0, |n| n.centroid);
-    let variance = 0.5 * sigma * sigma / (unit * unit);
-    hypothesis::beyond(excess(f, power), variance, f.found.fitted.scalars)
+    let (mut squares, mut weights) = (0.0, 0.0);
+    for row in (0..f.data.t_s.len()).filter(|&r| !f.data.outlier[r]) {
+        let w = f.level.weight[row].powi(2);
+        let square: f64 = residual.axes.iter().map(|a| a[row] * a[row]).sum();
+        if square.is_finite() {
+            squares += w * square;
+            weights += w;
+        }
+    }
+    let unit = f.level.unit_arcsec2();
+    let variance = 0.5 * sigma * sigma * weights / (f.data.counted() as f64).max(1.0) / unit;
+    let excess = squares / unit - variance * f.found.fitted.scalars;
+    Some((excess.max(0.0), variance))
+}
+
+/// [`weighed_excess`] where it stands out of the noise.
+fn remarkable(f: &Finish<'_>, residual: &Residuals) -> Option<f64> {
+    let (excess, variance) = weighed_excess(f, residual)?;
+    hypothesis::beyond(excess, variance, f.found.fitted.scalars)
 }

@@ -38,6 +38,8 @@ mod tests;
 const MIN_POINTS: usize = 60;
 /// Points of a series beyond which neighbours are averaged.
 pub(crate) const MOST_POINTS: usize = 4800;
+/// Least share of the square of many points that is taken to be white.
+const LEAST_WHITE: f64 = 0.01;
 /// Lines, and jumps, of one series.
 const MOST: usize = 5;
 /// Chance below which a line or a jump is worth a search with it: that judges it, and more strictly.
@@ -85,28 +87,80 @@ impl Leftover {
 
 /// Series with their spectra: what lines and jumps are looked for in.
 pub(crate) struct Series {
-    each: Vec<(Track, Option<Spectrum>)>,
+    each: Vec<Searched>,
     /// Chance that one of them shows a line, or a jump, that is none.
     alpha: f64,
 }
 
+/// One series.
+struct Searched {
+    /// In which jumps are looked for: means, where there are too many points.
+    means: Track,
+    /// In which lines are, where these are not the means: a fast line is another in them.
+    all: Option<Track>,
+    spectrum: Option<Spectrum>,
+}
+
+impl Searched {
+    fn of(track: &Track) -> Self {
+        let means = track.thinned();
+        let all = (track.t_s.len() > MOST_POINTS).then(|| track.counted());
+        Self {
+            means,
+            // a spectrum of so many points at any times would take hours
+            all: all.filter(|all| spectra::is_on_a_grid(&all.t_s)),
+            spectrum: None,
+        }
+    }
+
+    /// What has the spectrum.
+    fn fine(&self) -> &Track {
+        self.all.as_ref().unwrap_or(&self.means)
+    }
+
+    /// What is left, its lines, and its jumps.
+    fn describe(self, alpha: f64) -> (Track, Vec<f64>, Vec<f64>) {
+        let Self {
+            mut means,
+            all,
+            spectrum,
+        } = self;
+        let (lines, noise) = match (all, spectrum) {
+            (Some(mut all), Some(spectrum)) => {
+                let (lines, _) = all.lines(alpha, spectrum);
+                if !lines.is_empty() {
+                    means = all.thinned();
+                }
+                (lines, None)
+            }
+            (None, Some(spectrum)) => means.lines(alpha, spectrum),
+            (_, None) => Default::default(),
+        };
+        let jumps = means.jumps(alpha, noise);
+        (means, lines, jumps)
+    }
+}
+
 impl Series {
     pub(crate) fn of(tracks: &[Track]) -> Self {
-        let thinned: Vec<Track> = tracks
+        let mut each: Vec<Searched> = tracks
             .par_iter()
-            .map(Track::thinned)
-            .filter(|track| track.t_s.len() >= MIN_POINTS)
+            .map(Searched::of)
+            .filter(|one| one.means.t_s.len() >= MIN_POINTS)
             .collect();
-        let spectra = lines::spectra(&thinned);
+        let spectra = lines::spectra(&each.iter().map(Searched::fine).collect::<Vec<_>>());
+        for (one, spectrum) in each.iter_mut().zip(spectra) {
+            one.spectrum = spectrum;
+        }
         Self {
-            each: thinned.into_iter().zip(spectra).collect(),
+            each,
             alpha: SEARCH_ALPHA / (2.0 * tracks.len().max(1) as f64),
         }
     }
 
     /// Rotations about X and Y.
     pub(crate) fn across(&self) -> Option<[&Track; 2]> {
-        let mut turns = self.each.iter().map(|(track, _)| track).filter(|t| t.turns);
+        let mut turns = self.each.iter().map(|one| &one.means).filter(|t| t.turns);
         Some([turns.next()?, turns.next()?])
     }
 
@@ -116,12 +170,7 @@ impl Series {
         let each: Vec<_> = self
             .each
             .into_par_iter()
-            .map(|(mut track, spectrum)| {
-                let (lines, noise) =
-                    spectrum.map_or_else(Default::default, |s| track.lines(alpha, s));
-                let jumps = track.jumps(alpha, noise);
-                (track, lines, jumps)
-            })
+            .map(|one| one.describe(alpha))
             .collect();
         let mut out = Leftover::default();
         for (track, lines, jumps) in each {
@@ -234,18 +283,23 @@ impl Track {
             .map_or(0.0, |(l, f)| l - f)
     }
 
-    /// Points that count, about their mean, without spikes, averaged where they are too many.
+    /// Points that count, about their mean, without spikes.
+    fn counted(&self) -> Self {
+        self.means_over((0..self.t_s.len()).map(|k| k..k + 1))
+    }
+
+    /// The same, averaged where they are too many.
     fn thinned(&self) -> Self {
+        if self.t_s.len() <= MOST_POINTS {
+            return self.counted();
+        }
         let folds = Folds::whole(self.t_s.len());
-        let size = self.t_s.len().div_ceil(MOST_POINTS).max(1);
+        self.means_over(Bins::cut(&self.t_s, &folds, bins::MOST).rows)
+    }
+
+    fn means_over(&self, rows: impl IntoIterator<Item = std::ops::Range<usize>>) -> Self {
         let mut spike: Vec<bool> = self.weight.iter().map(|w| *w <= 0.0).collect();
         mark(&self.value, &mut spike);
-        let mut rows: Vec<std::ops::Range<usize>> = Vec::new();
-        if size == 1 {
-            rows.extend((0..self.t_s.len()).map(|k| k..k + 1));
-        } else {
-            rows = Bins::cut(&self.t_s, &folds, bins::MOST).rows;
-        }
         let mut out = Self {
             t_s: Vec::new(),
             value: Vec::new(),
@@ -291,8 +345,20 @@ impl Track {
         }
     }
 
+    /// Of many points what is slow is that of their means, and all else is white.
     fn noise(&self) -> Coloured {
-        Coloured::fit(&self.t_s, &self.value, &self.weight)
+        let fit = |of: &Self| Coloured::fit(&of.t_s, &of.value, &of.weight);
+        if self.t_s.len() <= MOST_POINTS {
+            return fit(self);
+        }
+        let noise = fit(&self.thinned());
+        let weighed = self.value.iter().zip(&self.weight).map(|(v, w)| w * v * v);
+        let square = weighed.sum::<f64>() / self.weight.iter().sum::<f64>();
+        let white = square - noise.slow * noise.slow;
+        Coloured {
+            white: white.max(LEAST_WHITE * square).sqrt(),
+            ..noise
+        }
     }
 
     fn whitened(&self, noise: &Coloured, series: &[f64]) -> Vec<f64> {

@@ -7,7 +7,7 @@ use super::Page;
 use super::write::{Cell, datum, escaped, step};
 use crate::number::{change, hertz, percent, probability, short, with_sigma};
 use crate::order::by_number;
-use crate::text::{of_size, selectors};
+use crate::text::{is_certain, of_size, selectors};
 
 /// Chance below which an effect counts as seen.
 const SIGNIFICANT: f64 = 0.01;
@@ -410,10 +410,11 @@ pub(super) fn leftover(page: &mut Page, report: &Report) {
                 datum("/unattributed/variance_fraction", v, &percent(v))
             )
         });
-        let first = if left.present {
-            "Something is left that follows a variable and that no effect explains."
-        } else {
-            "Nothing is left that follows any variable: the rest behaves as noise."
+        let follows = left.depends_on.iter().chain(&left.noise_depends_on);
+        let first = match (left.present, follows.clone().any(is_certain)) {
+            (true, true) => "Something is left that follows a variable and that no effect explains.",
+            (true, false) => "Something is left in time that follows no variable and that no effect explains.",
+            (false, _) => "Nothing is left that follows any variable: the rest behaves as noise.",
         };
         page.raw(&format!("<p>{first}{share}</p>"));
         if left.depends_on.is_empty() {

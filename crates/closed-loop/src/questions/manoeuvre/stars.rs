@@ -31,8 +31,8 @@ pub(crate) struct Sky<'a> {
     model: &'a Model,
     /// What the model leaves open of the bundle.
     nuisance: StarNuisance,
-    /// Stars of one frame.
-    stars: Vec<(i32, Star)>,
+    /// Stars of one frame, with their slots and how much their rows count.
+    stars: Vec<Seen>,
     attitude: UnitQuaternion<f64>,
     free: [bool; 2],
     step_s: f64,
@@ -43,11 +43,21 @@ pub(crate) struct Sky<'a> {
     drawn: Option<[f64; 3]>,
 }
 
+/// A star in a slot.
+#[derive(Clone)]
+struct Seen {
+    slot: i32,
+    star: Star,
+    /// Weight of its rows: the variance of a scalar is that of a row of weight 1.
+    weight: f64,
+}
+
 impl<'a> Sky<'a> {
     /// The stars of the frame with most of them, of several the one nearest the middle.
     pub(crate) fn of(
         data: &'a StarData,
         model: &'a Model,
+        weight: &[f64],
         variance: f64,
         noise: Option<CommonNoise>,
     ) -> Option<Self> {
@@ -56,9 +66,10 @@ impl<'a> Sky<'a> {
             let off = (2 * k).abs_diff(frames);
             (data.frames.rows_of(k).len(), usize::MAX - off)
         })?;
-        let stars = data.frames.rows_of(frame).map(|row| {
-            let star = data.stars[data.star[row]].clone();
-            (data.frames.slot[row], star)
+        let stars = data.frames.rows_of(frame).map(|row| Seen {
+            slot: data.frames.slot[row],
+            star: data.stars[data.star[row]].clone(),
+            weight: weight[row],
         });
         Some(Self {
             camera: &data.camera,
@@ -92,7 +103,7 @@ impl<'a> Sky<'a> {
         let mut frames = StarFrames::new();
         for (&t, q) in t_s.iter().zip(series.quaternions()) {
             frames.begin(t);
-            for (slot, star) in &stars {
+            for Seen { slot, star, .. } in &stars {
                 if let Some(at) = self.camera.project(&(q * star.direction))
                     && self.camera.contains(at)
                 {
@@ -100,7 +111,8 @@ impl<'a> Sky<'a> {
                 }
             }
         }
-        let find = |id: i64| stars.iter().find(|(_, s)| s.id == id).map(|s| s.1.clone());
+        let seen = |id: i64| stars.iter().find(|s| s.star.id == id);
+        let find = |id: i64| seen(id).map(|s| s.star.clone());
         let mut data = StarData::prepare(&Inputs {
             camera: self.camera,
             frames: &frames,
@@ -113,6 +125,12 @@ impl<'a> Sky<'a> {
         data.turn_back();
         data.follow(Some(flown));
         let none = || vec![0.0; data.t_s.len()];
+        let of_star = data
+            .stars
+            .iter()
+            .map(|s| seen(s.id).map_or(1.0, |s| s.weight));
+        let of_star: Vec<f64> = of_star.collect();
+        let weight: Vec<f64> = data.star.iter().map(|&s| of_star[s]).collect();
         let evidence = StarEvidence {
             data: &data,
             nuisance: self.nuisance.clone().of_stars(&data),
@@ -122,7 +140,7 @@ impl<'a> Sky<'a> {
             own_paths: false,
             sigma_guess_arcsec: 1.0,
             noise: None,
-            weight: vec![1.0; data.t_s.len()].into(),
+            weight: weight.into(),
             drawn: self.drawn,
             kept: Vec::new(),
         };
@@ -143,7 +161,7 @@ impl<'a> Sky<'a> {
         }
     }
 
-    fn stars_along(&self, flown: &Flown) -> Vec<(i32, Star)> {
+    fn stars_along(&self, flown: &Flown) -> Vec<Seen> {
         let axis = flown.axis();
         let fov = self.camera.fov().map(|f| f.rad());
         let fov = fov[0].max(fov[1]);
@@ -162,13 +180,13 @@ impl<'a> Sky<'a> {
                 let angle: Vector3<f64> = axis * (fov * k as f64);
                 let back = self.attitude.inverse();
                 let turn = back * rotation_from_vector(&angle) * self.attitude;
-                self.stars.iter().map(move |(slot, star)| {
-                    let moved = Star {
-                        id: star.id + COPY * k,
-                        direction: turn * star.direction,
-                        ..star.clone()
-                    };
-                    (*slot, moved)
+                self.stars.iter().map(move |seen| Seen {
+                    star: Star {
+                        id: seen.star.id + COPY * k,
+                        direction: turn * seen.star.direction,
+                        ..seen.star.clone()
+                    },
+                    ..seen.clone()
                 })
             })
             .collect()

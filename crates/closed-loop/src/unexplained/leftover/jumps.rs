@@ -42,11 +42,11 @@ impl SharedJump {
 impl Series {
     /// The jump that the tracker most likely makes, if it is worth a search.
     pub(crate) fn shared_jump(&self) -> Option<SharedJump> {
-        let first = &self.each.iter().find(|(track, _)| track.turns)?.0;
+        let first = &self.each.iter().find(|one| one.means.turns)?.means;
         let turns: Vec<&Track> = self
             .each
             .iter()
-            .map(|(track, _)| track)
+            .map(|one| &one.means)
             .filter(|track| track.turns && track.t_s == first.t_s)
             .collect();
         let noises: Vec<Coloured> = turns.iter().map(|t| t.noise()).collect();

@@ -108,14 +108,14 @@ fn least(values: &[f64]) -> Option<(usize, f64)> {
 }
 
 /// The spectrum of each series; `None` where the span is too short for any line.
-pub(super) fn spectra(tracks: &[Track]) -> Vec<Option<Spectrum>> {
+pub(super) fn spectra(tracks: &[&Track]) -> Vec<Option<Spectrum>> {
     // most series have the same times, and one plan serves them
     let first = |k: usize| tracks[..k].iter().position(|t| t.t_s == tracks[k].t_s);
     let plans: Vec<Option<(Grid, Arc<LombScargle>)>> = (0..tracks.len())
         .into_par_iter()
         .map(|k| {
             first(k).is_none().then(|| {
-                let grid = grid_of(&tracks[k])?;
+                let grid = grid_of(tracks[k])?;
                 Some((grid, Arc::new(grid.plan(&tracks[k].t_s)?)))
             })?
         })
@@ -124,7 +124,7 @@ pub(super) fn spectra(tracks: &[Track]) -> Vec<Option<Spectrum>> {
         .into_par_iter()
         .map(|k| {
             let (grid, plan) = plans[first(k).unwrap_or(k)].clone()?;
-            Spectrum::of(&tracks[k], grid, plan)
+            Spectrum::of(tracks[k], grid, plan)
         })
         .collect()
 }
@@ -151,8 +151,8 @@ impl Series {
         let turns: Vec<(&Track, &Spectrum)> = self
             .each
             .iter()
-            .filter(|(track, _)| track.turns)
-            .filter_map(|(track, spectrum)| Some((track, spectrum.as_ref()?)))
+            .filter(|one| one.means.turns)
+            .filter_map(|one| Some((one.fine(), one.spectrum.as_ref()?)))
             .collect();
         let grid = turns.first()?.1.grid;
         let turns: Vec<_> = turns
