@@ -59,6 +59,9 @@ pub fn centre_and_scale(values: impl Iterator<Item = f64>) -> Option<(f64, f64)>
     Some((centre, 1.482_602_218_505_602 * mad))
 }
 
+/// A scale that is so much smaller than what stands out is that of rounding: attitudes of 1e-16 beside an arcsecond.
+const ROUNDING: f64 = 1e-9;
+
 /// Marks the outliers of each group in `outlier` (already marked rows are not
 /// asked and stay marked); returns how many were added.
 ///
@@ -82,8 +85,9 @@ pub fn mark_outliers(
         let Some((centre, scale)) = centre_and_scale(rows.iter().map(|&i| values[i])) else {
             continue;
         };
-        // A series that is constant to rounding has no scale to judge by.
-        if scale <= 0.0 {
+        // A series of which most is constant to rounding has no scale to judge by.
+        let most = rows.iter().map(|&i| (values[i] - centre).abs());
+        if scale <= ROUNDING * most.fold(0.0, f64::max) {
             continue;
         }
         for &i in rows {

@@ -35,8 +35,9 @@ const ABERRATION: &str = "velocity_aberration";
 const CYCLES: [f64; 8] = [0.05, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 1.75];
 /// Beside the surface of solid osmium an orbit takes sqrt(3 pi / G rho) = 42 minutes, s: a faster line is none.
 const SHORTEST_S: f64 = 2500.0;
-/// What is shorter than two cycles may be told from nothing else: the bound for that, s.
+/// What is less than two turns in the span may be told from nothing else: the bound for that, s.
 const SHORTEST_TURN_S: f64 = 300.0;
+const FEW_TURNS: f64 = 2.0;
 /// Fits about the circle.
 const ROUNDS: usize = 4;
 /// Nats of white noise below which an orbit is not worth a search.
@@ -298,5 +299,14 @@ pub(crate) fn propose(
         };
         orbit = better.into();
     }
-    Ok((nats >= WORTH_A_SEARCH).then_some(orbit))
+    // a fit may end at more turns than it was tried at
+    let fastest_s = SHORTEST_S.min(surroundings.length_s() / FEW_TURNS);
+    let mut itself = vec![0.0; orbit.coefficients().len()];
+    itself[0] = 1.0;
+    let told = orbit.realise(&itself, surroundings).map(|e| e.parameters());
+    let is_fast = told.is_ok_and(|all| {
+        let period = all.iter().find(|p| p.name == "period_s");
+        period.is_some_and(|p| p.value < fastest_s)
+    });
+    Ok((nats >= WORTH_A_SEARCH && !is_fast).then_some(orbit))
 }
