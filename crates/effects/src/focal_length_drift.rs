@@ -5,7 +5,7 @@
 //! dP = 1e-6 ppm_per_s (t - middle of the data) P
 //! ```
 //!
-//! P is the position off the boresight. The constant part of the scale is not part of this effect: a
+//! P is the position off the boresight, and the mean is that of the run's span. The constant part of the scale is not part of this effect: a
 //! common gain of all centroids cannot be told from the focal length itself. Where the channel is not
 //! known it counts as its mean.
 //!
@@ -60,7 +60,7 @@ impl EffectKind for Kind {
             let series = channels::find(ID, channel, Ending::Temperature, surroundings)?;
             let value = reader.required("ppm_per_c")?;
             return Ok(Box::new(Shifted::new(
-                Drift::with_channel(channel, series),
+                Drift::with_channel(channel, series, surroundings),
                 vec![value],
             )));
         }
@@ -83,7 +83,11 @@ impl EffectKind for Kind {
         let mut all: Vec<Box<dyn Candidate>> = Vec::new();
         for (name, series) in channels::ending(Ending::Temperature, &scene.surroundings) {
             if channels::deviation(series) > 0.0 {
-                all.push(ShiftCandidate::boxed(Drift::with_channel(name, series)));
+                all.push(ShiftCandidate::boxed(Drift::with_channel(
+                    name,
+                    series,
+                    &scene.surroundings,
+                )));
             }
         }
         if scene.surroundings.length_s() > 0.0 {
@@ -108,11 +112,11 @@ enum Drift {
 }
 
 impl Drift {
-    fn with_channel(name: &str, series: &Series) -> Self {
+    fn with_channel(name: &str, series: &Series, surroundings: &Surroundings<'_>) -> Self {
         Self::Channel {
             name: name.to_owned(),
             series: series.clone(),
-            mean: series.mean(),
+            mean: channels::mean_within(series, surroundings.span_s),
         }
     }
 

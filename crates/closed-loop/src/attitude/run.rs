@@ -560,6 +560,10 @@ fn finish(
     }
     let (mut effects, entries) =
         figures::effects_found(found, &added, &explained, &surroundings, questions)?;
+    if effects.is_empty() {
+        // nothing was added: constants that coloured noise weighs otherwise are no gain, and no loss
+        after.clone_from(&before);
+    }
     let confusion = confusion::compare(found, &mut effects);
     if let (false, Some(step), Some(&start)) = (
         confusion.is_empty(),

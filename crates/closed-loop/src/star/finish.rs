@@ -61,6 +61,24 @@ impl Finish<'_> {
         self.found.left_out_of_fold(self.level, self.folds, chosen)
     }
 
+    /// What the declared model leaves out of fold, and its log-likelihood. Where it declares a slow error of the
+    /// reference, under which all fits are, so is this one: what is added is held against it.
+    fn declared_at_best(
+        &self,
+        effects: &[FoundEffect],
+    ) -> Result<(Residuals, Option<f64>), CloseError> {
+        let claimed = effects.iter().any(|e| e.id == REFERENCE_ERROR);
+        let landed = self.settled.phase_error.is_some();
+        if self.level.noise.is_some() && !claimed && !landed && self.image.is_none() {
+            return Ok((self.residuals(&[])?, self.found.fitted.data_loglik(&[])));
+        }
+        let loglik = match self.settled.loglik {
+            Some(known) => Some(known),
+            None => fit(self.measured, self.folds, &[])?.data_loglik(&[]),
+        };
+        Ok((self.settled.before.clone(), loglik))
+    }
+
     /// What the chosen effects leave in sample beside the description of it, where there is one, arcsec.
     fn beside_description(&self) -> Result<Option<Vec<Vec<f64>>>, CloseError> {
         let terms = self.described.terms_left();
@@ -283,16 +301,24 @@ pub(crate) fn finish(
     );
 
     let after = after.unwrap_or(plain);
-    let attitude = own_attitude::residuals(f.situation, f.data, f.folds, f.settled, &after);
+    let (before, before_loglik) = f.declared_at_best(&effects)?;
+    // one fit, one figure
+    let nothing_added = effects.is_empty();
+    let after = if nothing_added { before.clone() } else { after };
+    let mut attitude =
+        own_attitude::residuals(f.situation, f.data, f.folds, f.settled, &before, &after);
+    if let Some(attitude) = attitude.as_mut().filter(|_| nothing_added) {
+        attitude.after_arcsec.clone_from(&attitude.before_arcsec);
+    }
     let attitude_rms = |series: &[Vec<f64>; 3], outlier: &[bool]| {
         std::array::from_fn(|a| figures::rms(&series[a], outlier).unwrap_or(f64::NAN))
     };
-    let before_loglik = match f.settled.loglik {
-        Some(known) => Some(known),
-        None => fit(f.measured, f.folds, &[])?.data_loglik(&[]),
-    };
     let set = columns_of(&f.found.fitted.groups, &added);
-    let after_loglik = f.found.fitted.data_loglik(&set);
+    let after_loglik = if nothing_added {
+        before_loglik
+    } else {
+        f.found.fitted.data_loglik(&set)
+    };
     let set_aside = f.data.outlier.iter().filter(|o| **o).count();
     let report = Report {
         format: telemetry::report::REPORT_FORMAT.to_owned(),
@@ -305,7 +331,7 @@ pub(crate) fn finish(
         },
         before: f.errors(
             f.situation.model,
-            &f.settled.before,
+            &before,
             before_loglik,
             attitude
                 .as_ref()
@@ -325,7 +351,7 @@ pub(crate) fn finish(
         unattributed,
     };
     let [ax, ay]: [Vec<f64>; 2] = after.axes.try_into().unwrap_or_default();
-    let [bx, by]: [Vec<f64>; 2] = f.settled.before.axes.clone().try_into().unwrap_or_default();
+    let [bx, by]: [Vec<f64>; 2] = before.axes.try_into().unwrap_or_default();
     let fold_of_frame = f.folds.column();
     let frames = &f.data.frames;
     let fold = (0..frames.frames())

@@ -27,6 +27,7 @@ pub(crate) fn residuals(
     data: &StarData,
     folds: &Folds,
     settled: &Settled,
+    before: &Residuals,
     after: &Residuals,
 ) -> Option<AttitudeResiduals> {
     let table = situation.bundle.attitude.as_ref()?;
@@ -48,7 +49,7 @@ pub(crate) fn residuals(
             .collect()
     };
     let declared = settled.phase_error.as_ref().unwrap_or(&data.phase_error);
-    let shift_before = shift(&settled.before, declared);
+    let shift_before = shift(before, declared);
     let shift_after = shift(after, &data.phase_error);
     let fold = folds.column();
     let own: BTreeMap<u64, usize> = table
