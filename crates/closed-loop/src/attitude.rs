@@ -3,6 +3,7 @@
 //! ```text
 //! run             the order of the steps, from bundle to report
 //! data            the rotation between both, axis by axis, as evidence for the search
+//! mixing          noise that the axes share
 //! search          every hypothesis with its own noise
 //! declared_effects  what the declared effects turn it by
 //! spatial_errors  what the declared model itself makes of crossing and changing stars
@@ -18,6 +19,7 @@ mod declared_effects;
 mod imagined;
 mod likeness;
 mod line_level;
+pub(crate) mod mixing;
 mod run;
 mod search;
 pub(crate) mod spatial_errors;

@@ -18,6 +18,7 @@ use focal_plane::{ARCSEC_PER_RAD, AttitudeResidual, AttitudeSeries, AttitudeSour
 use nalgebra::{DMatrix, DVector, UnitQuaternion, Vector3};
 use spectra::robust::median_step;
 
+use crate::attitude::mixing::Mixing;
 use crate::bins::{Bins, MOST};
 use crate::evidence::{Amplitudes, Evidence, Residuals};
 
@@ -35,6 +36,8 @@ pub(crate) struct AttitudeData {
     pub(crate) bins: Bins,
     /// Rows that count in each bin, per axis; fresh after [`Self::rebin`].
     pub(crate) count: [Vec<f64>; 3],
+    /// Noise that the axes share.
+    pub(crate) mixing: Mixing,
     /// Rows set aside because the reference does not cover them.
     pub(crate) outside_reference: usize,
 }
@@ -53,6 +56,7 @@ impl AttitudeData {
             outlier: Default::default(),
             bins: Bins::cut(&[], &Folds::cut(0), MOST),
             count: Default::default(),
+            mixing: Mixing::default(),
             outside_reference: 0,
         };
         let residual = AttitudeResidual::against(t_s, q, reference);
@@ -122,6 +126,17 @@ impl AttitudeData {
             .collect()
     }
 
+    /// Means over the bins of all axes of a series of rows, each without the noise that it shares.
+    pub(crate) fn unshared(&self, axes: [&[f64]; 3]) -> [Vec<f64>; 3] {
+        let binned = std::array::from_fn(|axis| self.binned(axis, axes[axis]));
+        self.mixing.mix(binned)
+    }
+
+    /// The same of the residual.
+    pub(crate) fn unshared_theta(&self) -> [Vec<f64>; 3] {
+        self.unshared(self.theta.each_ref().map(Vec::as_slice))
+    }
+
     /// Rows as effects see them.
     pub(crate) fn rows<'a>(
         &'a self,
@@ -159,15 +174,16 @@ impl AttitudeEvidence<'_> {
         beta: &DVector<f64>,
     ) -> [Vec<f64>; 3] {
         let m = self.data.bins.rows.len();
-        std::array::from_fn(|axis| {
-            let mut series = self.data.binned(axis, &self.data.theta[axis]);
+        let mut all = self.data.unshared_theta();
+        for (axis, series) in all.iter_mut().enumerate() {
             for (k, value) in series.iter_mut().enumerate() {
                 let row = raw.row(axis * m + k);
                 let shift: f64 = (0..beta.len()).map(|j| row[3 + j] * beta[j]).sum();
-                *value -= constant[axis] + shift;
+                let constants: f64 = (0..3).map(|j| row[j] * constant[j]).sum();
+                *value -= constants + shift;
             }
-            series
-        })
+        }
+        all
     }
 
     /// Constants and candidates of `rows`, arcsec, x then y then z of every row.
@@ -211,11 +227,10 @@ impl AttitudeEvidence<'_> {
     pub(crate) fn whitened(&self, binned: &DMatrix<f64>) -> Box<dyn Design + '_> {
         let (m, width) = (self.data.bins.rows.len(), binned.ncols());
         let mut columns = binned.clone().insert_column(width, 0.0);
-        for axis in 0..3 {
-            let theta = self.data.binned(axis, &self.data.theta[axis]);
+        for (axis, theta) in self.data.unshared_theta().iter().enumerate() {
             columns
                 .view_mut((axis * m, width), (m, 1))
-                .copy_from_slice(&theta);
+                .copy_from_slice(theta);
         }
         self.whiten(&mut columns);
         Box::new(WhitenedDesign {
@@ -237,9 +252,16 @@ impl AttitudeEvidence<'_> {
         }
     }
 
+    /// [`plain`](Self::plain) without the noise that the axes share.
+    pub(crate) fn binned(&self, candidates: &[&dyn Candidate]) -> DMatrix<f64> {
+        let mut out = self.plain(candidates);
+        self.data.mixing.mix_columns(&mut out);
+        out
+    }
+
     /// Constants and candidates averaged over the bins: x, y, z of every bin by
     /// three constants and the candidates' columns, arcsec.
-    pub(crate) fn binned(&self, candidates: &[&dyn Candidate]) -> DMatrix<f64> {
+    pub(crate) fn plain(&self, candidates: &[&dyn Candidate]) -> DMatrix<f64> {
         let (n, m) = (self.data.t_s.len(), self.data.bins.rows.len());
         let raw = self.raw(0..n, candidates);
         let mut out = DMatrix::zeros(3 * m, raw.ncols());

@@ -53,9 +53,10 @@ pub(crate) fn likeness(
         evidence.whiten(&mut series);
         (q.transpose() * &series).norm_squared() / series.ncols() as f64
     };
-    let theta = [0, 1, 2].map(|axis| data.binned(axis, &data.theta[axis]));
+    let theta = data.unshared_theta();
     let measured = DMatrix::from_fn(3 * m, 1, |row, _| theta[row / m][row % m]);
-    let errors = DMatrix::from_fn(3 * m, drawn.len(), |row, k| drawn[k][row / m][row % m]);
+    let mut errors = DMatrix::from_fn(3 * m, drawn.len(), |row, k| drawn[k][row / m][row % m]);
+    data.mixing.mix_columns(&mut errors);
     let mut rng = stream(0, 0, Purpose::Estimation);
     let white = DMatrix::from_fn(3 * m, WHITE, |row, _| {
         let (axis, bin) = (row / m, row % m);
@@ -125,6 +126,7 @@ mod tests {
             outlier: std::array::from_fn(|_| vec![false; FRAMES]),
             bins: Bins::cut(t_s, &folds, MOST),
             count: Default::default(),
+            mixing: Default::default(),
             outside_reference: 0,
         };
         data.rebin(&folds, MOST);

@@ -11,6 +11,7 @@ use focal_plane::AttitudeSource as _;
 
 use crate::attitude::data::{AttitudeData, AttitudeEvidence};
 use crate::attitude::declared_effects;
+use crate::attitude::mixing::Mixing;
 use crate::attitude::search::{self, Declared};
 use crate::attitude::spatial_errors::SpatialErrors;
 use crate::attitude::steadied::steadied;
@@ -119,7 +120,11 @@ pub(crate) fn run(
     let steady = inside
         .filter(|_| !motion.by_rates() && noise.iter().any(|n| n.slow > 0.0))
         .filter(|_| is_smeared(&found))
-        .and_then(|inside| steadied(&data, reference, &inside, &noise));
+        .and_then(|inside| {
+            let shared = data.mixing != Mixing::default();
+            let whole = shared.then(|| fit_whole_noise(&data, &inside));
+            steadied(&data, reference, &inside, &whole.unwrap_or(noise))
+        });
     let steady = steady.map(|path| motion::around(&path, &data.t_s, 1.0).without_error());
     if let Some(steady) = &steady {
         progress("searching again along the path less the reference's slow error");
@@ -235,6 +240,7 @@ fn settle(
         let each = before.axes.iter().zip(&mut data.outlier);
         let added: usize = each.map(|(axis, outlier)| mark(axis, outlier)).sum();
         if added == 0 {
+            data.mixing = Mixing::of(&before, &data.outlier);
             return Ok(before);
         }
     }
@@ -274,7 +280,15 @@ fn declared_noise(situation: &Situation<'_>) -> [Option<Foreknown>; 3] {
     })
 }
 
+/// Noise of each axis without what it shares.
 fn fit_noise(data: &AttitudeData, residual: &Residuals) -> [Coloured; 3] {
+    let axes = std::array::from_fn(|axis| residual.axes[axis].as_slice());
+    let means = data.unshared(axes);
+    std::array::from_fn(|axis| Coloured::fit(&data.bins.t_s, &means[axis], &data.count[axis]))
+}
+
+/// Noise of each axis.
+fn fit_whole_noise(data: &AttitudeData, residual: &Residuals) -> [Coloured; 3] {
     std::array::from_fn(|axis| {
         let means = data.binned(axis, &residual.axes[axis]);
         Coloured::fit(&data.bins.t_s, &means, &data.count[axis])
@@ -433,7 +447,7 @@ fn tracks(data: &AttitudeData, residual: &Residuals, changes: Option<&SpatialErr
 /// Squared length of each candidate column about its mean on every axis, arcsec^2.
 fn column_lengths(evidence: &AttitudeEvidence<'_>, found: &Found) -> Vec<f64> {
     let data = evidence.data;
-    let binned = evidence.binned(&borrowed(&found.candidates));
+    let binned = evidence.plain(&borrowed(&found.candidates));
     let m = data.bins.rows.len();
     let length = |column: &[f64]| -> f64 {
         (0..3)
@@ -456,7 +470,7 @@ fn column_lengths(evidence: &AttitudeEvidence<'_>, found: &Found) -> Vec<f64> {
 /// Squared residual beyond the white noise of the axes on which it stands out of that, arcsec^2. Each by itself:
 /// the noise about the boresight would hide what the others hold.
 fn beyond_white(data: &AttitudeData, residual: &Residuals) -> Option<f64> {
-    let noise = fit_noise(data, residual);
+    let noise = fit_whole_noise(data, residual);
     let mut whole = None;
     for axis in 0..3 {
         let rows: f64 = data.count[axis].iter().sum();
@@ -575,7 +589,14 @@ fn finish(
         let looking = situation.reference.as_ref().and_then(|r| r.attitude(start));
         let looking = looking.unwrap_or_else(UnitQuaternion::identity);
         confusion.tell(&mut effects, start, looking, &|flown| {
-            fly(flown, &confusion.candidates, step, sigma, noise)
+            fly(
+                flown,
+                &confusion.candidates,
+                step,
+                sigma,
+                noise,
+                data.mixing,
+            )
         });
     }
     instants::complete(

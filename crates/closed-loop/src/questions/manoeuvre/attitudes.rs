@@ -9,6 +9,7 @@ use nalgebra::DMatrix;
 
 use super::{Flown, information};
 use crate::attitude::data::{AttitudeData, AttitudeEvidence};
+use crate::attitude::mixing::Mixing;
 use crate::bins::MOST;
 
 /// Information on the candidates' columns along a manoeuvre, with frames every `step_s`.
@@ -18,6 +19,7 @@ pub(crate) fn fly(
     step_s: f64,
     constant_sigma: [f64; 3],
     noise: [Coloured; 3],
+    mixing: Mixing,
 ) -> Option<DMatrix<f64>> {
     let (count, whole) = flown.frames(step_s);
     let t_s = flown.times(count);
@@ -26,6 +28,7 @@ pub(crate) fn fly(
     // nothing is predicted: only the sum over all is asked for
     let folds = Folds::whole(data.t_s.len());
     data.rebin(&folds, MOST);
+    data.mixing = mixing;
     let thinned = (count as f64 / whole).sqrt();
     let evidence = AttitudeEvidence {
         data: &data,
