@@ -70,6 +70,21 @@ impl Mixing {
         })
     }
 
+    /// Of residuals row by row, and which of them are outliers: what stands out about one axis is in the others then.
+    pub(crate) fn mix_rows(
+        self,
+        axes: &[Vec<f64>],
+        outlier: &[Vec<bool>; 3],
+    ) -> ([Vec<f64>; 3], [Vec<bool>; 3]) {
+        let mixed = self.mix(std::array::from_fn(|a| axes[a].clone()));
+        if self.0.is_none() {
+            return (mixed, outlier.clone());
+        }
+        let any = (0..outlier[0].len()).map(|k| outlier.iter().any(|o| o[k]));
+        let any: Vec<bool> = any.collect();
+        (mixed, std::array::from_fn(|_| any.clone()))
+    }
+
     /// Of columns of x, y and z, one behind the other.
     pub(crate) fn mix_columns(self, columns: &mut DMatrix<f64>) {
         let Some(m) = self.0 else { return };

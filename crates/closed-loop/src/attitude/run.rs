@@ -436,11 +436,11 @@ fn in_sample(evidence: &AttitudeEvidence<'_>, rows: usize, found: &Found) -> Opt
     Some(evidence.residuals(&Folds::whole(rows), &list, &amplitudes))
 }
 
-/// What lines and jumps are looked for in.
+/// What lines and jumps are looked for in: axes without the noise that they share, where a row counts on all of them.
 fn tracks(data: &AttitudeData, residual: &Residuals, changes: Option<&SpatialErrors>) -> Series {
-    let (axes, outlier) = (&residual.axes, &data.outlier);
+    let (axes, outlier) = data.mixing.mix_rows(&residual.axes, &data.outlier);
     Series::of(&leftover::attitude_tracks(
-        &data.t_s, axes, outlier, changes,
+        &data.t_s, &axes, &outlier, changes,
     ))
 }
 

@@ -1,5 +1,6 @@
 //! The loop on bundles of known truth.
 
+mod attitudes;
 mod declared;
 mod free_frames;
 mod gaps;
