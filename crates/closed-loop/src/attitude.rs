@@ -9,6 +9,7 @@
 //! spatial_errors  what the declared model itself makes of crossing and changing stars
 //! imagined        the same from drawn skies and fields, and its lines
 //! likeness        how much of an effect that makes
+//! left            what is left follows, and what of it is slow
 //! steadied        the reference's path less its slow error
 //! ```
 //!
@@ -17,6 +18,7 @@
 pub(crate) mod data;
 mod declared_effects;
 mod imagined;
+mod left;
 mod likeness;
 mod line_level;
 pub(crate) mod mixing;

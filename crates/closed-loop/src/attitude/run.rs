@@ -11,6 +11,7 @@ use focal_plane::AttitudeSource as _;
 
 use crate::attitude::data::{AttitudeData, AttitudeEvidence};
 use crate::attitude::declared_effects;
+use crate::attitude::left::{by_axes, slow_leftover};
 use crate::attitude::mixing::Mixing;
 use crate::attitude::search::{self, Declared};
 use crate::attitude::spatial_errors::SpatialErrors;
@@ -38,14 +39,9 @@ use crate::standing_out::mark;
 use crate::unexplained::leftover::{self, Series};
 use nalgebra::{DVector, UnitQuaternion};
 use spectra::robust::median_step;
-use statrs::distribution::{ChiSquared, ContinuousCDF};
 use telemetry::AttitudeResiduals;
-use telemetry::report::{Dependence, Errors, Report, Rows, Unattributed};
+use telemetry::report::{Errors, Report, Rows};
 
-/// A correlated part below this share of the variance of its axis, or that the
-/// likelihood hardly sees, is not worth a word.
-const SLOW_SHARE: f64 = 0.1;
-const SLOW_GAIN: f64 = 20.0;
 /// A slow error of so many times the declared is as declared: over a few correlation times its size is known to
 /// a half.
 const WIDER: f64 = 2.0;
@@ -109,7 +105,8 @@ pub(crate) fn run(
         let (bins, start) = (&data.bins.folds, fit_noise(data, &before));
         let (found, noise, refused) =
             search::search(&with_noise, data, bins, &folds, list, declared, start)?;
-        let inside = in_sample(&with_noise(noise), data.t_s.len(), &found);
+        let chosen = &found.selection.chosen;
+        let inside = in_sample(&with_noise(noise), data.t_s.len(), &found, chosen);
         let series = inside
             .as_ref()
             .map(|inside| tracks(data, inside, changes.as_ref()));
@@ -359,69 +356,15 @@ fn leftover_terms(situation: &Situation<'_>, data: &AttitudeData) -> Vec<Arc<dyn
     terms
 }
 
-/// A slowly varying part that no term predicts is left too: it shows as noise that
-/// is correlated in time, which the declared model does not have.
-fn slow_leftover(
-    data: &AttitudeData,
-    after: &Residuals,
-    declared: [f64; 3],
-    unattributed: &mut Unattributed,
-    left: f64,
-) {
-    let (mut slow, mut whole, mut gain, mut most) = (0.0, 0.0, 0.0, 0.0_f64);
-    for axis in 0..3 {
-        let mut means = data.binned(axis, &after.axes[axis]);
-        let count = &data.count[axis];
-        let sum: f64 = means.iter().zip(count).map(|(v, n)| v * n).sum();
-        let mean = sum / count.iter().sum::<f64>().max(1.0);
-        means.iter_mut().for_each(|v| *v -= mean);
-        let noise = Coloured::fit(&data.bins.t_s, &means, count);
-        let white = Coloured {
-            slow: 0.0,
-            white: noise.white.hypot(noise.slow),
-            ..noise
-        };
-        let loglik = |n: &Coloured| n.log_likelihood(&data.bins.t_s, &means, count);
-        let square = figures::rms(&after.axes[axis], &data.outlier[axis])
-            .map_or(0.0, |r| (r * r - mean * mean).max(f64::MIN_POSITIVE));
-        whole += square;
-        // what the declared model makes by itself is not left over
-        if noise.slow > declared[axis] {
-            slow += noise.slow * noise.slow;
-            // each axis by its own noise: that of the boresight would drown the others
-            most = most.max(noise.slow * noise.slow / square);
-            gain += (loglik(&noise) - loglik(&white)).max(0.0);
-        }
-    }
-    if most < SLOW_SHARE || gain < SLOW_GAIN {
-        return;
-    }
-    let share = (slow / whole).min(1.0);
-    unattributed.present = true;
-    unattributed.variance_fraction = Some(
-        unattributed
-            .variance_fraction
-            .unwrap_or(0.0)
-            .max(share * left),
-    );
-    unattributed.depends_on.retain(|d| d.variable != "time");
-    let entry = Dependence {
-        variable: "time".to_owned(),
-        variance_explained: share,
-        // two parameters an axis: Wilks
-        p_value: ChiSquared::new(6.0).map_or(1.0, |law| law.sf(2.0 * gain)),
-    };
-    unattributed.depends_on.insert(0, entry);
-    unattributed.depends_on.retain(figures::certain);
-    unattributed
-        .depends_on
-        .sort_by(|a, b| b.variance_explained.total_cmp(&a.variance_explained));
-}
-
 /// Residuals with the chosen effects estimated from all data: what other folds
 /// predict has steps of its own where folds meet.
-fn in_sample(evidence: &AttitudeEvidence<'_>, rows: usize, found: &Found) -> Option<Residuals> {
-    let set = columns_of(&found.fitted.groups, &found.selection.chosen);
+fn in_sample(
+    evidence: &AttitudeEvidence<'_>,
+    rows: usize,
+    found: &Found,
+    chosen: &[usize],
+) -> Option<Residuals> {
+    let set = columns_of(&found.fitted.groups, chosen);
     let value = found.fitted.fits.estimate(&set)?.value;
     let list = borrowed(&found.candidates);
     let columns = list.iter().map(|c| c.coefficients().len()).sum();
@@ -483,48 +426,6 @@ fn beyond_white(data: &AttitudeData, residual: &Residuals) -> Option<f64> {
     whole
 }
 
-/// Tells what the variables that the leftover follows explain of it in arcsec^2, each axis by its own: no more than
-/// `own` by the square, arcsec, about any axis is what the declared model makes, and not left over. `left`: share of
-/// the before variance that is left.
-fn by_axes(
-    data: &AttitudeData,
-    found: &Found,
-    plain: &Residuals,
-    with: &dyn Fn(usize) -> Result<Residuals, CloseError>,
-    own: [f64; 3],
-    left: f64,
-    unattributed: &mut Unattributed,
-) -> Result<(), CloseError> {
-    let squares = |r: &Residuals| -> [f64; 3] {
-        std::array::from_fn(|a| {
-            figures::rms(&r.axes[a], &data.outlier[a]).map_or(0.0, |rms| rms * rms)
-        })
-    };
-    let before = squares(plain);
-    let whole: f64 = before.iter().sum();
-    let (mut kept, mut most) = (Vec::new(), 0.0);
-    for mut entry in std::mem::take(&mut unattributed.depends_on) {
-        let term = figures::certain(&entry)
-            .then(|| figures::term_of(found, &entry))
-            .flatten();
-        if let Some(g) = term {
-            let after = squares(&with(g)?);
-            let gain: [f64; 3] = std::array::from_fn(|a| (before[a] - after[a]).max(0.0));
-            if (0..3).all(|a| gain[a] <= own[a] * own[a]) {
-                continue;
-            }
-            entry.variance_explained = gain.iter().sum::<f64>() / whole;
-            most = f64::max(most, entry.variance_explained);
-        }
-        kept.push(entry);
-    }
-    kept.sort_by(|a, b| b.variance_explained.total_cmp(&a.variance_explained));
-    unattributed.present = most > 0.0;
-    unattributed.variance_fraction = Some(most * left);
-    unattributed.depends_on = kept;
-    Ok(())
-}
-
 fn finish(
     situation: &Situation<'_>,
     data: &AttitudeData,
@@ -560,7 +461,7 @@ fn finish(
     let with = |g: usize| residuals(&evidence, folds, found, &[chosen.as_slice(), &[g]].concat());
     let own = changes.map_or([0.0; 3], |c| c.slow_arcsec);
     let share = last / whole;
-    by_axes(data, found, &after, &with, own, share, &mut unattributed)?;
+    let described = by_axes(data, found, &after, &with, own, share, &mut unattributed)?;
     let (surroundings, questions) = (situation.surroundings(), situation.questions);
     let mut added = chosen.clone();
     let plain = after;
@@ -614,7 +515,8 @@ fn finish(
         None => own,
     };
     // what acts in one fold alone is predicted by no other, and would be slow noise out of fold
-    let inside = in_sample(&evidence, data.t_s.len(), found);
+    let told: Vec<usize> = chosen.iter().copied().chain(described).collect();
+    let inside = in_sample(&evidence, data.t_s.len(), found, &told);
     let left = inside.as_ref().unwrap_or(&plain);
     slow_leftover(data, left, declared, &mut unattributed, last / whole);
     let series = series.unwrap_or_else(|| tracks(data, &plain, changes));

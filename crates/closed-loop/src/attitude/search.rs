@@ -68,6 +68,10 @@ const LITTLE: f64 = 8.0;
 /// 2 +- 2 less.
 const BY_FAR: f64 = 2.5;
 
+/// Nats by which a channel without a cause has to predict better than an effect, and more than which that adds
+/// nothing beside it.
+const DESCRIBED: f64 = 5.0;
+
 /// Where the climb to a hypothesis' own noise starts.
 #[derive(Clone, Copy, Debug)]
 enum Start {
@@ -173,6 +177,13 @@ pub(crate) fn search<'d>(
             banned[g] = true;
             refused.insert(family(candidates[g].as_ref()), Refusal::NoLessError);
             ranked.remove(0);
+        }
+        if let Some(&g) = ranked.first()
+            && trial.is_described(&chosen, g)
+        {
+            banned[g] = true;
+            refused.insert(family(candidates[g].as_ref()), Refusal::StandIn);
+            continue;
         }
         noise = base.noise;
         let Some(&added) = ranked.first() else {
@@ -372,6 +383,23 @@ impl<'a, 'd> Trial<'a, 'd> {
         let residual = evidence.residuals(rows, &borrowed(self.candidates), &amplitudes);
         let rms = |a: usize| figures::rms(&residual.axes[a], &self.data.outlier[a]);
         Some([rms(0)?, rms(1)?, rms(2)?].map(|r| r * r))
+    }
+
+    /// Whether a channel without a cause predicts better, alone, what `g` explains beside `chosen`.
+    fn is_described(&self, chosen: &[usize], g: usize) -> bool {
+        if follows_a_channel(self.candidates[g].as_ref()) {
+            return false;
+        }
+        let gain = |more: &[usize]| {
+            let score = self.score(&[chosen, more].concat());
+            score.map_or(f64::NEG_INFINITY, |s| s.out_of_fold)
+        };
+        let itself = gain(&[g]);
+        let channels = (0..self.candidates.len()).filter(|&c| {
+            is_a_channel(self.candidates[c].as_ref()) && !self.fitted.groups[c].columns.is_empty()
+        });
+        let mut better = channels.map(|c| (c, gain(&[c])));
+        better.any(|(c, told)| told > itself + DESCRIBED && gain(&[c, g]) < told + DESCRIBED)
     }
 
     /// Standing of group `g` beside the others of `chosen`.
