@@ -191,6 +191,7 @@ impl Assessment {
                 outliers: self.counts.outliers,
                 outside_reference: self.counts.outside,
             },
+            windows: None,
             before: errors(&closing.before_arcsec),
             after: errors(&closing.after_arcsec),
             effects: effects.collect(),

@@ -220,6 +220,7 @@ mod tests {
             verdict,
             folds: 5,
             rows: Rows::default(),
+            windows: None,
             before: errors(2.0),
             after: errors(1.5),
             effects,

@@ -25,7 +25,7 @@ use std::sync::Arc;
 
 use block_regression::{Folds, OutOfFold};
 use effects::Candidate;
-use star_images::{Formed, Stars, Variants};
+use star_images::{Formed, Stars, Unusable, Variants};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 use telemetry::report::{Estimate, FoundEffect, Selector};
 use telemetry::{EffectEntry, EffectValue, WindowTable};
@@ -47,7 +47,11 @@ pub(crate) const EFFECTIVE_PSF: &str = "effective_psf";
 const DARK_MAP_FILE: &str = "dark_map.csv";
 
 /// Dark map, spots and centroids from the raw windows, where these belong to the stars and are enough.
-pub(crate) fn form(data: &StarData, windows: &WindowTable, folds: &Folds) -> Option<Formed> {
+pub(crate) fn form(
+    data: &StarData,
+    windows: &WindowTable,
+    folds: &Folds,
+) -> Result<Formed, Unusable> {
     // With directions of its own every star's constant is free, and a distortion
     // fitted fold by fold would only add steps between the folds.
     let expected = if data.free_directions {
@@ -116,13 +120,18 @@ enum Way {
 }
 
 impl ImageLevel {
+    /// Whether centroids formed anew are adopted.
+    pub(crate) fn adopts(&self) -> bool {
+        self.dark_map.stands || self.effective_psf.stands
+    }
+
     /// The centroids that everything else is looked for in, and what is known of their zeros, px; `None`
     /// for those of the table.
     pub(crate) fn level<'a>(&self, formed: &'a Formed) -> Option<(&'a Variants, Vec<[f64; 2]>)> {
-        let (map, spot) = (self.dark_map.stands, self.effective_psf.stands);
-        if !map && !spot {
+        if !self.adopts() {
             return None;
         }
+        let (map, spot) = (self.dark_map.stands, self.effective_psf.stands);
         let side = if map {
             &formed.with_map
         } else {
@@ -142,8 +151,7 @@ impl ImageLevel {
 
     /// Whether the noise of the centroids is no longer that of the declared ones.
     pub(crate) fn new_noise(&self) -> bool {
-        matches!(self.way, Way::Fitted | Way::Gaussian | Way::Followed)
-            && (self.dark_map.stands || self.effective_psf.stands)
+        matches!(self.way, Way::Fitted | Way::Gaussian | Way::Followed) && self.adopts()
     }
 }
 

@@ -230,8 +230,8 @@ pub(crate) fn claim(
         folds,
     };
     let make = |belief: &dyn Fn(&Row) -> [f64; 2]| source.rows(belief);
-    let follows_light = situation.model.effects.iter().any(|e| e.id == MAGNITUDE)
-        || situation.bundle.images.is_some();
+    let follows_light =
+        situation.model.effects.iter().any(|e| e.id == MAGNITUDE) || situation.windows.is_some();
     let known = Known {
         moving: level.resolved,
         least_slope: if follows_light {

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 
 use effects::{FrameGeometry, Surroundings, VectorFrame};
 use focal_plane::{AttitudeSeries, Camera, Series};
-use telemetry::{Bundle, Model};
+use telemetry::{Bundle, Model, WindowTable};
 
 use crate::error::CloseError;
 use crate::motion::gyro::with_rates;
@@ -26,6 +26,8 @@ pub(crate) struct Situation<'a> {
     pub(crate) channels: BTreeMap<String, Series>,
     pub(crate) frames: Option<FrameGeometry>,
     pub(crate) reference: Option<AttitudeSeries>,
+    /// Raw windows, as long as centroids may be formed from them.
+    pub(crate) windows: Option<&'a WindowTable>,
     /// Effects that are to be tested by name.
     pub(crate) questions: &'a Questions,
     /// Year at which catalogue directions are wanted.
@@ -75,6 +77,7 @@ impl<'a> Situation<'a> {
                 quaternion_signs: f.quaternion_signs.known(),
             }),
             reference: reference(bundle),
+            windows: bundle.images.as_ref(),
             questions,
             year: bundle
                 .meta
@@ -88,6 +91,14 @@ impl<'a> Situation<'a> {
     pub(crate) fn believing<'b>(&'b self, model: &'b Model) -> Situation<'b> {
         Situation {
             model,
+            ..self.clone()
+        }
+    }
+
+    /// The same as if no windows had been sent.
+    pub(crate) fn without_windows(&self) -> Self {
+        Self {
+            windows: None,
             ..self.clone()
         }
     }

@@ -9,6 +9,7 @@
 //! light           where the light of each star fell, better than its reference says
 //! landing         where fits take the stars, and with them the light
 //! outliers        rows that stand out
+//! windows         rows that have raw windows, and those that have none
 //! nuisance        what the declared model leaves unknown, as columns with priors
 //! changes         what residuals change by from frame to frame
 //! weights         how much each star counts
@@ -53,5 +54,6 @@ mod seen_directions;
 mod settling;
 mod steadied;
 pub(crate) mod weights;
+mod windows;
 
 pub(crate) use run::run;

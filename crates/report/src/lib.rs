@@ -16,6 +16,7 @@ mod scene_figures;
 mod set_aside;
 mod text;
 mod verdict;
+mod windows;
 
 pub use assess_figures::assess_figures;
 pub use assess_text::assess_summary;

@@ -10,6 +10,7 @@ use crate::number::number;
 use crate::order::by_number;
 use crate::set_aside;
 use crate::verdict::sentence;
+use crate::windows;
 
 /// The findings of a run in words and numbers, some 20 lines of at most 100 columns.
 #[must_use]
@@ -46,6 +47,9 @@ fn verdict(out: &mut String, closed: &Closed) {
     );
     for star in set_aside::stars(closed.stars.as_ref()) {
         line!(out, "          {star}");
+    }
+    for sentence in windows::sentences(report.windows.as_ref()) {
+        wrapped(out, "          ", &sentence);
     }
     line!(out);
 }
@@ -360,6 +364,7 @@ mod tests {
                 outliers: 0,
                 outside_reference: 0,
             },
+            windows: None,
             before: Errors::default(),
             after: Errors::default(),
             effects: vec![],

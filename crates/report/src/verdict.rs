@@ -69,6 +69,7 @@ mod tests {
                 used,
                 ..Rows::default()
             },
+            windows: None,
             before: errors(),
             after: errors(),
             effects: vec![],

@@ -143,6 +143,7 @@ fn findings(stars: bool, attitude: bool) -> Report {
             outliers: 12,
             outside_reference: 58,
         },
+        windows: None,
         before: errors(1.0),
         after: errors(0.1),
         effects: vec![effect("rolling_shutter"), effect(HOSTILE)],

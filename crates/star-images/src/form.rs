@@ -2,12 +2,13 @@
 //!
 //! Not physics: the interface of the modules beside it.
 
-use std::collections::HashMap;
+use std::fmt;
 
 use focal_plane::{Camera, Pixel, StarFrames};
 use rayon::prelude::*;
 use telemetry::WindowTable;
 
+use crate::joining::windows_of_rows;
 use crate::learn::{self, Learned};
 use crate::map::{self, DarkMap};
 use crate::robust::{MAD_SCALE, robust_median};
@@ -61,8 +62,8 @@ pub struct Centroids {
     /// 1 sigma of what is constant for each star, px: what the map takes off moments, and the zeros of
     /// spots, that are set to them.
     pub zero_px: Vec<[f64; 2]>,
-    /// Rows that kept the centroid of the table, at most in any variant.
-    pub fallback_rows: usize,
+    /// Rows that some variant has no centroid for: they keep that of the table.
+    kept: Vec<bool>,
 }
 
 /// Centroids formed anew, and the map behind them.
@@ -76,6 +77,42 @@ pub struct Formed {
     pub map: DarkMap,
     /// Full width at half maximum of each star's spot, px; NaN where none could be learned.
     pub fwhm_px: Vec<f64>,
+    /// Star rows whose centroids are formed anew in every way and variant. All others keep that of the table
+    /// somewhere, with another noise and what the detector does to it: ways are to be compared without them.
+    pub anew: Vec<bool>,
+}
+
+/// Why no centroids can be formed anew from some windows. In words it goes on from "none of them can be used: ".
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Unusable {
+    /// No window that can be used has the time and slot of a star row.
+    NoWindow,
+    /// Too few frames have windows.
+    TooFewFrames {
+        /// Frames that have.
+        frames: usize,
+        /// The least that is needed.
+        need: usize,
+    },
+    /// The windows hold no light above their background.
+    NoLight,
+}
+
+impl fmt::Display for Unusable {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NoWindow => {
+                f.write_str("none has the time and slot of a star row and enough values")
+            }
+            Self::TooFewFrames { frames, need } => {
+                write!(
+                    f,
+                    "they are of {frames} frames, and at least {need} are needed"
+                )
+            }
+            Self::NoLight => f.write_str("they hold no light above their background"),
+        }
+    }
 }
 
 /// Knots of a spot, px: fine enough for the sharpest spot that a window samples.
@@ -86,13 +123,15 @@ const MARGIN_PX: f64 = 0.5;
 const MIN_FRAMES: usize = 30;
 
 /// Learns dark map and spots from the windows, outside each fold and on all
-/// data, and forms the centroids anew. `fold` is the fold of each frame, counted from 0. `None` where the
-/// windows do not belong to the star rows (by time and slot) or are too few to learn from: fewer than 30 frames.
+/// data, and forms the centroids anew. `fold` is the fold of each frame, counted from 0.
+///
+/// # Errors
+/// [`Unusable`] where the windows do not belong to the star rows (by time and slot), are too few to learn from (fewer
+/// than 30 frames), or are dark.
 ///
 /// # Panics
 /// Unless `fold` has an entry for each frame, and every slice of `data` one for each row.
-#[must_use]
-pub fn form(data: &Stars<'_>, windows: &WindowTable, fold: &[usize]) -> Option<Formed> {
+pub fn form(data: &Stars<'_>, windows: &WindowTable, fold: &[usize]) -> Result<Formed, Unusable> {
     let rows = data.frames.rows();
     assert_eq!(fold.len(), data.frames.frames(), "a fold for each frame");
     assert!(
@@ -105,10 +144,18 @@ pub fn form(data: &Stars<'_>, windows: &WindowTable, fold: &[usize]) -> Option<F
     );
     let folds = fold.iter().max().map_or(0, |last| last + 1);
     let frames = entries(data, windows);
-    if frames.iter().filter(|f| !f.is_empty()).count() < MIN_FRAMES {
-        return None;
+    let seen = frames.iter().filter(|f| !f.is_empty()).count();
+    if seen == 0 {
+        return Err(Unusable::NoWindow);
     }
-    let sample = Sample::collect(data.stars, windows.size, &windows.unread, &frames)?;
+    if seen < MIN_FRAMES {
+        return Err(Unusable::TooFewFrames {
+            frames: seen,
+            need: MIN_FRAMES,
+        });
+    }
+    let sample = Sample::collect(data.stars, windows.size, &windows.unread, &frames)
+        .ok_or(Unusable::NoLight)?;
     let grid = Grid::new(sample.reach_px() + MARGIN_PX, KNOTS_PX);
     let length_px = data.camera.half_size_px().into_iter().fold(0.0, f64::max);
     let learn = |mapped: bool| -> Vec<Learned> {
@@ -126,7 +173,7 @@ pub fn form(data: &Stars<'_>, windows: &WindowTable, fold: &[usize]) -> Option<F
         || centroids(data, &sample, &learned, fold),
         || centroids(data, &sample, &bare, fold),
     );
-    let all = learned.pop()?;
+    let all = learned.pop().ok_or(Unusable::NoWindow)?;
     let width = |s: &learn::Spot| {
         if s.psi.is_empty() {
             f64::NAN
@@ -134,7 +181,9 @@ pub fn form(data: &Stars<'_>, windows: &WindowTable, fold: &[usize]) -> Option<F
             spot::fwhm_px(&grid, &s.psi)
         }
     };
-    Some(Formed {
+    let kept = without_map.kept.iter().zip(&with_map.kept);
+    Ok(Formed {
+        anew: kept.map(|(a, b)| !(a | b)).collect(),
         without_map,
         with_map,
         fwhm_px: all.spots.iter().map(width).collect(),
@@ -150,7 +199,10 @@ fn centroids(data: &Stars<'_>, sample: &Sample, learned: &[Learned], fold: &[usi
         .enumerate()
         .map(|(k, one)| one_variant(data, sample, one, |frame| fold[frame] != k))
         .collect();
-    let mut out = Centroids::default();
+    let mut out = Centroids {
+        kept: vec![false; data.frames.rows()],
+        ..Centroids::default()
+    };
     let any = made.iter().any(|m| m.switching > 0);
     for one in made {
         let [moments, plain, unbiased, fitted, gaussian, followed] = one.variants;
@@ -163,9 +215,11 @@ fn centroids(data: &Stars<'_>, sample: &Sample, learned: &[Learned], fold: &[usi
             out.followed.push(followed);
         }
         out.switching = one.switching;
-        out.fallback_rows = out.fallback_rows.max(one.fallback);
+        for (kept, one) in out.kept.iter_mut().zip(one.kept) {
+            *kept |= one;
+        }
     }
-    out.zero_px = zeros(data, &[&out.moments, &out.fitted]);
+    out.zero_px = zeros(data, &out.kept, &[&out.moments, &out.fitted]);
     out
 }
 
@@ -174,7 +228,7 @@ struct Made {
     /// Moments, plain moments, these less their bias, fits, Gaussian fits, and fits with switching pixels followed.
     variants: [[Vec<f64>; 2]; WAYS],
     /// Rows that are those of the table.
-    fallback: usize,
+    kept: Vec<bool>,
     /// Pixels that are followed.
     switching: usize,
 }
@@ -230,12 +284,12 @@ fn one_variant(
         .into_iter()
         .map(|star| star.map(|list| clipped_mean(&list)))
         .collect();
-    let mut fallback = data.frames.rows() - sample.windows();
+    let mut kept = vec![true; data.frames.rows()];
     for (w, found) in formed.into_iter().enumerate() {
         let Some(found) = found else {
-            fallback += 1;
             continue;
         };
+        kept[sample.row[w]] = false;
         for (k, (variant, at)) in variants.iter_mut().zip(found).enumerate() {
             for axis in 0..2 {
                 let zero = k
@@ -247,7 +301,7 @@ fn one_variant(
     }
     Made {
         variants,
-        fallback,
+        kept,
         switching,
     }
 }
@@ -298,10 +352,10 @@ fn clipped_mean(values: &[f64]) -> f64 {
 
 /// 1 sigma of each star's mean position, px, from its scatter between what was learned outside each fold
 /// (delete-one jackknife), the largest over `kinds`; with few folds each star's own is drawn half way to the
-/// mean over all.
+/// mean over all. Rows `kept` from the table know nothing of it.
 ///
 /// Source: Efron & Stein 1981, Annals of Statistics 9, 586 (jackknife).
-fn zeros(data: &Stars<'_>, kinds: &[&Variants]) -> Vec<[f64; 2]> {
+fn zeros(data: &Stars<'_>, kept: &[bool], kinds: &[&Variants]) -> Vec<[f64; 2]> {
     let stars = data.stars;
     let mut largest = vec![[0.0_f64; 2]; stars];
     for variants in kinds {
@@ -315,7 +369,7 @@ fn zeros(data: &Stars<'_>, kinds: &[&Variants]) -> Vec<[f64; 2]> {
         for axis in 0..2 {
             let mut means = vec![vec![0.0; stars]; folds];
             let mut rows = vec![0.0_f64; stars];
-            for (row, &star) in data.star.iter().enumerate() {
+            for (row, &star) in data.star.iter().enumerate().filter(|(row, _)| !kept[*row]) {
                 rows[star] += 1.0;
                 for (mean, variant) in means.iter_mut().zip(variants.iter()) {
                     // from the table's: positions on a wide detector lose digits
@@ -341,14 +395,7 @@ fn zeros(data: &Stars<'_>, kinds: &[&Variants]) -> Vec<[f64; 2]> {
 
 /// The windows of the star rows, frame by frame; a row without one has no entry.
 fn entries<'a>(data: &Stars<'_>, windows: &'a WindowTable) -> Vec<Vec<Entry<'a>>> {
-    let key = |t_s: f64, slot: i32| (t_s.to_bits(), slot);
-    let at: HashMap<(u64, i32), usize> = windows
-        .t_s
-        .iter()
-        .zip(&windows.slot)
-        .enumerate()
-        .map(|(i, (&t, &s))| (key(t, s), i))
-        .collect();
+    let window = windows_of_rows(data.frames, windows);
     // Outliers are kept: a warm pixel that few windows cross looks like one, and
     // particle hits are left out pixel by pixel.
     (0..data.frames.frames())
@@ -356,7 +403,7 @@ fn entries<'a>(data: &Stars<'_>, windows: &'a WindowTable) -> Vec<Vec<Entry<'a>>
             data.frames
                 .rows_of(k)
                 .filter_map(|row| {
-                    let i = *at.get(&key(data.frames.t_s[k], data.frames.slot[row]))?;
+                    let i = window[row]?;
                     let centre = Pixel {
                         x: data.expected_px[0][row],
                         y: data.expected_px[1][row],

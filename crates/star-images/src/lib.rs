@@ -19,6 +19,7 @@
 //! | positions of the effective spot | [`Centroids::fitted`] |
 //! | positions of the round Gaussian nearest to it | [`Centroids::gaussian`] |
 //! | positions of the effective spot, pixels that switch followed in time | [`Centroids::followed`] |
+//! | rows that have a centroid formed in each of these ways | [`Formed::anew`] |
 //! | the map, with a sigma for every pixel | [`Formed::map`], [`DarkMap`] |
 //! | all of the former with a map and without | [`Formed::with_map`], [`Formed::without_map`] |
 //!
@@ -33,6 +34,7 @@ mod dark;
 mod form;
 mod gaussian_spot;
 mod geometry;
+mod joining;
 mod learn;
 mod map;
 mod moment_level;
@@ -46,5 +48,6 @@ mod switching;
 mod synthetic;
 mod window_fit;
 
-pub use form::{Centroids, Formed, Stars, Variants, form};
+pub use form::{Centroids, Formed, Stars, Unusable, Variants, form};
+pub use joining::windows_of_rows;
 pub use map::{DarkMap, DarkPixel};

@@ -143,18 +143,14 @@ impl Sample {
 
     fn push(&mut self, entry: &Entry<'_>, table_flux: bool, pixels: &mut Pixels) {
         let numbers = [entry.start, entry.base, entry.corner];
-        let usable = numbers
-            .as_flattened()
-            .iter()
-            .all(|v| v.abs() < MAX_PIXEL_INDEX)
+        let usable = numbers.into_iter().all(on_a_detector)
             && entry.jacobian.as_flattened().iter().all(|v| v.is_finite());
         let values = || {
             self.cells
                 .iter()
                 .map(|&[c, r]| entry.values[r * self.size[0] + c])
         };
-        let read = values().filter(|v| v.is_finite()).count();
-        if !usable || 2 * read <= self.cells.len() {
+        if !usable || !read_enough(values()) {
             return;
         }
         let lowest = values()
@@ -267,6 +263,19 @@ impl Sample {
         // a centroid off its window is an error, not a wide spot
         reach.fold(0.0, f64::max).min(0.5 * largest + 1.5)
     }
+}
+
+/// Whether a position, px, is a number that a pixel may have.
+pub(crate) fn on_a_detector(at: [f64; 2]) -> bool {
+    at.iter().all(|v| v.abs() < MAX_PIXEL_INDEX)
+}
+
+/// Whether more than half of what is read out of a window has a value.
+pub(crate) fn read_enough(values: impl Iterator<Item = f64>) -> bool {
+    let [all, finite] = values.fold([0_usize; 2], |[all, finite], v| {
+        [all + 1, finite + usize::from(v.is_finite())]
+    });
+    2 * finite > all
 }
 
 /// Numbers given to detector pixels in the order of their first appearance.

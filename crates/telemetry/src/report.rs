@@ -39,6 +39,9 @@ pub struct Report {
     pub folds: usize,
     /// Rows used and left out.
     pub rows: Rows,
+    /// What became of the raw windows, where the bundle has them beside stars.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub windows: Option<Windows>,
     /// The declared model at its best.
     pub before: Errors,
     /// With the effects listed.
@@ -77,6 +80,21 @@ pub struct Rows {
     pub outliers: usize,
     /// Rows outside the span of the reference, or around which too little of it is known.
     pub outside_reference: usize,
+}
+
+/// What became of the raw windows beside the star rows.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Windows {
+    /// Windows with the time and slot of a star row.
+    pub used: usize,
+    /// Windows that could not be used: of no star row, off the detector, or without values in most pixels.
+    pub unused: usize,
+    /// Star rows that have no window that can be used.
+    pub rows_without: usize,
+    /// Rows left out of search and figures because the others' centroids were formed anew and theirs could not be.
+    pub rows_left_out: usize,
+    /// Why no centroids were formed anew, in words; `None` where they were.
+    pub not_formed: Option<String>,
 }
 
 /// Size of the residuals under a model.

@@ -563,6 +563,7 @@ fn finish(
             outliers: count,
             outside_reference: data.outside_reference,
         },
+        windows: None,
         before: errors(&before),
         after: errors(&after),
         effects,

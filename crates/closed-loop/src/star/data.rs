@@ -136,6 +136,8 @@ pub(crate) struct StarData {
     pub(crate) outside_reference: usize,
     /// Those of them that are rows here, among the outliers.
     pub(crate) unplaced: usize,
+    /// Rows among the outliers that are none, but whose centroids could not be formed anew.
+    pub(crate) unformed: usize,
 }
 
 /// What [`StarData::prepare`] starts from.
@@ -322,6 +324,7 @@ impl StarData {
             window_px: [Vec::new(), Vec::new()],
             outside_reference: from.rows() - n,
             unplaced: 0,
+            unformed: 0,
             frames,
             stars,
             star,

@@ -72,7 +72,7 @@ impl<'a> StarEvidence<'a> {
     ) -> Self {
         let temporal = situation.model.noise.temporal_arcsec.filter(|s| *s > 0.0);
         // where windows are sent, centroids are formed anew, with another noise
-        let (weight, drawn) = if situation.bundle.images.is_some() {
+        let (weight, drawn) = if situation.windows.is_some() {
             (vec![1.0; data.t_s.len()], None)
         } else {
             let changes = changes::of(data);

@@ -6,7 +6,7 @@
 use block_regression::Folds;
 use spectra::robust::median_step;
 use star_images::Formed;
-use telemetry::report::{ConsideredEffect, Errors, FoundEffect, Report, Rows};
+use telemetry::report::{ConsideredEffect, Errors, FoundEffect, Report, Rows, Windows};
 use telemetry::{DarkMap, Model, StarResiduals};
 
 use crate::causes::commonness::Slow;
@@ -53,7 +53,9 @@ pub(crate) struct Finish<'a> {
     /// What was looked for without candidates.
     pub(crate) orbit: Option<Look>,
     pub(crate) settled: &'a Settled,
-    pub(crate) image: Option<(&'a ImageLevel, &'a Formed)>,
+    pub(crate) image: Option<&'a ImageLevel>,
+    /// Centroids formed anew from the same rows.
+    pub(crate) formed: Option<&'a Formed>,
 }
 
 impl Finish<'_> {
@@ -72,7 +74,9 @@ impl Finish<'_> {
         if self.level.noise.is_some() && !claimed && !landed && self.image.is_none() {
             return Ok((self.residuals(&[])?, self.found.fitted.data_loglik(&[])));
         }
-        let loglik = match self.settled.loglik {
+        // that of the same rows
+        let settled = self.settled.loglik.filter(|_| self.data.unformed == 0);
+        let loglik = match settled {
             Some(known) => Some(known),
             None => fit(self.measured, self.folds, &[])?.data_loglik(&[]),
         };
@@ -169,7 +173,7 @@ pub(crate) fn finish(
         median_step(&f.data.frames.t_s).unwrap_or(1.0),
         &mut effects,
     )?;
-    if let Some((level, formed)) = f.image {
+    if let Some((level, formed)) = f.image.zip(f.formed) {
         for (at, (effect, entry)) in image_level::effects(level, formed).into_iter().enumerate() {
             effects.insert(at, effect);
             entries.insert(at, entry);
@@ -225,10 +229,10 @@ pub(crate) fn finish(
     drop(turned);
     let mut noise = noise?;
     let mut noise_left = noise_effects::NoiseFollows::default();
-    if f.image.is_some_and(|(level, _)| level.new_noise()) {
+    if f.image.is_some_and(ImageLevel::new_noise) {
         noise = noise.without_magnitude();
     }
-    if f.image.is_none() && !f.data.frames_are_unrelated() {
+    if f.formed.is_none() && !f.data.frames_are_unrelated() {
         let of = description::of_noise(f.situation, f.data);
         let claimed = &noise;
         noise_left =
@@ -271,7 +275,7 @@ pub(crate) fn finish(
             .filter(|c| c.id == wander.id)
             .for_each(|c| c.clone_from(&wander));
     }
-    if let Some((level, _)) = f.image {
+    if let Some(level) = f.image {
         for (id, step) in [
             (image_level::DARK_MAP, &level.dark_map),
             (image_level::EFFECTIVE_PSF, &level.effective_psf),
@@ -326,9 +330,14 @@ pub(crate) fn finish(
         folds: f.folds.count,
         rows: Rows {
             used: f.data.t_s.len() - set_aside,
-            outliers: set_aside - f.data.unplaced,
+            outliers: set_aside - f.data.unplaced - f.data.unformed,
             outside_reference: f.data.outside_reference,
         },
+        // the rest of it is told by whoever knows the rows that are none here
+        windows: f.formed.map(|_| Windows {
+            rows_left_out: f.data.unformed,
+            ..Windows::default()
+        }),
         before: f.errors(
             f.situation.model,
             &before,
@@ -373,9 +382,9 @@ pub(crate) fn finish(
         }),
         attitude,
         dark_map: f
-            .image
-            .filter(|(level, _)| level.dark_map.stands)
-            .map(|(_, formed)| DarkMap {
+            .formed
+            .filter(|_| f.image.is_some_and(|level| level.dark_map.stands))
+            .map(|formed| DarkMap {
                 x_px: formed.map.pixels.iter().map(|p| p.x_px).collect(),
                 y_px: formed.map.pixels.iter().map(|p| p.y_px).collect(),
                 dn: formed.map.pixels.iter().map(|p| p.dn).collect(),
@@ -383,7 +392,7 @@ pub(crate) fn finish(
             }),
         rivals: f
             .image
-            .map(|(level, _)| level.rivals.clone())
+            .map(|level| level.rivals.clone())
             .unwrap_or_default(),
     })
 }

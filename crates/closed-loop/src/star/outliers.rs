@@ -17,6 +17,21 @@ use crate::star::data::StarData;
 const FEW_ROWS: usize = 10;
 
 impl StarData {
+    /// The same with the rows set aside whose centroids are not formed `anew`; `None` if there are none.
+    pub(crate) fn formed_anew(&self, anew: &[bool]) -> Option<Self> {
+        let lost = |r: &usize| !anew[*r] && !self.outlier[*r];
+        let lost: Vec<usize> = (0..anew.len()).filter(lost).collect();
+        if lost.is_empty() {
+            return None;
+        }
+        let mut out = self.clone();
+        for &r in &lost {
+            out.outlier[r] = true;
+        }
+        out.unformed = lost.len();
+        Some(out)
+    }
+
     /// Rows that are no outliers.
     pub(crate) fn counted(&self) -> usize {
         self.outlier.iter().filter(|out| !**out).count()

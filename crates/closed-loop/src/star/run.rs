@@ -3,7 +3,8 @@
 //!
 //! Where raw windows are there, what is left is traced to the detector first:
 //! centroids are formed anew with a dark map learned outside each fold, and the
-//! rival explanation, a function of pixel phase, is tried on the same footing.
+//! rival explanation, a function of pixel phase, is tried on the same footing. Where some rows have no window,
+//! that is done on the others, and on all rows without windows if it was in vain.
 //!
 //! Not physics: the order of the steps.
 
@@ -11,15 +12,16 @@ use std::sync::Arc;
 
 use block_regression::Folds;
 use effects::{Candidate, Scene, StarFacts, WarmPixels};
-use focal_plane::{AttitudeSeries, Points};
+use focal_plane::{AttitudeSeries, Points, StarFrames};
 use spectra::robust::median_step;
+use star_images::{Formed, Unusable};
 
 use crate::causes::description;
 use crate::causes::{self, Named, Outcome, Quest};
 use crate::declared;
 use crate::error::CloseError;
 use crate::figures;
-use crate::image_level::{self, Side};
+use crate::image_level::{self, ImageLevel, Side};
 use crate::motion::{self, Around, gyro::with_rates, source};
 use crate::outcome::Closed;
 use crate::search::catalogue;
@@ -34,6 +36,7 @@ use crate::star::pointed::Pointed;
 use crate::star::search::{Searched, Wander, in_vain};
 use crate::star::settling::{Settled, settle};
 use crate::star::steadied::steadied;
+use crate::star::windows::{self, AsMeasured, Seen};
 use crate::unexplained::leftover::{self, Series};
 
 /// Fewest frames: every fold needs data to be predicted from.
@@ -52,6 +55,76 @@ pub(crate) fn run(
         .stars
         .as_ref()
         .ok_or(CloseError::NothingToCompare("no stars"))?;
+    let Some(table) = situation.windows else {
+        return as_measured(situation, frames, None, progress);
+    };
+    let seen = Seen::of(frames, table);
+    let some = seen.some(frames);
+    let known = Known {
+        in_part: some.is_some(),
+        ..Known::default()
+    };
+    let ended = match (seen.count.used, &some) {
+        (0, _) => Ended::AsMeasured(Unusable::NoWindow.into()),
+        (_, None) => on_rows(situation, frames, &known, progress)?,
+        (_, Some(some)) => match on_rows(situation, some, &known, progress) {
+            Err(error) => Ended::AsMeasured(windows::too_few(&error).ok_or(error)?),
+            Ok(ended) => ended,
+        },
+    };
+    let mut count = seen.count;
+    let mut closed = match ended {
+        Ended::Closed(closed) => {
+            let unformed = closed.report.windows.as_ref();
+            let unformed = unformed.map_or(0, |w| w.rows_left_out);
+            count.rows_left_out = count.rows_without + unformed;
+            *closed
+        }
+        Ended::AsMeasured(why) => {
+            let situation = situation.without_windows();
+            let closed = as_measured(&situation, frames, Some(&why), progress)?;
+            if let AsMeasured::Unusable(why) = why {
+                count.not_formed = Some(why);
+            }
+            closed
+        }
+    };
+    closed.report.windows = Some(count);
+    Ok(closed)
+}
+
+/// All rows with the centroids of the table, whatever windows there are.
+fn as_measured(
+    situation: &Situation<'_>,
+    frames: &StarFrames,
+    why: Option<&AsMeasured>,
+    progress: &dyn Fn(&str),
+) -> Result<Closed, CloseError> {
+    let known = Known {
+        as_measured: why,
+        ..Known::default()
+    };
+    match on_rows(situation, frames, &known, progress)? {
+        Ended::Closed(closed) => Ok(*closed),
+        // only windows lead there
+        Ended::AsMeasured(_) => Err(CloseError::NothingToCompare("no windows")),
+    }
+}
+
+/// How a run on some rows ends.
+enum Ended {
+    Closed(Box<Closed>),
+    /// No centroids formed anew are adopted, so that it has to be run without windows.
+    AsMeasured(AsMeasured),
+}
+
+/// From these star rows to the report.
+fn on_rows(
+    situation: &Situation<'_>,
+    frames: &StarFrames,
+    known: &Known<'_>,
+    progress: &dyn Fn(&str),
+) -> Result<Ended, CloseError> {
     progress("joining stars, reference and catalogue");
     let phase = declared::OnCentroids::of(situation)?;
     let find = |id: i64| -> Option<Star> { situation.star(id) };
@@ -74,7 +147,7 @@ pub(crate) fn run(
             why: "the others lie outside the reference, or have no two stars to solve an attitude from",
         });
     }
-    if let Some(windows) = &situation.bundle.images {
+    if let Some(windows) = situation.windows {
         data.see_windows(windows);
     }
     let unrelated = data.frames_are_unrelated();
@@ -84,14 +157,17 @@ pub(crate) fn run(
         Folds::cut(data.frames.frames())
     };
     for _ in 0..OUTLIER_ROUNDS {
-        let closed = trace(&mut data, situation, &phase, &folds, progress)?;
+        let ended = trace(&mut data, situation, &phase, &folds, known, progress)?;
+        let Ended::Closed(closed) = &ended else {
+            return Ok(ended);
+        };
         // a star mistaken for another hides in the residual of a lens that nobody calibrated
         let left = closed.stars.as_ref().filter(|_| unrelated);
         if left.is_none_or(|s| data.mark_outliers(&[&s.after_arcsec]) == 0) {
-            return Ok(closed);
+            return Ok(ended);
         }
     }
-    trace(&mut data, situation, &phase, &folds, progress)
+    trace(&mut data, situation, &phase, &folds, known, progress)
 }
 
 /// From the residual of the declared model to the report.
@@ -100,19 +176,21 @@ fn trace(
     situation: &Situation<'_>,
     phase: &declared::OnCentroids,
     folds: &Folds,
+    before: &Known<'_>,
     progress: &dyn Fn(&str),
-) -> Result<Closed, CloseError> {
+) -> Result<Ended, CloseError> {
     progress("residuals of the declared model");
     data.lands_as_modelled();
     let mut settled = settle(data, situation, phase, folds)?;
     let mut known = Known {
         landings: LANDINGS,
-        ..Known::default()
+        ..before.clone()
     };
     loop {
         let Elsewhere { shifts, forms } =
             match explain(data, situation, phase, folds, &settled, &known, progress)? {
-                Explained::Closed(closed) => return Ok(*closed),
+                Explained::Closed(closed) => return Ok(Ended::Closed(closed)),
+                Explained::AsMeasured(why) => return Ok(Ended::AsMeasured(*why)),
                 Explained::Steadier(path) => {
                     known.path = Some(path);
                     continue;
@@ -130,8 +208,12 @@ fn trace(
 }
 
 /// What searches before know.
-#[derive(Default)]
-struct Known {
+#[derive(Clone, Default)]
+struct Known<'a> {
+    /// Whether there are rows without windows beside these.
+    in_part: bool,
+    /// Why the centroids of the table stay.
+    as_measured: Option<&'a AsMeasured>,
     /// The reference's motion without its slow error.
     path: Option<AttitudeSeries>,
     /// What was chosen, in its polished form, and its place among the candidates.
@@ -140,7 +222,7 @@ struct Known {
     landings: usize,
 }
 
-impl Known {
+impl Known<'_> {
     /// Puts polished forms in the place of the same candidates of `list`: another polish has little left to do.
     fn polished(&self, list: &mut [Arc<dyn Candidate>]) {
         let cause = |c: &dyn Candidate| (family(c), c.part(), c.nonlinear().len());
@@ -157,6 +239,8 @@ impl Known {
 /// What a search ends with.
 enum Explained {
     Closed(Box<Closed>),
+    /// The centroids of the table are to stay, as if there were no windows.
+    AsMeasured(Box<AsMeasured>),
     /// What was found shifts the light to another pixel phase than the fits assumed.
     Elsewhere(Box<Elsewhere>),
     /// Something is left that follows the motion of a reference that errs slowly: its path without that error.
@@ -170,7 +254,7 @@ fn explain(
     phase: &declared::OnCentroids,
     folds: &Folds,
     settled: &Settled,
-    before: &Known,
+    before: &Known<'_>,
     progress: &dyn Fn(&str),
 ) -> Result<Explained, CloseError> {
     let own = match &situation.reference {
@@ -191,60 +275,36 @@ fn explain(
     };
     let motion = around.as_ref();
     data.follow(source(motion));
-    let data = &*data;
-    let measured = StarEvidence::new(data, situation, vec![data.measured_residual()], motion);
-
-    let formed = match &situation.bundle.images {
+    let whole = &*data;
+    let formed = match situation.windows {
         Some(windows) => {
             progress("dark map from the raw windows");
-            image_level::form(data, windows, folds)
+            match image_level::form(whole, windows, folds) {
+                Ok(formed) => Some(formed),
+                Err(why) => return Ok(Explained::AsMeasured(Box::new(why.into()))),
+            }
         }
         None => None,
     };
-    let anew = |variants: &[[Vec<f64>; 2]], zero_px: &[[f64; 2]]| {
-        let residuals = variants
-            .iter()
-            .map(|c| data.residual_arcsec(Points { x: &c[0], y: &c[1] }))
-            .collect();
-        let evidence = StarEvidence::new(data, situation, residuals, motion);
-        StarEvidence {
-            nuisance: evidence.nuisance.with_zeros(data, zero_px),
-            ..evidence
-        }
-    };
-    let sides = formed.as_ref().map(|f| {
-        [&f.without_map, &f.with_map].map(|c| Side {
-            moments: anew(&c.moments, &c.zero_px),
-            plain: anew(&c.plain, &c.zero_px),
-            unbiased: anew(&c.unbiased, &c.zero_px),
-            fitted: anew(&c.fitted, &c.zero_px),
-            gaussian: anew(&c.gaussian, &c.zero_px),
-            followed: (!c.followed.is_empty()).then(|| anew(&c.followed, &c.zero_px)),
-        })
-    });
-
+    let clean = formed.as_ref().and_then(|f| whole.formed_anew(&f.anew));
+    let clean = clean.as_ref().unwrap_or(whole);
     progress("searching for causes");
-    let (facts, warm) = {
-        let pointed = Pointed::of(data, &settled.before, &measured.weight);
-        let rows = data.rows(0..data.t_s.len(), source(motion), None);
-        (pointed.stars(), pointed.pixels(&rows))
-    };
-    let scene = scene(situation, data, &facts, &warm);
-    let image = match &sides {
-        Some(sides) => {
-            let mut others = catalogue::candidates(&scene);
-            others.retain(|c| c.acts_on_stars());
-            let phase: Vec<_> = others
-                .extract_if(.., |c| c.id() == "pixel_phase_harmonics")
-                .collect();
-            let beside = [phase.as_slice(), &others];
-            Some(image_level::compare(&measured, sides, beside, folds, data)?)
-        }
+    let mut image = match &formed {
+        Some(formed) => Some(compared(clean, situation, motion, folds, settled, formed)?),
         None => None,
     };
+    let adopts = image.as_ref().is_some_and(ImageLevel::adopts);
+    if let Some(image) = image.take_if(|_| before.in_part && !adopts) {
+        let why = AsMeasured::Compared(image);
+        return Ok(Explained::AsMeasured(Box::new(why)));
+    }
+    let data = if adopts { clean } else { whole };
+    let measured = StarEvidence::new(data, situation, vec![data.measured_residual()], motion);
+    let (facts, warm) = pointed_at(data, motion, &measured, settled);
+    let scene = scene(situation, data, &facts, &warm);
     let own = image.as_ref().zip(formed.as_ref());
     let own = own.and_then(|(image, formed)| image.level(formed));
-    let own = own.map(|(variants, zero_px)| anew(variants, &zero_px));
+    let own = own.map(|(variants, zero_px)| anew(data, situation, motion, variants, &zero_px));
     let level = own.as_ref().unwrap_or(&measured);
     let ways = description::ways(situation, data);
     let reference = path.or(situation.reference.as_ref());
@@ -360,7 +420,11 @@ fn explain(
         wander: searched.wander.as_ref(),
         orbit: look,
         settled,
-        image: image.as_ref().zip(formed.as_ref()),
+        image: match before.as_measured {
+            Some(AsMeasured::Compared(image)) => Some(image),
+            _ => image.as_ref(),
+        },
+        formed: formed.as_ref(),
     };
     let after = whole.residuals(&searched.found.selection.chosen)?;
     if landings > 0
@@ -375,6 +439,68 @@ fn explain(
     // some hundred megabytes, which whoever writes the report need not wait for
     rayon::spawn(move || drop((described, searched.found)));
     Ok(Explained::Closed(Box::new(closed)))
+}
+
+/// Ways to form centroids anew beside those of the table.
+fn compared(
+    data: &StarData,
+    situation: &Situation<'_>,
+    motion: Option<&Around>,
+    folds: &Folds,
+    settled: &Settled,
+    formed: &Formed,
+) -> Result<ImageLevel, CloseError> {
+    let measured = StarEvidence::new(data, situation, vec![data.measured_residual()], motion);
+    let sides = [&formed.without_map, &formed.with_map].map(|c| {
+        let anew = |variants| anew(data, situation, motion, variants, &c.zero_px);
+        Side {
+            moments: anew(&c.moments),
+            plain: anew(&c.plain),
+            unbiased: anew(&c.unbiased),
+            fitted: anew(&c.fitted),
+            gaussian: anew(&c.gaussian),
+            followed: (!c.followed.is_empty()).then(|| anew(&c.followed)),
+        }
+    });
+    let (facts, warm) = pointed_at(data, motion, &measured, settled);
+    let mut others = catalogue::candidates(&scene(situation, data, &facts, &warm));
+    others.retain(|c| c.acts_on_stars());
+    let phase: Vec<_> = others
+        .extract_if(.., |c| c.id() == "pixel_phase_harmonics")
+        .collect();
+    let beside = [phase.as_slice(), &others];
+    image_level::compare(&measured, &sides, beside, folds, data)
+}
+
+/// Centroids formed anew as evidence; `zero_px` is 1 sigma of what is constant for each star, px.
+fn anew<'a>(
+    data: &'a StarData,
+    situation: &Situation<'_>,
+    motion: Option<&'a Around>,
+    variants: &[[Vec<f64>; 2]],
+    zero_px: &[[f64; 2]],
+) -> StarEvidence<'a> {
+    let residuals = variants
+        .iter()
+        .map(|c| data.residual_arcsec(Points { x: &c[0], y: &c[1] }))
+        .collect();
+    let evidence = StarEvidence::new(data, situation, residuals, motion);
+    StarEvidence {
+        nuisance: evidence.nuisance.with_zeros(data, zero_px),
+        ..evidence
+    }
+}
+
+/// Stars and pixels that the residual of the declared model points at.
+fn pointed_at(
+    data: &StarData,
+    motion: Option<&Around>,
+    measured: &StarEvidence<'_>,
+    settled: &Settled,
+) -> (Vec<StarFacts>, WarmPixels) {
+    let pointed = Pointed::of(data, &settled.before, &measured.weight);
+    let rows = data.rows(0..data.t_s.len(), source(motion), None);
+    (pointed.stars(), pointed.pixels(&rows))
 }
 
 /// The orbit that turns the camera in place of what was found to, or beside what is left of that.

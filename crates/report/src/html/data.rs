@@ -9,6 +9,7 @@ use super::write::{Cell, count, escaped};
 use super::{Page, Run};
 use crate::number::short;
 use crate::set_aside;
+use crate::windows;
 
 /// Longest model that is shown, bytes.
 const MODEL: usize = 20_000;
@@ -120,6 +121,9 @@ pub(super) fn in_a_line(page: &mut Page, run: &Run<'_>) {
     ));
     for star in set_aside::stars(run.closed.stars.as_ref()) {
         page.paragraph(&star);
+    }
+    for sentence in windows::sentences(report.windows.as_ref()) {
+        page.paragraph(&sentence);
     }
 }
 

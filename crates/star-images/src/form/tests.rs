@@ -128,7 +128,7 @@ fn errors_of_the_map_are_honest() {
     let formed = formed(&made);
     let rms = rms_of(&pulls(&made, &formed.map, &warm));
     assert!((0.8..1.32).contains(&rms), "deviations of {rms} sigma");
-    assert_eq!(formed.with_map.fallback_rows, 0);
+    assert!(formed.anew.iter().all(|a| *a));
 }
 
 /// First moments with the map off are better than plain ones on a clean detector,
@@ -283,7 +283,7 @@ fn a_map_belongs_to_the_detector() {
 
     let (without_second, without_first) = (make(&dark, 1), make(&dark, 0));
     let (first, second) = (formed(&without_second), formed(&without_first));
-    assert_eq!(first.with_map.fallback_rows, 800);
+    assert_eq!(first.anew.iter().filter(|a| !**a).count(), 800);
     let (a, b) = (pixel(&first.map), pixel(&second.map));
     for p in [a, b, pixel(&whole)] {
         assert!((p.dn - size).abs() < 5.0 * p.sigma_dn + 1.0, "{p:?}");
@@ -424,15 +424,20 @@ fn little_or_foreign_data_is_no_failure() {
         ..scenario()
     }
     .make();
-    assert!(form(&few.data.stars(), &few.windows, &folds(12)).is_none());
+    let why = |made: &Made, frames| form(&made.data.stars(), &made.windows, &folds(frames)).err();
+    let few_frames = Unusable::TooFewFrames {
+        frames: 12,
+        need: MIN_FRAMES,
+    };
+    assert_eq!(why(&few, 12), Some(few_frames));
     let mut strange = scenario().make();
     for t in &mut strange.windows.t_s {
         *t += 0.5;
     }
-    assert!(form(&strange.data.stars(), &strange.windows, &folds(400)).is_none());
+    assert_eq!(why(&strange, 400), Some(Unusable::NoWindow));
     let mut black = scenario().make();
     black.windows.pixels.fill(BACKGROUND);
-    assert!(form(&black.data.stars(), &black.windows, &folds(400)).is_none());
+    assert_eq!(why(&black, 400), Some(Unusable::NoLight));
 }
 
 /// A spot that never moves over its pixels cannot be told from them: the errors say so, whether the pixels are
@@ -485,7 +490,7 @@ fn stars_may_come_and_go() {
     // no spot can be learned from five windows
     let missing = (0..400).flat_map(|k| (0..4).map(move |s| (k, s)));
     let missing = missing.filter(|&(k, s)| s == 2 || !kept(k, s)).count();
-    assert_eq!(formed.with_map.fallback_rows, missing);
+    assert_eq!(formed.anew.iter().filter(|a| !**a).count(), missing);
     assert!(formed.fwhm_px[2].is_nan() && formed.fwhm_px[0] > 2.0);
     let fitted = out_of_fold(&made, &formed.with_map.fitted);
     let used = |r: usize| r % 4 == 3 && kept(r / 4, 3);
@@ -578,7 +583,7 @@ mod measured {
         )
         .unwrap();
         let formed = form(&data.stars(), &windows, &folds(data.frames.frames())).unwrap();
-        assert_eq!(formed.with_map.fallback_rows, 0);
+        assert!(formed.anew.iter().all(|a| *a));
         let table = [data.frames.x_px.clone(), data.frames.y_px.clone()];
         let before = residual(&data, &sample, &[&table; 5], f64::INFINITY);
         let mut outlier = vec![false; data.frames.rows()];
