@@ -260,7 +260,10 @@ pub(crate) fn compare<'a>(
     };
     if claim.stands {
         // what moves the stars otherwise may be what a map of nothing profits from
-        claim.stands = beside(accounts.map(|account| account.evidence))?.stands;
+        let beside_others = beside(accounts.map(|account| account.evidence))?;
+        if !beside_others.stands {
+            claim = beside_others;
+        }
     }
     // Without a map, moments are those of the table or those formed anew.
     let better = |anew| better_of(anew, &measured);
@@ -296,10 +299,15 @@ pub(crate) fn compare<'a>(
     } else {
         &map.moments
     };
-    let mut dark_map = Step {
-        stands: claim.stands,
-        p_value: claim.p_value,
-        ..step(&by_map.alone, &better(&bare.moments).alone, whole)
+    // what does not stand is told with the gain that was judged
+    let mut dark_map = if claim.stands {
+        Step {
+            stands: true,
+            p_value: claim.p_value,
+            ..step(&by_map.alone, &better(&bare.moments).alone, whole)
+        }
+    } else {
+        claim.clone()
     };
     // What switches is the map's, whatever the way; a static map is claimed by itself first.
     let follows = match followed.filter(|_| claim.stands) {
@@ -310,10 +318,14 @@ pub(crate) fn compare<'a>(
         dark_map.delta_loglik += further.delta_loglik;
         dark_map.explained += further.explained;
     }
-    let effective_psf = Step {
-        stands: corrected.stands,
-        p_value: corrected.p_value,
-        ..step(&last.alone, &moments.alone, whole)
+    let effective_psf = if corrected.stands {
+        Step {
+            stands: true,
+            p_value: corrected.p_value,
+            ..step(&last.alone, &moments.alone, whole)
+        }
+    } else {
+        corrected
     };
     Ok(ImageLevel {
         rivals,

@@ -44,6 +44,13 @@ fn rival<'a>(closed: &'a Closed, what: &str) -> &'a Rival {
     closed.rivals.iter().find(|r| r.what == what).unwrap()
 }
 
+/// Gain, nats, and p-value of an effect that was not added.
+fn not_added(closed: &Closed, id: &str) -> (f64, f64) {
+    let entry = closed.report.considered.iter().find(|c| c.id == id);
+    let told = entry.and_then(|c| c.delta_loglik.zip(c.p_value));
+    told.expect("the effect is there, with gain and p")
+}
+
 /// Column and row of pixel `i` of the map.
 #[expect(clippy::cast_possible_truncation, reason = "a thousand pixels")]
 fn cell(closed: &Closed, i: usize) -> [i64; 2] {
@@ -355,6 +362,15 @@ fn a_fit_that_has_less_noise_is_no_effect() {
     assert!(fitted < 0.5 * declared, "{fitted} {declared}");
     assert!(ids(&closed).is_empty(), "{:?}", closed.report.effects);
     assert!(!closed.report.unattributed.present);
+    // Neither is told with what a fit gains. Student's t is even: a mean above zero has p below one half.
+    for id in ["dark_map", "effective_psf"] {
+        let (gain, p) = not_added(&closed, id);
+        assert!(
+            gain.abs() < 0.05 * rival(&closed, "gaussian spot").delta_loglik,
+            "{id}: {gain}"
+        );
+        assert_eq!(gain > 0.0, p < 0.5, "{id}: {gain} nats, p = {p}");
+    }
 }
 
 /// A spot of 2.8 px in a window of six loses light at its edges, and first moments lag behind: the spot is named, with
@@ -375,6 +391,22 @@ fn a_spot_that_its_window_cuts_off_is_named() {
         }
         .make());
         assert_eq!(ids(&closed), named, "{sigma_px}");
+        for id in ["dark_map", "effective_psf"] {
+            if !named.contains(&id) {
+                // beside what was added: nothing of that is in it
+                let (gain, p) = not_added(&closed, id);
+                assert_eq!(
+                    gain > 0.0,
+                    p < 0.5,
+                    "{sigma_px}, {id}: {gain} nats, p = {p}"
+                );
+                let added = closed.report.effects[0].delta_loglik;
+                assert!(
+                    gain < 0.05 * added,
+                    "{sigma_px}, {id}: {gain} of {added} nats"
+                );
+            }
+        }
     }
 }
 
