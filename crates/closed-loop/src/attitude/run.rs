@@ -546,6 +546,7 @@ fn finish(
             alone: beyond_white(data, &before),
             left: beyond_white(data, &plain),
             resolved: motion.resolved(),
+            unusable: None,
             effects: &effects,
             considered: &considered,
         },

@@ -100,6 +100,8 @@ pub(crate) struct Grounds<'a> {
     pub(crate) left: Option<f64>,
     /// Whether the samples tell how the tracker moved between them.
     pub(crate) resolved: bool,
+    /// Why the raw windows that there are tell nothing.
+    pub(crate) unusable: Option<String>,
     pub(crate) effects: &'a [FoundEffect],
     pub(crate) considered: &'a [ConsideredEffect],
 }
@@ -296,6 +298,8 @@ impl Grounds<'_> {
             .collect();
         let reason = if !self.resolved && kind.needs().contains("the samples resolve") {
             "the motion between the samples is not known: they do not predict each other".to_owned()
+        } else if let Some(why) = self.unusable.as_ref().filter(|_| kind.acts_on().images) {
+            why.clone()
         } else if candidates.is_empty() {
             format!("the bundle lacks what it needs: {}", kind.needs())
         } else if candidates

@@ -56,6 +56,8 @@ pub(crate) struct Finish<'a> {
     pub(crate) image: Option<&'a ImageLevel>,
     /// Centroids formed anew from the same rows.
     pub(crate) formed: Option<&'a Formed>,
+    /// Why the windows that there are tell nothing.
+    pub(crate) unusable: Option<&'a str>,
 }
 
 impl Finish<'_> {
@@ -92,6 +94,13 @@ impl Finish<'_> {
         let beside = self.level.keeping(&terms);
         let found = self.found.refitted(&beside, self.folds)?;
         Ok(noise_effects::in_sample(&beside, &found))
+    }
+
+    /// Why the raw windows tell nothing, and how many there are.
+    fn unusable(&self) -> Option<String> {
+        let all = self.situation.bundle.images.as_ref().map_or(0, |w| w.len());
+        let why = self.unusable?;
+        Some(format!("none of the {all} raw windows can be used: {why}"))
     }
 
     /// `model` is the declared one, or that with what was added.
@@ -299,6 +308,7 @@ pub(crate) fn finish(
             alone: remarkable(f, &f.settled.before),
             left: remarkable(f, &plain),
             resolved: f.level.resolved,
+            unusable: f.unusable(),
             effects: &effects,
             considered: &considered,
         },

@@ -425,6 +425,10 @@ fn explain(
             _ => image.as_ref(),
         },
         formed: formed.as_ref(),
+        unusable: match before.as_measured {
+            Some(AsMeasured::Unusable(why)) => Some(why),
+            _ => None,
+        },
     };
     let after = whole.residuals(&searched.found.selection.chosen)?;
     if landings > 0

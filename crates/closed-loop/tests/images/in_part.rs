@@ -4,8 +4,9 @@
 
 use std::collections::BTreeSet;
 
-use telemetry::Bundle;
+use closed_loop::{Questions, close_asking};
 use telemetry::report::Windows;
+use telemetry::{Bundle, Model};
 
 use super::scene::{Scene, WIDE, ids, keep_rows, population, run};
 use super::small;
@@ -109,4 +110,41 @@ fn windows_of_one_star_among_free_attitudes_tell_nothing() {
     let why = windows.not_formed.unwrap();
     assert!(why.contains("do not suffice by themselves"), "{why}");
     assert_eq!(closed.report.rows.used + closed.report.rows.outliers, 300);
+}
+
+/// What is said of a dark map that is asked about.
+fn finding(bundle: &Bundle) -> (String, Windows) {
+    let questions = Questions::about(["dark_map"]).expect("it is in the catalogue");
+    let closed = close_asking(&Model::default(), bundle, &questions, &|_| ());
+    let report = closed.expect("a report").report;
+    let reason = report.hypotheses[0].reason.clone();
+    (
+        reason.expect("a reason"),
+        report.windows.expect("there are windows"),
+    )
+}
+
+/// Windows of other times, and too few of them, are no windows that the bundle lacks.
+#[test]
+fn why_windows_tell_nothing_is_said() {
+    let scene = |frames: usize| Scene {
+        frames,
+        ..Scene::default()
+    };
+    let mut late = scene(40).make();
+    for t_s in &mut late.images.as_mut().unwrap().t_s {
+        *t_s += 0.25;
+    }
+    let (reason, windows) = finding(&late);
+    assert_eq!(
+        (windows.used, windows.unused, windows.rows_without),
+        (0, 200, 200)
+    );
+    assert!(reason.contains("none of the 200 raw windows"), "{reason}");
+    assert!(reason.contains("time and slot of a star row"), "{reason}");
+    assert!(windows.not_formed.is_some_and(|why| reason.contains(&why)));
+    let (reason, windows) = finding(&scene(20).make());
+    assert_eq!((windows.used, windows.unused), (100, 0));
+    assert!(reason.contains("none of the 100 raw windows"), "{reason}");
+    assert!(reason.contains("20 frames, and at least 30"), "{reason}");
 }
