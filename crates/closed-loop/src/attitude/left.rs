@@ -32,10 +32,10 @@ pub(super) fn by_axes(
     left: f64,
     unattributed: &mut Unattributed,
 ) -> Result<Option<usize>, CloseError> {
+    // what the axes share hides what is one axis' own
     let squares = |r: &Residuals| -> [f64; 3] {
-        std::array::from_fn(|a| {
-            figures::rms(&r.axes[a], &data.outlier[a]).map_or(0.0, |rms| rms * rms)
-        })
+        let (axes, outlier) = data.mixing.mix_rows(&r.axes, &data.outlier);
+        std::array::from_fn(|a| figures::rms(&axes[a], &outlier[a]).map_or(0.0, |rms| rms * rms))
     };
     let before = squares(plain);
     let whole: f64 = before.iter().sum();
