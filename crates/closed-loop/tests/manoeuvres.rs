@@ -144,7 +144,7 @@ fn a_rolling_shutter_is_told_from_a_time_tag() {
         [SLEW, "{ ra_deg = 85.0, dec_deg = 0.0 }"],
         ["rolling_shutter", "line_time_s"],
         40e-6,
-        [1, 8],
+        [4, 5],
         "time_tag_offset",
     );
 }
