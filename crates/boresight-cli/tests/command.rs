@@ -95,6 +95,13 @@ fn results_are_whole_and_the_model_can_be_used_again() -> Done {
     let model = out.join("model.toml");
     let report = answer(boresight().arg("close").args([&model, &bundle]))?;
     assert_eq!(report["verdict"], "consistent");
+    // and who asks for a term without a cause hears that there is none
+    let mut asked = boresight();
+    asked
+        .args(["close", "--add-empirical"])
+        .args([&model, &bundle]);
+    let said = String::from_utf8(asked.output()?.stdout)?;
+    assert!(said.contains("--add-empirical added nothing"), "{said}");
     Ok(())
 }
 

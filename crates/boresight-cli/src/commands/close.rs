@@ -52,7 +52,13 @@ pub(crate) fn run(options: &Close, console: &Console) -> anyhow::Result<()> {
     let mut closed = close_asking(&model, &bundle, &questions, &progress)?;
     let compared = (options.out.is_some() || console.json())
         .then(|| flown(&model, &bundle, &mut closed, console));
-    let text = summary(&closed);
+    let mut text = summary(&closed);
+    let mut added = closed.report.effects.iter();
+    if options.add_empirical && !added.any(|e| e.id == "empirical") {
+        text.push_str(
+            "--add-empirical added nothing: what is left follows no variable that a model can declare\n",
+        );
+    }
     if let Some(dir) = &options.out {
         console.progress("writing results");
         let output = Output::new(dir)?;
