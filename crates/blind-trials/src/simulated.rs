@@ -141,7 +141,7 @@ const IMITATED: [Imitated<'_>; 6] = [
 ];
 const MISPLACED: Option<(&str, &str)> = Some(("star_id", "21421"));
 
-/// The simulated bundles: [`nulls`], and one effect each beside the declared distortion.
+/// The simulated bundles: those in which no effect of the tracker acts, and one effect each beside the declared distortion.
 ///
 /// # Errors
 ///
