@@ -8,6 +8,7 @@
 
 use imager::{Acting, Truth};
 use scenarios::Scenario;
+use telemetry::{EffectEntry, EffectValue};
 
 use crate::BlindError;
 use crate::trial::{Made, Trial};
@@ -98,48 +99,21 @@ const CASES: [(&str, f64, &str, bool); 5] = [
     ("reference_wanders", 1.0, WANDER, true),
 ];
 
-/// What a distortion imitates, with its size: a motion, its text, an effect, its selector, and its parameters.
-/// Each is some six to ten standard errors, most of which the declared distortion makes.
-type Imitated<'a> = (
-    &'a str,
-    &'a str,
-    &'a str,
-    Option<(&'a str, &'a str)>,
-    &'a [(&'a str, f64)],
-);
-const IMITATED: [Imitated<'_>; 6] = [
-    ("hold", HOLD, "optical_distortion", None, &[("k1", 9e-3)]),
-    (
-        "hold",
-        HOLD,
-        "chromatic_shift",
-        None,
-        &[("ppm_per_mag", 50.0)],
-    ),
-    (
-        "hold",
-        HOLD,
-        "catalogue_position",
-        MISPLACED,
-        &[("east_arcsec", 2.8), ("north_arcsec", -2.2)],
-    ),
-    ("slews", SLEWS, "optical_distortion", None, &[("k1", 9e-3)]),
-    (
-        "slews",
-        SLEWS,
-        "chromatic_shift",
-        None,
-        &[("ppm_per_mag", 50.0)],
-    ),
-    (
-        "scan",
-        SCAN,
-        "rolling_shutter",
-        None,
-        &[("line_time_s", 1.5e-4)],
-    ),
+/// What a distortion imitates: the name of a motion, its text, and the effect. Each is some six to ten standard
+/// errors, most of which the declared distortion makes.
+const IMITATED: [(&str, &str, &str); 6] = [
+    ("hold", HOLD, DISTORTED),
+    ("hold", HOLD, COLOURED),
+    ("hold", HOLD, MISPLACED),
+    ("slews", SLEWS, DISTORTED),
+    ("slews", SLEWS, COLOURED),
+    ("scan", SCAN, SHUTTER),
 ];
-const MISPLACED: Option<(&str, &str)> = Some(("star_id", "21421"));
+const DISTORTED: &str = "id = \"optical_distortion\"\nk1 = 9e-3";
+const COLOURED: &str = "id = \"chromatic_shift\"\nppm_per_mag = 50.0";
+const MISPLACED: &str =
+    "id = \"catalogue_position\"\nstar_id = \"21421\"\neast_arcsec = 2.8\nnorth_arcsec = -2.2";
+const SHUTTER: &str = "id = \"rolling_shutter\"\nline_time_s = 1.5e-4";
 
 /// The simulated bundles: those in which no effect of the tracker acts, and one effect each beside the declared distortion.
 ///
@@ -148,35 +122,15 @@ const MISPLACED: Option<(&str, &str)> = Some(("star_id", "21421"));
 /// None, unless the settings are wrong.
 pub fn simulated() -> Result<Vec<Trial>, BlindError> {
     let mut trials = nulls()?;
-    for (motion, text, id, selector, parameters) in IMITATED {
-        let name = format!("distorted_{motion}_{id}");
-        let lines: Vec<String> = selector
-            .iter()
-            .map(|(name, value)| format!("{name} = {value}"))
-            .chain(
-                parameters
-                    .iter()
-                    .map(|(name, value)| format!("{name} = {value:e}")),
-            )
-            .collect();
-        let effect = format!("[[effect]]\nid = \"{id}\"\n{}\n", lines.join("\n"));
-        let scenario = Scenario::parse(&format!("{TRACKER}{effect}{PERFECT}{text}"), &name)?;
-        let acting = Acting {
-            id: id.to_owned(),
-            selectors: selector
-                .iter()
-                .map(|(n, v)| ((*n).to_owned(), (*v).to_owned()))
-                .collect(),
-            values: parameters
-                .iter()
-                .map(|(n, v)| ((*n).to_owned(), *v))
-                .collect(),
-            ..Acting::default()
-        };
+    for (motion, text, effect) in IMITATED {
+        let text = format!("{TRACKER}[[effect]]\n{effect}\n{PERFECT}{text}");
+        let scenario = Scenario::parse(&text, motion)?;
+        let acting: Vec<Acting> = scenario.model.effects.iter().map(acting).collect();
+        let name = format!("distorted_{motion}_{}", acting[0].id);
         trials.push(Trial {
             name,
             truth: Truth {
-                effect: vec![acting],
+                effect: acting,
                 ..Truth::default()
             },
             model: scenario.model_without_effects(),
@@ -184,6 +138,26 @@ pub fn simulated() -> Result<Vec<Trial>, BlindError> {
         });
     }
     Ok(trials)
+}
+
+/// A declared effect as what acts: numbers are sizes, words say on what.
+fn acting(entry: &EffectEntry) -> Acting {
+    let mut acting = Acting {
+        id: entry.id.clone(),
+        ..Acting::default()
+    };
+    for (name, value) in &entry.parameters {
+        match value {
+            EffectValue::Number(number) => {
+                acting.values.insert(name.clone(), *number);
+            }
+            EffectValue::Text(text) => {
+                acting.selectors.insert(name.clone(), text.clone());
+            }
+            EffectValue::Numbers(_) => {}
+        }
+    }
+    acting
 }
 
 /// The simulated nulls: hold and slews of each case. Where the reference wanders, `reference_error` acts.
@@ -234,6 +208,7 @@ mod tests {
                 panic!("{} is rendered", trial.name)
             };
             assert_eq!(scenario.model.effects.len(), 1, "{}", trial.name);
+            assert!(!trial.truth.effect[0].values.is_empty(), "{}", trial.name);
             assert!(trial.model.effects.is_empty(), "{}", trial.name);
             assert!(
                 trial.model.noise.distortion_arcsec.is_some(),

@@ -104,8 +104,8 @@ impl AttitudeData {
         let step = median_step(&self.t_s).unwrap_or(f64::INFINITY);
         // a little finer than the Nyquist frequency
         let rows = 0.45 / (frequency_hz * step);
-        let rows = (1..self.t_s.len()).take_while(|&n| n as f64 <= rows).last();
-        self.t_s.len().div_ceil(rows.unwrap_or(1))
+        let rows = (1..self.t_s.len()).take_while(|&n| n as f64 <= rows);
+        self.t_s.len().div_ceil(rows.count().max(1))
     }
 
     /// Means over the bins of one axis of a series of rows; 0 where nothing counts.

@@ -18,6 +18,7 @@ use crate::unexplained::SEARCH_ALPHA;
 /// likelihood hardly sees, is not worth a word.
 const SLOW_SHARE: f64 = 0.1;
 const SLOW_GAIN: f64 = 20.0;
+
 /// Tells what the variables that the leftover follows explain of it in arcsec^2, each axis by its own: no more than
 /// `own` by the square, arcsec, about any axis is what the declared model makes, and not left over. `left`: share of
 /// the before variance that is left. Returns the term that explains most.
@@ -40,33 +41,8 @@ pub(super) fn by_axes(
     let before = squares(plain);
     let whole: f64 = before.iter().sum();
     let (mut kept, mut most, mut best) = (Vec::new(), 0.0, None);
-    let all = std::mem::take(&mut unattributed.depends_on);
-    let tried = found.candidates.len() as f64;
-    for g in
-        (0..found.candidates.len()).filter(|&g| search::is_a_channel(found.candidates[g].as_ref()))
-    {
-        let judged = &found.selection.judged[g];
-        let p_value = (judged.p_value * tried).min(1.0);
-        let variable = found.candidates[g].selectors().remove("variable");
-        if let Some(variable) = variable
-            && judged.stands()
-            && p_value < SEARCH_ALPHA
-            && !all
-                .iter()
-                .any(|d| d.variable == variable && figures::certain(d))
-        {
-            kept.push(Dependence {
-                variable,
-                variance_explained: 1.0,
-                p_value,
-            });
-        }
-    }
-    let others = all
-        .into_iter()
-        .filter(|d| !kept.iter().any(|k: &Dependence| k.variable == d.variable));
-    let all: Vec<Dependence> = kept.iter().cloned().chain(others).collect();
-    kept.clear();
+    let mut all = std::mem::take(&mut unattributed.depends_on);
+    tell_at_own_noise(found, &mut all);
     for mut entry in all {
         let term = figures::certain(&entry)
             .then(|| figures::term_of(found, &entry))
@@ -92,6 +68,30 @@ pub(super) fn by_axes(
     unattributed.variance_fraction = Some(most * left);
     unattributed.depends_on = kept;
     Ok(best)
+}
+
+/// Channels that stand at their own best noise, in the place of what is `told` of them if that is not certain; what
+/// they explain is found out later.
+fn tell_at_own_noise(found: &Found, told: &mut Vec<Dependence>) {
+    let tried = found.candidates.len() as f64;
+    for (candidate, judged) in found.candidates.iter().zip(&found.selection.judged) {
+        let p_value = (judged.p_value * tried).min(1.0);
+        let stands = search::is_a_channel(candidate.as_ref()) && judged.stands();
+        let variable = candidate.selectors().remove("variable");
+        let Some(variable) = variable.filter(|_| stands && p_value < SEARCH_ALPHA) else {
+            continue;
+        };
+        let entry = Dependence {
+            variable,
+            variance_explained: 1.0,
+            p_value,
+        };
+        match told.iter_mut().find(|d| d.variable == entry.variable) {
+            Some(known) if figures::certain(known) => {}
+            Some(known) => *known = entry,
+            None => told.push(entry),
+        }
+    }
 }
 
 /// A slowly varying part that no term predicts is left too: it shows as noise that

@@ -106,7 +106,7 @@ pub(crate) fn run(
         let (found, noise, refused) =
             search::search(&with_noise, data, bins, &folds, list, declared, start)?;
         let chosen = &found.selection.chosen;
-        let inside = in_sample(&with_noise(noise), data.t_s.len(), &found, chosen);
+        let inside = in_sample(&with_noise(noise), &found, chosen);
         let series = inside
             .as_ref()
             .map(|inside| tracks(data, inside, changes.as_ref()));
@@ -129,7 +129,8 @@ pub(crate) fn run(
         (found, noise, refused, series, _) = search(&data, motion, &[])?;
     }
     let line = series.as_ref().and_then(|s| s.shared_line(LIKELY));
-    let line = line.filter(|line| data.bins_for(line.frequency_hz) <= FINEST);
+    let fine = line.map_or(0, |line| data.bins_for(line.frequency_hz));
+    let line = line.filter(|_| fine <= FINEST);
     let jump = series.as_ref().and_then(Series::shared_jump);
     let mut put_forward: Vec<_> = line
         .map(|line| line.candidate(&scene))
@@ -147,7 +148,6 @@ pub(crate) fn run(
     if !put_forward.is_empty() {
         progress("searching again with the line, jump or orbit that is left");
         if line.is_some_and(|line| !data.bins.resolve(line.frequency_hz)) {
-            let fine = line.map_or(0, |line| data.bins_for(line.frequency_hz));
             data.rebin(&folds, fine.max(leftover::MOST_POINTS));
         }
         let again = search(&data, motion, &put_forward)?;
@@ -280,16 +280,18 @@ fn declared_noise(situation: &Situation<'_>) -> [Option<Foreknown>; 3] {
 /// Noise of each axis without what it shares.
 fn fit_noise(data: &AttitudeData, residual: &Residuals) -> [Coloured; 3] {
     let axes = std::array::from_fn(|axis| residual.axes[axis].as_slice());
-    let means = data.unshared(axes);
-    std::array::from_fn(|axis| Coloured::fit(&data.bins.t_s, &means[axis], &data.count[axis]))
+    noise_of(data, &data.unshared(axes))
 }
 
 /// Noise of each axis.
 fn fit_whole_noise(data: &AttitudeData, residual: &Residuals) -> [Coloured; 3] {
-    std::array::from_fn(|axis| {
-        let means = data.binned(axis, &residual.axes[axis]);
-        Coloured::fit(&data.bins.t_s, &means, &data.count[axis])
-    })
+    let means = std::array::from_fn(|axis| data.binned(axis, &residual.axes[axis]));
+    noise_of(data, &means)
+}
+
+/// Noise that suits means over the bins best.
+fn noise_of(data: &AttitudeData, means: &[Vec<f64>; 3]) -> [Coloured; 3] {
+    std::array::from_fn(|axis| Coloured::fit(&data.bins.t_s, &means[axis], &data.count[axis]))
 }
 
 /// Log-likelihood of all rows a row, under the noise that suits them best, nats.
@@ -360,7 +362,6 @@ fn leftover_terms(situation: &Situation<'_>, data: &AttitudeData) -> Vec<Arc<dyn
 /// predict has steps of its own where folds meet.
 fn in_sample(
     evidence: &AttitudeEvidence<'_>,
-    rows: usize,
     found: &Found,
     chosen: &[usize],
 ) -> Option<Residuals> {
@@ -376,7 +377,8 @@ fn in_sample(
         nuisance: Vec::new(),
         candidates: vec![beta],
     };
-    Some(evidence.residuals(&Folds::whole(rows), &list, &amplitudes))
+    let folds = Folds::whole(evidence.data.t_s.len());
+    Some(evidence.residuals(&folds, &list, &amplitudes))
 }
 
 /// What lines and jumps are looked for in: axes without the noise that they share, where a row counts on all of them.
@@ -457,10 +459,10 @@ fn finish(
         last = now;
     }
     // what is left is judged before a term without a cause is added
-    let mut unattributed = figures::unattributed(found, last / whole);
+    let share = last / whole;
+    let mut unattributed = figures::unattributed(found, share);
     let with = |g: usize| residuals(&evidence, folds, found, &[chosen.as_slice(), &[g]].concat());
     let own = changes.map_or([0.0; 3], |c| c.slow_arcsec);
-    let share = last / whole;
     let described = by_axes(data, found, &after, &with, own, share, &mut unattributed)?;
     let (surroundings, questions) = (situation.surroundings(), situation.questions);
     let mut added = chosen.clone();
@@ -516,9 +518,9 @@ fn finish(
     };
     // what acts in one fold alone is predicted by no other, and would be slow noise out of fold
     let told: Vec<usize> = chosen.iter().copied().chain(described).collect();
-    let inside = in_sample(&evidence, data.t_s.len(), found, &told);
+    let inside = in_sample(&evidence, found, &told);
     let left = inside.as_ref().unwrap_or(&plain);
-    slow_leftover(data, left, declared, &mut unattributed, last / whole);
+    slow_leftover(data, left, declared, &mut unattributed, share);
     let series = series.unwrap_or_else(|| tracks(data, &plain, changes));
     let reference = situation.reference.as_ref().zip(series.across());
     let look = reference.and_then(|(path, tracks)| Look::at(&surroundings, path, tracks));

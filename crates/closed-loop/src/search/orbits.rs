@@ -301,12 +301,14 @@ pub(crate) fn propose(
     }
     // a fit may end at more turns than it was tried at
     let fastest_s = SHORTEST_S.min(surroundings.length_s() / FEW_TURNS);
+    let is_fast = period_s(orbit.as_ref(), surroundings).is_some_and(|p| p < fastest_s);
+    Ok((nats >= WORTH_A_SEARCH && !is_fast).then_some(orbit))
+}
+
+/// The period of an orbit as it stands, at whatever speed.
+fn period_s(orbit: &dyn Candidate, surroundings: &Surroundings<'_>) -> Option<f64> {
     let mut itself = vec![0.0; orbit.coefficients().len()];
     itself[0] = 1.0;
-    let told = orbit.realise(&itself, surroundings).map(|e| e.parameters());
-    let is_fast = told.is_ok_and(|all| {
-        let period = all.iter().find(|p| p.name == "period_s");
-        period.is_some_and(|p| p.value < fastest_s)
-    });
-    Ok((nats >= WORTH_A_SEARCH && !is_fast).then_some(orbit))
+    let told = orbit.realise(&itself, surroundings).ok()?.parameters();
+    Some(told.iter().find(|p| p.name == "period_s")?.value)
 }

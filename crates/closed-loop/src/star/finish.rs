@@ -264,8 +264,9 @@ pub(crate) fn finish(
         constants.tell(f.described, last / whole, &mut unattributed);
     }
     noise_left.tell(&mut unattributed);
-    let weighed = weighed_excess(f, &plain).map_or(0.0, |(excess, _)| excess);
-    let mut considered = figures::considered(f.found, weighed, f.refused, &surroundings);
+    let weighed = weighed_excess(f, &plain);
+    let excess_left = weighed.map_or(0.0, |(excess, _)| excess);
+    let mut considered = figures::considered(f.found, excess_left, f.refused, &surroundings);
     if let Some(orbit) = &f.orbit {
         orbit.tell(&mut considered);
     }
@@ -305,8 +306,8 @@ pub(crate) fn finish(
             found: f.found,
             surroundings,
             information: &|c| fits.information(c),
-            alone: remarkable(f, &f.settled.before),
-            left: remarkable(f, &plain),
+            alone: remarkable(f, weighed_excess(f, &f.settled.before)),
+            left: remarkable(f, weighed),
             resolved: f.level.resolved,
             unusable: f.unusable(),
             effects: &effects,
@@ -316,9 +317,14 @@ pub(crate) fn finish(
 
     let after = after.unwrap_or(plain);
     let (before, before_loglik) = f.declared_at_best(&effects)?;
-    // one fit, one figure
     let nothing_added = effects.is_empty();
-    let after = if nothing_added { before.clone() } else { after };
+    // one fit, one figure
+    let (after, after_loglik) = if nothing_added {
+        (before.clone(), before_loglik)
+    } else {
+        let set = columns_of(&f.found.fitted.groups, &added);
+        (after, f.found.fitted.data_loglik(&set))
+    };
     let mut attitude =
         own_attitude::residuals(f.situation, f.data, f.folds, f.settled, &before, &after);
     if let Some(attitude) = attitude.as_mut().filter(|_| nothing_added) {
@@ -326,12 +332,6 @@ pub(crate) fn finish(
     }
     let attitude_rms = |series: &[Vec<f64>; 3], outlier: &[bool]| {
         std::array::from_fn(|a| figures::rms(&series[a], outlier).unwrap_or(f64::NAN))
-    };
-    let set = columns_of(&f.found.fitted.groups, &added);
-    let after_loglik = if nothing_added {
-        before_loglik
-    } else {
-        f.found.fitted.data_loglik(&set)
     };
     let set_aside = f.data.outlier.iter().filter(|o| **o).count();
     let report = Report {
@@ -458,8 +458,8 @@ fn weighed_excess(f: &Finish<'_>, residual: &Residuals) -> Option<(f64, f64)> {
     Some((excess.max(0.0), variance))
 }
 
-/// [`weighed_excess`] where it stands out of the noise.
-fn remarkable(f: &Finish<'_>, residual: &Residuals) -> Option<f64> {
-    let (excess, variance) = weighed_excess(f, residual)?;
+/// A [`weighed_excess`] where it stands out of the noise.
+fn remarkable(f: &Finish<'_>, weighed: Option<(f64, f64)>) -> Option<f64> {
+    let (excess, variance) = weighed?;
     hypothesis::beyond(excess, variance, f.found.fitted.scalars)
 }

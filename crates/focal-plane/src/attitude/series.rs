@@ -257,8 +257,8 @@ impl AttitudeSeries {
         let back = (1..=(2 * SIDE).min(i))
             .take_while(|k| joined(i - k))
             .count();
-        let ahead_of = |back: usize| ahead.min(2 * SIDE - back.min(SIDE));
-        let (back, ahead) = (back.min(2 * SIDE - ahead.min(SIDE)), ahead_of(back));
+        let share = |own: usize, other: usize| own.min(2 * SIDE - other.min(SIDE));
+        let (back, ahead) = (share(back, ahead), share(ahead, back));
         (back + ahead >= 2).then(|| self.slope_through(i, back, ahead))
     }
 
