@@ -4,6 +4,7 @@
 //! run             the order of the steps, from bundle to report
 //! data            the rotation between both, axis by axis, as evidence for the search
 //! mixing          noise that the axes share
+//! motion_terms    what it may follow of the motion
 //! search          every hypothesis with its own noise
 //! declared_effects  what the declared effects turn it by
 //! spatial_errors  what the declared model itself makes of crossing and changing stars
@@ -22,6 +23,7 @@ mod left;
 mod likeness;
 mod line_level;
 pub(crate) mod mixing;
+mod motion_terms;
 mod run;
 mod search;
 pub(crate) mod spatial_errors;

@@ -12,7 +12,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use block_regression::Fits;
-use effects::Surroundings;
+use effects::{Candidate, Surroundings};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 use telemetry::report::{
@@ -304,11 +304,16 @@ fn refused(found: &Found, id: &str, surroundings: &Surroundings<'_>) -> Option<R
 }
 
 /// What the leftover follows, among the empirical terms of `found` beside the chosen
-/// effects. `left` is the share of the before variance that is left.
-pub(crate) fn unattributed(found: &Found, left: f64) -> Unattributed {
+/// effects, that `may` be. `left` is the share of the before variance that is left.
+pub(crate) fn unattributed(
+    found: &Found,
+    left: f64,
+    may: impl Fn(&dyn Candidate) -> bool,
+) -> Unattributed {
     let set = columns_of(&found.fitted.groups, &found.selection.chosen);
     let terms: Vec<Followed<'_>> = (0..found.candidates.len())
         .filter(|&g| found.candidates[g].id() == EMPIRICAL && found.selection.judged[g].observable)
+        .filter(|&g| may(found.candidates[g].as_ref()))
         .filter_map(|g| {
             let name = found.candidates[g].selectors().get("variable")?.clone();
             Some(Followed {
@@ -489,13 +494,15 @@ pub(crate) fn best_empirical(
     })
 }
 
-/// The term of `found` in that variable.
+/// The term of `found` in that variable: of several the one that gains most.
 pub(crate) fn term_of(found: &Found, dependence: &Dependence) -> Option<usize> {
-    (0..found.candidates.len()).find(|&g| {
+    let gain = |g: &usize| found.selection.judged[*g].delta_loglik;
+    let terms = (0..found.candidates.len()).filter(|&g| {
         let candidate = found.candidates[g].as_ref();
         candidate.id() == EMPIRICAL
             && candidate.selectors().get("variable") == Some(&dependence.variable)
-    })
+    });
+    terms.max_by(|a, b| gain(a).total_cmp(&gain(b)))
 }
 
 /// The finding in one word; empirical terms never count as explanation.

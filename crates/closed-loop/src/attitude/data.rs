@@ -186,39 +186,19 @@ impl AttitudeEvidence<'_> {
         all
     }
 
-    /// Constants and candidates of `rows`, arcsec, x then y then z of every row.
-    fn raw(&self, rows: Range<usize>, candidates: &[&dyn Candidate]) -> DMatrix<f64> {
-        let n = rows.len();
-        let width = 3 + candidates
-            .iter()
-            .map(|c| c.coefficients().len())
-            .sum::<usize>();
-        let mut out = DMatrix::zeros(3 * n, width);
-        let seen = self.data.rows(rows, self.motion);
-        let mut columns: [Vec<f64>; 3] = Default::default();
-        for axis in 0..3 {
-            out.view_mut((axis * n, axis), (n, 1)).fill(1.0);
+    /// Columns of one candidate in all rows, arcsec, about x, y and z, one after another; false where it shows nothing.
+    fn fill(&self, candidate: &dyn Candidate, columns: &mut [Vec<f64>; 3]) -> bool {
+        let n = self.data.t_s.len();
+        for axis in &mut *columns {
+            axis.clear();
+            axis.resize(candidate.coefficients().len() * n, 0.0);
         }
-        let mut column = 3;
-        for candidate in candidates {
-            let p = candidate.coefficients().len();
-            for axis in &mut columns {
-                axis.clear();
-                axis.resize(p * n, 0.0);
-            }
-            let [x, y, z] = &mut columns;
-            if candidate.attitude_columns(&seen, VectorsMut { x, y, z }) {
-                for (axis, values) in columns.iter().enumerate() {
-                    for j in 0..p {
-                        for i in 0..n {
-                            out[(axis * n + i, column + j)] = values[j * n + i] * ARCSEC_PER_RAD;
-                        }
-                    }
-                }
-            }
-            column += p;
-        }
-        out
+        let seen = self.data.rows(0..n, self.motion);
+        let [x, y, z] = &mut *columns;
+        let shows = candidate.attitude_columns(&seen, VectorsMut { x, y, z });
+        let values = columns.iter_mut().flatten();
+        values.for_each(|value| *value *= ARCSEC_PER_RAD);
+        shows
     }
 }
 
@@ -260,19 +240,60 @@ impl AttitudeEvidence<'_> {
     }
 
     /// Constants and candidates averaged over the bins: x, y, z of every bin by
-    /// three constants and the candidates' columns, arcsec.
+    /// three constants and the candidates' columns, arcsec. One candidate after another: of a long run, all rows of all
+    /// would not fit.
     pub(crate) fn plain(&self, candidates: &[&dyn Candidate]) -> DMatrix<f64> {
         let (n, m) = (self.data.t_s.len(), self.data.bins.rows.len());
-        let raw = self.raw(0..n, candidates);
-        let mut out = DMatrix::zeros(3 * m, raw.ncols());
-        for (j, column) in raw.column_iter().enumerate() {
-            for axis in 0..3 {
-                let rows = &column.as_slice()[axis * n..(axis + 1) * n];
-                let means = self.data.binned(axis, rows);
-                out.view_mut((axis * m, j), (m, 1)).copy_from_slice(&means);
+        let sizes = candidates.iter().map(|c| c.coefficients().len());
+        let mut out = DMatrix::zeros(3 * m, 3 + sizes.sum::<usize>());
+        for axis in 0..3 {
+            let counts = self.data.count[axis].iter();
+            let ones: Vec<f64> = counts.map(|n| f64::from(u8::from(*n > 0.0))).collect();
+            out.view_mut((axis * m, axis), (m, 1))
+                .copy_from_slice(&ones);
+        }
+        let mut columns: [Vec<f64>; 3] = Default::default();
+        let mut first = 3;
+        for candidate in candidates {
+            let size = candidate.coefficients().len();
+            if self.fill(*candidate, &mut columns) {
+                for (axis, values) in columns.iter().enumerate() {
+                    for (j, rows) in values.chunks_exact(n).enumerate() {
+                        let means = self.data.binned(axis, rows);
+                        out.view_mut((axis * m, first + j), (m, 1))
+                            .copy_from_slice(&means);
+                    }
+                }
             }
+            first += size;
         }
         out
+    }
+
+    /// What candidates of these amplitudes, fold by fold, do to each row, arcsec: x, y and z of all rows.
+    fn shifts(&self, candidates: &[&dyn Candidate], amplitudes: &Amplitudes) -> Vec<Vec<f64>> {
+        let n = self.data.t_s.len();
+        let mut shifts = vec![vec![0.0; 3 * n]; amplitudes.candidates.len()];
+        let mut columns: [Vec<f64>; 3] = Default::default();
+        let mut first = 0;
+        for candidate in candidates {
+            let own = first..first + candidate.coefficients().len();
+            first = own.end;
+            let acts =
+                |of_fold: &DVector<f64>| of_fold.as_slice()[own.clone()].iter().any(|b| *b != 0.0);
+            if !amplitudes.candidates.iter().any(acts) || !self.fill(*candidate, &mut columns) {
+                continue;
+            }
+            for (shift, of_fold) in shifts.iter_mut().zip(&amplitudes.candidates) {
+                for (shift, values) in shift.chunks_exact_mut(n).zip(&columns) {
+                    for (values, j) in values.chunks_exact(n).zip(own.clone()) {
+                        let all = shift.iter_mut().zip(values);
+                        all.for_each(|(shift, value)| *shift += of_fold[j] * value);
+                    }
+                }
+            }
+        }
+        shifts
     }
 }
 
@@ -330,14 +351,12 @@ impl Evidence for AttitudeEvidence<'_> {
         amplitudes: &Amplitudes,
     ) -> Residuals {
         let n = self.data.t_s.len();
-        let raw = self.raw(0..n, candidates);
         let fold = folds.fold_of_frame();
         let mut out = Residuals {
             axes: vec![vec![0.0; n]; 3],
             modelled: vec![vec![0.0; n]; 3],
         };
-        for f in 0..folds.count {
-            let shift = raw.columns_range(3..) * &amplitudes.candidates[f];
+        for (f, shift) in self.shifts(candidates, amplitudes).iter().enumerate() {
             for axis in 0..3 {
                 let left = |k: usize| self.data.theta[axis][k] - shift[axis * n + k];
                 let train: Vec<f64> = (0..n)

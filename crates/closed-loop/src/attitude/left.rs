@@ -70,13 +70,12 @@ pub(super) fn by_axes(
     Ok(best)
 }
 
-/// Channels that stand at their own best noise, in the place of what is `told` of them if that is not certain; what
+/// Channels and motions that stand at their own best noise, in the place of what is `told` of them if that is not certain; what
 /// they explain is found out later.
 fn tell_at_own_noise(found: &Found, told: &mut Vec<Dependence>) {
-    let tried = found.candidates.len() as f64;
     for (candidate, judged) in found.candidates.iter().zip(&found.selection.judged) {
-        let p_value = (judged.p_value * tried).min(1.0);
-        let stands = search::is_a_channel(candidate.as_ref()) && judged.stands();
+        let p_value = judged.p_value;
+        let stands = search::is_a_description(candidate.as_ref()) && judged.stands();
         let variable = candidate.selectors().remove("variable");
         let Some(variable) = variable.filter(|_| stands && p_value < SEARCH_ALPHA) else {
             continue;

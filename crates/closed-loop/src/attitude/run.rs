@@ -13,6 +13,7 @@ use crate::attitude::data::{AttitudeData, AttitudeEvidence};
 use crate::attitude::declared_effects;
 use crate::attitude::left::{by_axes, slow_leftover};
 use crate::attitude::mixing::Mixing;
+use crate::attitude::motion_terms;
 use crate::attitude::search::{self, Declared};
 use crate::attitude::spatial_errors::SpatialErrors;
 use crate::attitude::steadied::steadied;
@@ -100,6 +101,7 @@ pub(crate) fn run(
         let mut list = catalogue::candidates(&scene);
         list.retain(|c| c.acts_on_attitude());
         list.extend(leftover_terms(situation, data));
+        list.extend(motion_terms::terms(motion, &data.t_s));
         list.extend(put_forward.iter().cloned());
         let with_noise = |noise: [Coloured; 3]| evidence(data, situation, noise, motion);
         let (bins, start) = (&data.bins.folds, fit_noise(data, &before));
@@ -460,7 +462,7 @@ fn finish(
     }
     // what is left is judged before a term without a cause is added
     let share = last / whole;
-    let mut unattributed = figures::unattributed(found, share);
+    let mut unattributed = figures::unattributed(found, share, |c| !motion_terms::is_of_motion(c));
     let with = |g: usize| residuals(&evidence, folds, found, &[chosen.as_slice(), &[g]].concat());
     let own = changes.map_or([0.0; 3], |c| c.slow_arcsec);
     let described = by_axes(data, found, &after, &with, own, share, &mut unattributed)?;

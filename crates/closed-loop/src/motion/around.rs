@@ -119,6 +119,11 @@ impl Around {
         }
     }
 
+    /// Between samples, s.
+    pub(crate) fn step_s(&self) -> f64 {
+        self.step_s
+    }
+
     /// Whether the samples tell how the tracker moved between them.
     pub(crate) fn resolved(&self) -> bool {
         self.resolved
