@@ -29,7 +29,9 @@
 //! ```
 //!
 //! with B the number of blocks that hold the information: not all do where the motion
-//! comes in slews.
+//! comes in slews. Where the data is also cut by what was measured ([`BlockGrams::by_source`]), those parts are the
+//! blocks of all columns of which they hold the information more evenly: a few dozen frames have five blocks in time,
+//! and of a trend two.
 //!
 //! How much wider than under white noise, m = eigenvalues of V over v S^-1, is known far
 //! better on average over p parameters than for each alone: p (B - 1) squares tell it
@@ -163,6 +165,8 @@ pub struct Fits {
     fold_of_block: Vec<usize>,
     /// `G W - 2 G_nc` of each block with W of all data: what makes T^T G T of any few columns.
     inner: Vec<DMatrix<f64>>,
+    /// The same of each part by source.
+    inner_by_source: Vec<DMatrix<f64>>,
     /// Squared length of each candidate column before the nuisance is out.
     raw: Vec<f64>,
     /// [`Folds::prior_blocks`].
@@ -259,11 +263,10 @@ impl Fits {
         let whole = (0..own_residuals)
             .map(|f| Eliminated::new(&sums.all, layout, variance, &layout.picked(Some(f))))
             .collect::<Option<Vec<_>>>()?;
-        let inner = grams
-            .gram
-            .par_iter()
-            .map(|g| g.inner(&all.nuisance, &pick))
-            .collect();
+        let [inner, inner_by_source] = [&grams.gram, &grams.by_source].map(|cut| {
+            let blocks = cut.par_iter();
+            blocks.map(|g| g.inner(&all.nuisance, &pick)).collect()
+        });
         Some(Self {
             layout: layout.clone(),
             folds: by_fold,
@@ -274,6 +277,7 @@ impl Fits {
             grams: grams.clone(),
             fold_of_block: folds.fold_of_block.clone(),
             inner,
+            inner_by_source,
             raw: layout.raw(&sums.all.0),
             prior: folds.prior_blocks,
             usual: OnceLock::new(),
@@ -300,6 +304,7 @@ impl Fits {
             scalars: vec![*scalars],
             log_scale: 0.0,
             known: None,
+            by_source: Vec::new(),
         };
         Self::whole(&alone, &layout, guess)?.variance(&[])
     }
@@ -319,6 +324,7 @@ impl Fits {
             grams: grams.clone(),
             fold_of_block: Vec::new(),
             inner: Vec::new(),
+            inner_by_source: Vec::new(),
             raw: layout.raw(&total.0),
             prior: 0.0,
             usual: OnceLock::new(),
@@ -490,22 +496,35 @@ impl Fits {
         self.usual.get_or_init(|| self.usual())
     }
 
-    fn scatter(&self, set: &[usize]) -> Option<Scatter> {
-        let (value, factor) = self.all.amplitudes(set)?;
+    /// The blocks in time, and the parts by source.
+    fn cuts(&self) -> [(&[Gram], &[DMatrix<f64>]); 2] {
+        [
+            (&self.grams.gram, &self.inner),
+            (&self.grams.by_source, &self.inner_by_source),
+        ]
+    }
+
+    /// Squares of the scores of each block of a cut at `value`, widened, and how many blocks hold the information.
+    fn spread(
+        &self,
+        (blocks, inner): (&[Gram], &[DMatrix<f64>]),
+        set: &[usize],
+        value: &DVector<f64>,
+    ) -> (DMatrix<f64>, f64) {
         let n = self.layout.nuisance_precision.nrows();
         let residual = self.layout.residual(None);
         let p = set.len();
         // M = T^T G T of a block: M_ij = G_ij + (W_i inner_j + inner_i W_j) / 2
         let w = &self.all.nuisance;
-        let left = self.all.left(set, &value);
+        let left = self.all.left(set, value);
         let mut spread = DMatrix::zeros(p, p);
         let mut shares = Shares::default();
         let columns: Vec<usize> = set.iter().map(|c| n + c).collect();
         let mut score = DVector::zeros(p);
         let mut within = DVector::zeros(n);
-        for (gram, inner) in self.grams.gram.iter().zip(&self.inner) {
-            less_into(inner, set, &value, &mut within);
-            gram.less(residual, &columns, &value, &mut score);
+        for (gram, inner) in blocks.iter().zip(inner) {
+            less_into(inner, set, value, &mut within);
+            gram.less(residual, &columns, value, &mut score);
             let mut share = 0.0;
             for (i, &c) in set.iter().enumerate() {
                 let (nuisance, inner) = (w.column(c), inner.column(c));
@@ -516,17 +535,28 @@ impl Fits {
             spread.ger(1.0, &score, &score, 1.0);
             shares.add(share);
         }
-        spread *= shares.widening();
+        (spread * shares.widening(), shares.blocks())
+    }
+
+    fn scatter(&self, set: &[usize]) -> Option<Scatter> {
+        let (value, factor) = self.all.amplitudes(set)?;
+        let cuts = self.cuts().map(|cut| self.spread(cut, set, &value));
+        let [in_time, by_source] = cuts;
+        let (mut spread, blocks) = if by_source.1 > in_time.1 {
+            by_source
+        } else {
+            in_time
+        };
         let variance = self.variance(set)?;
         // S less the sum of M is what the prior adds
-        let of_set = w.select_columns(set);
+        let of_set = self.all.nuisance.select_columns(set);
         spread += of_set.tr_mul(&(&self.all.prior * &of_set)) * variance;
         let inverse = factor.inverse();
         Some(Scatter {
             robust: &inverse * spread * &inverse,
             white: inverse * variance,
             value,
-            blocks: shares.blocks(),
+            blocks,
         })
     }
 

@@ -184,6 +184,9 @@ pub struct BlockGrams {
     pub log_scale: f64,
     /// Where it is known, the sum of M over the blocks of each fold; the weight is then the same in all blocks.
     pub known: Option<Arc<Vec<DMatrix<f64>>>>,
+    /// The same in all, cut by what was measured and not by when: parts whose noise is each its own however long it
+    /// lasts. None where the data is not cut so.
+    pub by_source: Vec<Gram>,
 }
 
 /// Sums of Gram matrices and scalars over the blocks of each fold, and over all.
@@ -211,6 +214,7 @@ impl FoldSums {
             scalars: vec![*scalars],
             log_scale: 0.0,
             known: None,
+            by_source: Vec::new(),
         }
     }
 }
@@ -250,6 +254,7 @@ impl BlockGrams {
             scalars,
             log_scale: 0.0,
             known: None,
+            by_source: Vec::new(),
         }
     }
 

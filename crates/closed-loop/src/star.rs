@@ -17,6 +17,7 @@
 //! columns         all columns of a fit, row by row
 //! reference_noise how much the rotation that they share counts
 //! moments         their products, in one pass, for every fit at every noise
+//! by_star         the same of a short run, star by star
 //! evidence        data, noise and products as what the search asks of a measurement
 //! settling        the declared model at its best, and the outliers beside it
 //! steadied        the reference's path less its slow error
@@ -27,6 +28,7 @@
 //!
 //! Not physics: the contents of a folder.
 
+mod by_star;
 mod changes;
 pub(crate) mod columns;
 pub(crate) mod data;

@@ -9,10 +9,12 @@
 //!
 //! Source: Liang & Zeger 1986 (cluster-robust variance).
 
+use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use super::moderation::Usual;
 use super::{Fits, Shares};
+use crate::gram::Gram;
 
 /// What all columns say counts for no more than this many times the blocks that there are.
 const MOST_BLOCKS: f64 = 2.0;
@@ -37,18 +39,54 @@ impl Fits {
             .collect();
         let some = shown.par_chunks(TOGETHER);
         let columns: Vec<(f64, f64)> = some.flat_map_iter(|some| self.each_alone(some)).collect();
-        Usual::of(&columns, MOST_BLOCKS * self.grams.gram.len() as f64)
+        Usual::of(
+            &columns,
+            MOST_BLOCKS
+                * self
+                    .cuts()
+                    .map(|(blocks, _)| blocks.len())
+                    .into_iter()
+                    .fold(0, usize::max) as f64,
+        )
     }
 
     /// How much wider than white noise each of `columns` scatters by itself, and the blocks less one that say so: as
     /// [`scatter`](Self::scatter) of each, in one pass over the blocks.
     pub(super) fn each_alone(&self, columns: &[usize]) -> Vec<(f64, f64)> {
+        let [in_time, by_source] = self.cuts().map(|cut| self.sums_alone(cut, columns));
+        let both = in_time.into_iter().zip(by_source);
+        let alone = both.map(|(a, b)| {
+            if b.shares.blocks() > a.shares.blocks() {
+                b
+            } else {
+                a
+            }
+        });
+        let widths = alone.filter_map(|own| {
+            let variance = self.variance(&[own.column])?;
+            let nuisance = self.all.nuisance.column(own.column);
+            let of_prior = nuisance.dot(&(&self.all.prior * nuisance)) * variance;
+            let spread = own.spread * own.shares.widening() + of_prior;
+            Some((
+                spread / (own.information * variance),
+                own.shares.blocks() - 1.0,
+            ))
+        });
+        widths.collect()
+    }
+
+    /// The sums over the blocks of a cut, of each column that has an amplitude.
+    fn sums_alone(
+        &self,
+        (blocks, inner): (&[Gram], &[DMatrix<f64>]),
+        columns: &[usize],
+    ) -> Vec<Alone> {
         let n = self.layout.nuisance_precision.nrows();
         let residual = self.layout.residual(None);
         let w = &self.all.nuisance;
         let last = w.ncols() - 1;
         let mut alone: Vec<Alone> = columns.iter().filter_map(|&c| self.alone(c)).collect();
-        for (gram, inner) in self.grams.gram.iter().zip(&self.inner) {
+        for (gram, inner) in blocks.iter().zip(inner) {
             for own in &mut alone {
                 let (nuisance, within) = (w.column(own.column), inner.column(own.column));
                 let a = nuisance.dot(&within);
@@ -60,17 +98,7 @@ impl Fits {
                 own.shares.add((square + a).max(0.0) / own.information);
             }
         }
-        let widths = alone.iter().filter_map(|own| {
-            let variance = self.variance(&[own.column])?;
-            let nuisance = w.column(own.column);
-            let of_prior = nuisance.dot(&(&self.all.prior * nuisance)) * variance;
-            let spread = own.spread * own.shares.widening() + of_prior;
-            Some((
-                spread / (own.information * variance),
-                own.shares.blocks() - 1.0,
-            ))
-        });
-        widths.collect()
+        alone
     }
 
     fn alone(&self, column: usize) -> Option<Alone> {

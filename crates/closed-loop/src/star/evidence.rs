@@ -21,6 +21,7 @@ use crate::bins::Bins;
 use crate::evidence::{Amplitudes, Evidence, Residuals};
 use crate::motion::{Around, source};
 use crate::situation::Situation;
+use crate::star::by_star::by_star;
 use crate::star::changes;
 use crate::star::columns::{CHUNK_FRAMES, StarColumns};
 use crate::star::data::StarData;
@@ -268,7 +269,11 @@ impl Evidence for StarEvidence<'_> {
             None => Keep::None,
         };
         let all = self.all(candidates);
-        StarMoments::accumulate(&self.columns(&all), folds, keep).white()
+        let columns = self.columns(&all);
+        BlockGrams {
+            by_source: by_star(&columns, folds),
+            ..StarMoments::accumulate(&columns, folds, keep).white()
+        }
     }
 
     fn residuals(

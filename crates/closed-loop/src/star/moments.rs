@@ -30,7 +30,8 @@ use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use rayon::prelude::*;
 
 use self::paced::Paced;
-use self::sums::{SOLVING, Scratch, SolvedBins, Sums};
+pub(super) use self::sums::SOLVING;
+use self::sums::{Scratch, SolvedBins, Sums};
 use crate::bins::Bins;
 use crate::star::columns::StarColumns;
 
@@ -215,6 +216,7 @@ impl StarMoments {
             scalars,
             log_scale,
             known: None,
+            by_source: Vec::new(),
         }
     }
 
@@ -246,6 +248,7 @@ impl StarMoments {
             scalars: vec![self.blocks.iter().map(|b| b.scalars).sum()],
             log_scale: 0.0,
             known: None,
+            by_source: Vec::new(),
         }
     }
 
@@ -291,6 +294,7 @@ impl StarMoments {
             known: self
                 .known(columns)
                 .filter(|_| self.blocks.iter().all(|b| b.lost.is_none())),
+            by_source: Vec::new(),
         }
     }
 
@@ -314,6 +318,7 @@ impl StarMoments {
             scalars: self.blocks.iter().map(Block::solved_scalars).collect(),
             log_scale,
             known: self.known(columns),
+            by_source: Vec::new(),
         }
     }
 
@@ -330,6 +335,7 @@ impl StarMoments {
             scalars: vec![self.blocks.iter().map(Block::solved_scalars).sum()],
             log_scale,
             known: None,
+            by_source: Vec::new(),
         }
     }
 

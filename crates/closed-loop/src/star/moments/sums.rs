@@ -32,7 +32,7 @@ const PANEL: usize = 48;
 /// Columns that are turned over at once.
 const TURNED: usize = 8;
 /// Two stars give four numbers for three angles; one gives none to spare.
-pub(super) const SOLVING: usize = 2;
+pub(in crate::star) const SOLVING: usize = 2;
 
 /// Bins of frames whose rotations are kept apart.
 pub(super) struct SolvedBins<'a> {

@@ -419,3 +419,45 @@ fn a_free_attitude_leaves_what_no_rotation_explains() {
         assert!((scalars - count as f64).abs() < 0.5);
     }
 }
+
+/// What every star adds to the sums beside free attitudes is all of it: to rounding.
+#[test]
+fn parts_of_stars_are_the_whole() {
+    let data = data(true, 40);
+    let model = "format = \"boresight-model/1\"\n[noise]\ntemporal_arcsec = 7.0\n\
+                 distortion_arcsec = 3.0\ndistortion_order = 2\n";
+    let nuisance = StarNuisance::declared(&Model::parse(model, "model.toml", &[]).unwrap(), &data);
+    let turn = Turn {
+        coefficients: ["x", "y", "z"]
+            .map(|n| Coefficient::new(n, "arcsec", 1.0))
+            .to_vec(),
+        whole: true,
+    };
+    let waves = effects::harmonics_of(&data.camera, &[1, 2]);
+    let candidates: [&dyn Candidate; 2] = [&turn, &*waves];
+    let residual = std::array::from_fn(|axis| {
+        let rows = 0..data.t_s.len();
+        rows.map(|r| (1.7 * r as f64 + axis as f64).sin()).collect()
+    });
+    let weight = weights(&data);
+    let columns = StarColumns {
+        data: &data,
+        nuisance: &nuisance,
+        candidates: &candidates,
+        residuals: &[residual],
+        motion: None,
+        weight: &weight,
+    };
+    let folds = Folds::cut(data.frames.frames());
+    let whole = StarMoments::accumulate(&columns, &folds, Keep::Free).white();
+    for count in [3, 5] {
+        let parts = crate::star::by_star::parts(&columns, count);
+        assert_eq!(parts.len(), count);
+        let sum = BlockGrams {
+            scalars: vec![0.0; count],
+            gram: parts,
+            ..whole.clone()
+        };
+        close(&sum.total().0, &whole.total().0);
+    }
+}
