@@ -301,8 +301,11 @@ pub(crate) fn propose(
     }
     // a fit may end at more turns than it was tried at
     let fastest_s = SHORTEST_S.min(surroundings.length_s() / FEW_TURNS);
-    let is_fast = period_s(orbit.as_ref(), surroundings).is_some_and(|p| p < fastest_s);
-    Ok((nats >= WORTH_A_SEARCH && !is_fast).then_some(orbit))
+    let period_s = period_s(orbit.as_ref(), surroundings).unwrap_or(f64::INFINITY);
+    let is_fast = period_s < fastest_s;
+    // where nature has none, a slow error makes one as well as it makes anything
+    let slow_makes_it = period_s < SHORTEST_S && nats < slow.unwrap_or(0.0) + OWN_SHAPE;
+    Ok((nats >= WORTH_A_SEARCH && !is_fast && !slow_makes_it).then_some(orbit))
 }
 
 /// The period of an orbit as it stands, at whatever speed.
