@@ -25,7 +25,7 @@ use crate::error::CloseError;
 use crate::evidence::Residuals;
 use crate::questions::hypothesis::{Questions, Told};
 use crate::search::empirical::EMPIRICAL;
-use crate::search::group::Group;
+use crate::search::group::{Group, is_believed};
 use crate::search::refusal::Refused;
 use crate::search::selection::{columns_of, each};
 use crate::search::{Found, family, first_column};
@@ -279,7 +279,7 @@ fn refused(found: &Found, id: &str, surroundings: &Surroundings<'_>) -> Option<R
     let first = first_column(&found.candidates, g);
     group.columns.iter().enumerate().find_map(|(k, column)| {
         let (value, [low, high]) = (estimate.value[own + k], group.bounds[k]);
-        if (low..=high).contains(&value) {
+        if is_believed(&estimate, own + k, [low, high]) {
             return None;
         }
         let candidate = found.candidates[g].as_ref();
@@ -373,8 +373,7 @@ pub(crate) fn follows(
         let which: Vec<usize> = (set.len()..with.len()).collect();
         let fold = fits.out_of_fold(&with)?;
         let estimate = fits.estimate(&with)?;
-        let sizes = &estimate.value.as_slice()[set.len()..];
-        if !term.group.believes(part, sizes) {
+        if !term.group.believes(part, &estimate, set.len()) {
             return None;
         }
         let p = estimate.p_value(&which);

@@ -242,9 +242,8 @@ fn describe_at(described: &Described, rest: &[usize], times: f64) -> Option<(f64
                 let more = price.worth(likelihood - base, part.len());
                 let certain = || {
                     beside(fits, &with, part).is_some_and(|(e, which)| {
-                        let sizes = &e.value.as_slice()[with.len()..];
                         e.p_value(&which) * (tried as f64) < FAMILY_ALPHA
-                            && term.group.believes(part, sizes)
+                            && term.group.believes(part, &e, with.len())
                     })
                 };
                 if more > WORTH && best.as_ref().is_none_or(|best| more > best.more) && certain() {

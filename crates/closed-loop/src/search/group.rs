@@ -2,6 +2,8 @@
 //!
 //! Not physics: which columns belong together, and which stand in each other's place.
 
+use block_regression::Estimate;
+
 /// Candidate columns that enter or leave together.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Group {
@@ -29,11 +31,11 @@ pub(crate) struct Group {
 }
 
 impl Group {
-    /// Whether `values` of `columns`, some of its own, are all credible.
-    pub(crate) fn believes(&self, columns: &[usize], values: &[f64]) -> bool {
-        columns.iter().zip(values).all(|(column, value)| {
+    /// Whether what `estimate` says of `columns`, some of its own, from its parameter `first` on, is all credible.
+    pub(crate) fn believes(&self, columns: &[usize], estimate: &Estimate, first: usize) -> bool {
+        columns.iter().zip(first..).all(|(column, i)| {
             let at = self.columns.iter().position(|c| c == column);
-            at.is_none_or(|k| (self.bounds[k][0]..=self.bounds[k][1]).contains(value))
+            at.is_none_or(|k| is_believed(estimate, i, self.bounds[k]))
         })
     }
 
@@ -47,6 +49,17 @@ impl Group {
     }
 }
 
+/// Sigmas by which an estimate may lie beyond what is credible: the size itself may be as large.
+const BEYOND: f64 = 2.0;
+
+/// Whether parameter `i` may be within these bounds. A bound at zero is one of sign: what is beyond chance beyond it
+/// is no size of the same.
+pub(crate) fn is_believed(estimate: &Estimate, i: usize, [low, high]: [f64; 2]) -> bool {
+    let off = BEYOND * estimate.sigma(i);
+    let [below, above] = [low, high].map(|bound| if bound == 0.0 { 0.0 } else { off });
+    (low - below..=high + above).contains(&estimate.value[i])
+}
+
 /// Whether group `g` may be chosen beside these.
 pub(crate) fn open_beside(groups: &[Group], chosen: &[usize], g: usize) -> bool {
     chosen.iter().all(|&c| !groups[c].excludes(&groups[g]))
@@ -54,6 +67,8 @@ pub(crate) fn open_beside(groups: &[Group], chosen: &[usize], g: usize) -> bool 
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::{DMatrix, DVector};
+
     use super::*;
 
     fn group(family: &str, reach: Option<([f64; 2], f64)>) -> Group {
@@ -70,18 +85,32 @@ mod tests {
         }
     }
 
-    /// A size at its bound is believed, one beyond it not; what the group does not have has no bound.
+    /// A size within two sigmas (of 0.05) of its bound is believed, one beyond not, and none beyond one of sign; what
+    /// the group does not have has no bound.
     #[test]
     fn sizes_within_their_bounds_are_believed() {
         let group = group("", None);
         for (columns, sizes, believed) in [
             (&[4, 6][..], &[-1.0, 2.0][..], true),
+            (&[4, 6], &[1.09, 2.09], true),
             (&[6], &[1.5], true),
-            (&[4], &[1.5], false),
-            (&[6, 4], &[-0.1, 0.5], false),
+            (&[4], &[1.11], false),
+            (&[4], &[-1.11], false),
+            (&[6, 4], &[-0.01, 0.5], false),
             (&[5], &[9.0], true),
         ] {
-            assert_eq!(group.believes(columns, sizes), believed, "{columns:?}");
+            let known = DMatrix::identity(sizes.len(), sizes.len()) * 0.05 * 0.05;
+            let estimate = Estimate {
+                value: DVector::from_column_slice(sizes),
+                covariance: known.clone(),
+                white: known,
+                blocks: 60.0,
+            };
+            assert_eq!(
+                group.believes(columns, &estimate, 0),
+                believed,
+                "{columns:?} {sizes:?}"
+            );
         }
     }
 

@@ -405,7 +405,7 @@ impl Trials<'_> {
         let group = &self.groups[g];
         let judgement = Judgement {
             delta_loglik: gain,
-            credible: group.believes(&group.columns, &estimate.value.as_slice()[own]),
+            credible: group.believes(&group.columns, &estimate, own.start),
             p_value: (estimate.p_value(&which) * self.cost[g]).min(1.0),
             observable: true,
         };

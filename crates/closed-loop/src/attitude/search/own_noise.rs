@@ -21,6 +21,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::Trial;
 use crate::attitude::data::AttitudeEvidence;
+use crate::search::group::is_believed;
 use crate::search::selection::columns_of;
 use crate::search::{Fitted, first_column, fit_design, without};
 
@@ -124,15 +125,10 @@ impl Trial<'_, '_> {
                 }
             });
             let credible = fitted.groups.iter().all(|group| {
-                group
-                    .columns
-                    .iter()
-                    .zip(&group.bounds)
-                    .all(|(c, [low, high])| {
-                        set.iter()
-                            .position(|s| s == c)
-                            .is_some_and(|i| (*low..=*high).contains(&estimate.value[i]))
-                    })
+                group.columns.iter().zip(&group.bounds).all(|(c, bounds)| {
+                    let at = set.iter().position(|s| s == c);
+                    at.is_some_and(|i| is_believed(&estimate, i, *bounds))
+                })
             });
             let mut all = vec![0.0; columns];
             for (value, &c) in estimate.value.iter().zip(&set) {

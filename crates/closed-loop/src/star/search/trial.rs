@@ -14,7 +14,7 @@ use coloured_noise::{CommonNoise, Rotations, SlowGains};
 use nalgebra::DMatrix;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use crate::search::group::Group;
+use crate::search::group::{Group, is_believed};
 use crate::search::selection::{Judgement, WIDENING, columns_of};
 use crate::star::moments::StarMoments;
 
@@ -128,7 +128,7 @@ impl Trial<'_> {
                 let credible = own
                     .clone()
                     .zip(&group.bounds)
-                    .all(|(i, [low, high])| (*low..=*high).contains(&estimate.value[i]));
+                    .all(|(i, bounds)| is_believed(&estimate, i, *bounds));
                 Part {
                     columns: own,
                     shapes: group.shapes,
