@@ -35,6 +35,9 @@ use crate::unexplained::star_freedom::Freedom;
 const ALPHA: f64 = 0.001;
 /// The same of one that was found, at its instant or frequency, without what the stars of a frame share.
 const ALPHA_ALONE: f64 = 0.01;
+/// Least share of its squares that is still there then: a frame's rotation takes a few stars' share of what is each
+/// star's own, and most of what it was itself.
+const OWN_SHARE: f64 = 0.3;
 /// Points of a star's series, and fewest.
 const MOST_POINTS: usize = 1200;
 const MIN_POINTS: usize = 60;
@@ -148,13 +151,13 @@ pub(crate) fn search(
         let lines = Lines::of(series, freedom, last - first)?;
         let (k, found) = lines.best(series)?;
         let apart = apart.as_ref()?;
-        (k < apart.grid.bins && apart.at(k).0 < ALPHA_ALONE).then_some(found)
+        let alone = (k < apart.grid.bins).then(|| apart.at(k))?;
+        is_own(alone, &found).then_some(found)
     };
     let step_in = |series: &[Own]| {
         let found = step(series, freedom, &data.frames.t_s)?;
         let alone = step_at(&by_itself, *beside_rotation, found.at);
-        (alone.is_some_and(|(p, _)| p < ALPHA_ALONE) && is_no_wander(data, own, found.at))
-            .then_some(found)
+        (is_own(alone?, &found) && is_no_wander(data, own, found.at)).then_some(found)
     };
     let less = |basis: &(dyn Fn(f64) -> [f64; 2] + Sync)| -> Vec<Own> {
         series.iter().map(|s| s.beside(basis)).collect()
@@ -176,6 +179,11 @@ pub(crate) fn search(
     out.line_hz = line.map(|l| l.at);
     out.jump_s = jump.map(|j| j.at);
     out
+}
+
+/// Whether what was `found` is the stars', by the chance and the squares of the same `alone`, without what they share.
+fn is_own((p_value, squares): (f64, f64), found: &Event) -> bool {
+    p_value < ALPHA_ALONE && squares > OWN_SHARE * found.squares
 }
 
 /// A line or a step: its frequency or instant, its chance, and the squares that it takes.
