@@ -22,6 +22,7 @@ use spectra::robust::median_step;
 
 use crate::attitude::spatial_errors::SpatialErrors;
 use crate::bins::{self, Bins};
+use crate::figures;
 use crate::standing_out::mark;
 use crate::star::data::StarData;
 use crate::star::frame_rotation::rotation_row;
@@ -79,7 +80,14 @@ pub(crate) struct Leftover {
 impl Leftover {
     /// Writes them where they are reported: something is left then.
     pub(crate) fn tell(self, unattributed: &mut Unattributed) {
-        unattributed.present |= !(self.lines_hz.is_empty() && self.jumps_s.is_empty());
+        if self.lines_hz.is_empty() && self.jumps_s.is_empty() {
+            return;
+        }
+        if !unattributed.present {
+            // what chance does as well is not named beside it
+            unattributed.depends_on.retain(figures::certain);
+        }
+        unattributed.present = true;
         unattributed.lines_hz = self.lines_hz;
         unattributed.jumps_s = self.jumps_s;
     }
