@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use telemetry::report::{Report, Verdict};
 use telemetry::{Bundle, EffectEntry, EffectValue};
 
-use crate::kit::{closed, named};
+use crate::kit::{Case, Path, closed, named};
 use crate::snapshots::{Lens, arcsec, pictures, taken};
 
 /// A wide field: some forty stars of 150 in 80 deg.
@@ -217,5 +217,24 @@ fn a_slope_of_the_noise_has_its_level() {
     for chi2 in [found.report.after.chi2_per_dof, again.before.chi2_per_dof] {
         let chi2 = chi2.expect("chi-squared");
         assert!((0.85..1.25).contains(&chi2), "{chi2}");
+    }
+}
+
+/// Forty pictures of twenty stars at 2 Hz, whose focal length grows by 25 ppm/s: 13 to 16 sigma, for which five blocks in
+/// time, of which two hold the drift, would ask for p = 0.01.
+#[test]
+fn a_drift_in_few_pictures_is_named() {
+    for seed in [3, 4] {
+        let mut case = Case::new(Path::Still, seed);
+        case.duration_s = 20.0;
+        case.stars = 20;
+        let case = case.with("focal_length_drift", "ppm_per_s = 25.0");
+        let (model, mut bundle) = case.make();
+        bundle.reference = None;
+        let report = closed(&model, &bundle).expect("the loop closes").report;
+        assert_eq!(named(&report), ["focal_length_drift"], "seed {seed}");
+        let drift = &report.effects[0].parameters["ppm_per_s"];
+        let z = (drift.value - 25.0) / drift.sigma.expect("a sigma");
+        assert!(z.abs() < 4.0, "{z} sigma");
     }
 }
