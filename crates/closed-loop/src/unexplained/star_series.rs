@@ -534,6 +534,23 @@ mod tests {
         search(&data, &own, || alone, &vec![1.0; rows])
     }
 
+    /// Beyond chance without what the stars share, and of a third of the size at least.
+    #[test]
+    fn what_the_frames_turned_by_is_not_the_stars() {
+        let found = Event {
+            at: 0.005,
+            p_value: 1e-20,
+            squares: 100.0,
+        };
+        for (alone, own) in [
+            ((0.005, 60.0), true),
+            ((0.005, 20.0), false),
+            ((0.05, 60.0), false),
+        ] {
+            assert_eq!(is_own(alone, &found), own, "{alone:?}");
+        }
+    }
+
     /// A line of half the noise is 1500/16 nats an axis and star, beyond doubt; of thirty times the noise no chance is
     /// left in which the frequencies differ. It is the stars' own only where they differ, and no step.
     #[test]
