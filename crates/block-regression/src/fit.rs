@@ -496,12 +496,15 @@ impl Fits {
         self.usual.get_or_init(|| self.usual())
     }
 
-    /// The blocks in time, and the parts by source.
-    fn cuts(&self) -> [(&[Gram], &[DMatrix<f64>]); 2] {
-        [
-            (&self.grams.gram, &self.inner),
-            (&self.grams.by_source, &self.inner_by_source),
-        ]
+    /// The blocks in time, and the parts by source where there are some.
+    fn cuts(&self) -> impl Iterator<Item = (&[Gram], &[DMatrix<f64>])> {
+        let in_time = (self.grams.gram.as_slice(), self.inner.as_slice());
+        let by_source = (
+            self.grams.by_source.as_slice(),
+            self.inner_by_source.as_slice(),
+        );
+        let both = [in_time, by_source].into_iter();
+        both.filter(|(blocks, _)| !blocks.is_empty())
     }
 
     /// Squares of the scores of each block of a cut at `value`, widened, and how many blocks hold the information.
@@ -541,12 +544,8 @@ impl Fits {
     fn scatter(&self, set: &[usize]) -> Option<Scatter> {
         let (value, factor) = self.all.amplitudes(set)?;
         let cuts = self.cuts().map(|cut| self.spread(cut, set, &value));
-        let [in_time, by_source] = cuts;
-        let (mut spread, blocks) = if by_source.1 > in_time.1 {
-            by_source
-        } else {
-            in_time
-        };
+        let (mut spread, blocks) =
+            cuts.reduce(|first, other| if other.1 > first.1 { other } else { first })?;
         let variance = self.variance(set)?;
         // S less the sum of M is what the prior adds
         let of_set = self.all.nuisance.select_columns(set);

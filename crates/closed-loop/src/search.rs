@@ -72,6 +72,11 @@ impl Fitted {
         }
     }
 
+    /// What the log-likelihood gains where the squared error falls from `before` to `after`, nats.
+    pub(crate) fn nats(&self, before: f64, after: f64) -> f64 {
+        0.5 * self.scalars * (before / after).ln()
+    }
+
     /// Noise variance beside `chosen`.
     pub(crate) fn variance_beside(&self, chosen: &[usize]) -> Option<f64> {
         self.fits.variance(&columns_of(&self.groups, chosen))

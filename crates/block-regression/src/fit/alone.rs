@@ -31,6 +31,17 @@ struct Alone {
     shares: Shares,
 }
 
+impl Alone {
+    /// The one of two cuts of which more blocks hold the information.
+    fn with_more_blocks(self, other: Self) -> Self {
+        if other.shares.blocks() > self.shares.blocks() {
+            other
+        } else {
+            self
+        }
+    }
+}
+
 impl Fits {
     /// What all columns, each alone, say of the noise.
     pub(super) fn usual(&self) -> Usual {
@@ -39,30 +50,20 @@ impl Fits {
             .collect();
         let some = shown.par_chunks(TOGETHER);
         let columns: Vec<(f64, f64)> = some.flat_map_iter(|some| self.each_alone(some)).collect();
-        Usual::of(
-            &columns,
-            MOST_BLOCKS
-                * self
-                    .cuts()
-                    .map(|(blocks, _)| blocks.len())
-                    .into_iter()
-                    .fold(0, usize::max) as f64,
-        )
+        let blocks = self.cuts().map(|(blocks, _)| blocks.len()).max();
+        Usual::of(&columns, MOST_BLOCKS * blocks.unwrap_or(0) as f64)
     }
 
     /// How much wider than white noise each of `columns` scatters by itself, and the blocks less one that say so: as
     /// [`scatter`](Self::scatter) of each, in one pass over the blocks.
     pub(super) fn each_alone(&self, columns: &[usize]) -> Vec<(f64, f64)> {
-        let [in_time, by_source] = self.cuts().map(|cut| self.sums_alone(cut, columns));
-        let both = in_time.into_iter().zip(by_source);
-        let alone = both.map(|(a, b)| {
-            if b.shares.blocks() > a.shares.blocks() {
-                b
-            } else {
-                a
-            }
+        let cuts = self.cuts().map(|cut| self.sums_alone(cut, columns));
+        let alone = cuts.reduce(|first, other| {
+            let both = first.into_iter().zip(other);
+            both.map(|(first, other)| first.with_more_blocks(other))
+                .collect()
         });
-        let widths = alone.filter_map(|own| {
+        let widths = alone.into_iter().flatten().filter_map(|own| {
             let variance = self.variance(&[own.column])?;
             let nuisance = self.all.nuisance.column(own.column);
             let of_prior = nuisance.dot(&(&self.all.prior * nuisance)) * variance;

@@ -137,17 +137,14 @@ impl AttitudeData {
         self.unshared(self.theta.each_ref().map(Vec::as_slice))
     }
 
-    /// Rows as effects see them.
-    pub(crate) fn rows<'a>(
-        &'a self,
-        rows: Range<usize>,
-        attitude: Option<&'a dyn AttitudeSource>,
-    ) -> AttitudeRows<'a> {
+    /// All rows as effects see them.
+    fn rows<'a>(&'a self, attitude: Option<&'a dyn AttitudeSource>) -> AttitudeRows<'a> {
+        let [wx_rad_s, wy_rad_s, wz_rad_s] = &self.rate;
         AttitudeRows {
-            t_s: &self.t_s[rows.clone()],
-            wx_rad_s: &self.rate[0][rows.clone()],
-            wy_rad_s: &self.rate[1][rows.clone()],
-            wz_rad_s: &self.rate[2][rows],
+            t_s: &self.t_s,
+            wx_rad_s,
+            wy_rad_s,
+            wz_rad_s,
             attitude,
         }
     }
@@ -193,7 +190,7 @@ impl AttitudeEvidence<'_> {
             axis.clear();
             axis.resize(candidate.coefficients().len() * n, 0.0);
         }
-        let seen = self.data.rows(0..n, self.motion);
+        let seen = self.data.rows(self.motion);
         let [x, y, z] = &mut *columns;
         let shows = candidate.attitude_columns(&seen, VectorsMut { x, y, z });
         let values = columns.iter_mut().flatten();

@@ -20,9 +20,11 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use effects::{AttitudeRows, Candidate, Coefficient, Effect, EffectError, StarRows, Surroundings};
-use focal_plane::{ARCSEC_PER_RAD, Camera, PointsMut, VectorsMut};
-use nalgebra::{UnitQuaternion, Vector3};
+use effects::{
+    AttitudeRows, Candidate, Coefficient, Effect, EffectError, StarRows, Surroundings, mean_turn,
+};
+use focal_plane::{ARCSEC_PER_RAD, AttitudeSource, Camera, PointsMut, VectorsMut};
+use nalgebra::Vector3;
 
 use crate::motion::Around;
 use crate::search::empirical::EMPIRICAL;
@@ -133,23 +135,12 @@ impl Motion {
     }
 
     /// Its value at a time: rad/s, or rad/s^2 from how the path is bent over `over_s` on both sides.
-    fn at(
-        self,
-        source: &dyn focal_plane::AttitudeSource,
-        t_s: f64,
-        over_s: f64,
-    ) -> Option<Vector3<f64>> {
+    fn at(self, source: &dyn AttitudeSource, t_s: f64, over_s: f64) -> Option<Vector3<f64>> {
         if self == Self::Rate {
             return source.rate_rad_s(t_s);
         }
         let mut hint = 0;
-        let mut turn = |d_s: f64| {
-            let turn = source.turn(t_s, d_s, &mut hint)?;
-            Some(focal_plane::rotation_vector(
-                &turn,
-                &UnitQuaternion::identity(),
-            ))
-        };
+        let mut turn = |d_s: f64| mean_turn(source, t_s, d_s, 0.0, &mut hint);
         // the tracker turns by what the sky does the other way
         Some((turn(over_s)? + turn(-over_s)?) / -(over_s * over_s))
     }

@@ -272,7 +272,7 @@ pub(crate) fn propose(
         let with = columns(0..first);
         let without = columns(1..first);
         let error = |set: &[usize]| fitted.fits.error(set).unwrap_or(f64::INFINITY);
-        let gain = |set: &[usize]| 0.5 * fitted.scalars * (error(&without) / error(set)).ln();
+        let gain = |set: &[usize]| fitted.nats(error(&without), error(set));
         nats = gain(&with);
         let others = gain(&columns(1..all.len()));
         if nats < WORTH_A_SEARCH || nats < RIVAL * others.max(slow.unwrap_or(0.0)) {

@@ -15,7 +15,7 @@
 use std::sync::Arc;
 
 use block_regression::{Folds, Gram};
-use nalgebra::{DMatrix, Matrix3, Vector3};
+use nalgebra::{DMatrix, RowVector3};
 
 use crate::star::columns::StarColumns;
 use crate::star::frame_rotation::rotation_row;
@@ -52,44 +52,33 @@ pub(super) fn parts(columns: &StarColumns<'_>, parts: usize) -> Vec<Gram> {
         if columns.weigh(frames, &mut filled) < SOLVING {
             continue;
         }
-        // what turns the camera is nothing beside a free attitude
-        let mut seen = [
-            DMatrix::zeros(rows.len(), width),
-            DMatrix::zeros(rows.len(), width),
-        ];
-        for (axis, seen) in seen.iter_mut().enumerate() {
-            let polynomials = filled.shared.transpose();
-            for k in 0..layout.shared {
+        // rows of x, then of y; what turns the camera is nothing beside a free attitude
+        let (n, polynomials) = (rows.len(), filled.shared.transpose());
+        let (mut seen, mut turns) = (DMatrix::zeros(2 * n, width), DMatrix::zeros(2 * n, 3));
+        for axis in 0..2 {
+            let mut seen = seen.rows_mut(axis * n, n);
+            for (k, column) in polynomials.column_iter().enumerate() {
                 seen.column_mut(layout.shared_at(k, axis))
-                    .copy_from(&polynomials.column(k));
+                    .copy_from(&column);
             }
             for (column, &place) in filled.own[axis].column_iter().zip(&layout.own) {
                 seen.column_mut(place).copy_from(&column);
             }
         }
-        let turns: Vec<[Vector3<f64>; 2]> = rows
-            .clone()
-            .map(|row| {
-                let weight = columns.weight_of(row);
-                rotation_row(data, row).map(|axis| Vector3::from(axis) * weight)
-            })
-            .collect();
-        let normal: Matrix3<f64> = turns.iter().flatten().map(|a| a * a.transpose()).sum();
-        let Some(solved) = normal.cholesky() else {
-            continue;
-        };
-        let mut moments = DMatrix::zeros(3, width);
-        for (i, turn) in turns.iter().enumerate() {
-            for (axis, a) in turn.iter().enumerate() {
-                moments.ger(1.0, a, &seen[axis].row(i).transpose(), 1.0);
+        for (i, row) in rows.clone().enumerate() {
+            let weight = columns.weight_of(row);
+            for (axis, turn) in rotation_row(data, row).iter().enumerate() {
+                let turn = RowVector3::from_row_slice(turn) * weight;
+                turns.row_mut(axis * n + i).copy_from(&turn);
             }
         }
-        let theta = solved.solve(&moments);
+        let Some(solved) = turns.tr_mul(&turns).cholesky() else {
+            continue;
+        };
+        let left = &seen - &turns * solved.solve(&turns.tr_mul(&seen));
         for (i, row) in rows.enumerate().filter(|(_, row)| !data.outlier[*row]) {
-            for (axis, a) in turns[i].iter().enumerate() {
-                let left = seen[axis].row(i) - a.transpose() * &theta;
-                rows_of_part[data.star[row] % parts].extend(left.iter());
-            }
+            let part = &mut rows_of_part[data.star[row] % parts];
+            part.extend(left.row(i).iter().chain(left.row(n + i).iter()));
         }
     }
     let nothing = Arc::new(DMatrix::zeros(width, width));

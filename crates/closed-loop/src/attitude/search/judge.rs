@@ -19,7 +19,7 @@ use crate::attitude::line_level::line_level;
 use crate::attitude::motion_terms::is_of_motion;
 use crate::search::empirical::EMPIRICAL;
 use crate::search::selection::{FAMILY_ALPHA, Judgement, SLOW_PRICE, WIDENING, columns_of};
-use crate::search::without;
+use crate::search::{Fitted, without};
 use crate::unexplained::SEARCH_ALPHA;
 
 /// The effects that a change of stars looks like, and stars that come by again.
@@ -68,13 +68,15 @@ impl Trial<'_, '_> {
 
     /// Whether a motion gains little beside `others`, under white noise and under the present one: not worth a climb.
     fn is_slight(&self, others: &[usize], g: usize) -> bool {
-        let gains = [&self.plain, self.fitted].map(|fitted| {
+        let gain = |fitted: &Fitted| {
             let error = |set: &[usize]| fitted.fits.error(&columns_of(&fitted.groups, set));
             let (without, with) = (error(others)?, error(&[others, &[g]].concat())?);
-            Some(0.5 * fitted.scalars * (without / with).ln())
-        });
+            Some(fitted.nats(without, with))
+        };
+        let is_little = |fitted: &Fitted| gain(fitted).is_none_or(|nats| nats < LITTLE);
         is_of_motion(self.candidates[g].as_ref())
-            && gains.iter().all(|g| g.is_none_or(|g| g < LITTLE))
+            && is_little(&self.plain)
+            && is_little(self.fitted)
     }
 
     /// Standing of group `g` beside the others of `chosen`.

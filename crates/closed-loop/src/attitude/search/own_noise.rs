@@ -21,7 +21,6 @@ use nalgebra::{DMatrix, DVector};
 
 use super::Trial;
 use crate::attitude::data::AttitudeEvidence;
-use crate::search::group::is_believed;
 use crate::search::selection::columns_of;
 use crate::search::{Fitted, first_column, fit_design, without};
 
@@ -90,7 +89,7 @@ impl Trial<'_, '_> {
         };
         chosen.iter().all(|g| {
             let others = without(chosen, &[*g]);
-            error(&others).is_some_and(|e| 0.5 * self.plain.scalars * (e / all).ln() > LITTLE)
+            error(&others).is_some_and(|e| self.plain.nats(e, all) > LITTLE)
         })
     }
 
@@ -124,11 +123,11 @@ impl Trial<'_, '_> {
                     (Start::Faint, None) => self.climbing_from_faint(axis, &residual[axis]),
                 }
             });
+            let mut first = 0;
             let credible = fitted.groups.iter().all(|group| {
-                group.columns.iter().zip(&group.bounds).all(|(c, bounds)| {
-                    let at = set.iter().position(|s| s == c);
-                    at.is_some_and(|i| is_believed(&estimate, i, *bounds))
-                })
+                let own = first;
+                first += group.columns.len();
+                group.believes(&group.columns, &estimate, own)
             });
             let mut all = vec![0.0; columns];
             for (value, &c) in estimate.value.iter().zip(&set) {
@@ -214,7 +213,7 @@ impl Trial<'_, '_> {
         self.loglik(noise, &nothing) + 0.5 * scalars * std::f64::consts::TAU.ln()
     }
 
-    pub(super) fn loglik(&self, noise: &[Coloured; 3], residual: &[Vec<f64>; 3]) -> f64 {
+    fn loglik(&self, noise: &[Coloured; 3], residual: &[Vec<f64>; 3]) -> f64 {
         self.logliks(noise, residual).iter().sum()
     }
 

@@ -228,7 +228,7 @@ impl<'a> Alone<'a> {
         let Some((before, with)) = error(&rest).zip(error(self.chosen)) else {
             return false;
         };
-        let gain = 0.5 * fitted.scalars * (before / with).ln();
+        let gain = fitted.nats(before, with);
         let slow = self.trial.climb(&self.trial.columns(&rest), start);
         let slow = slow.map_or(0.0, |(noise, rotations, _)| {
             0.5 * rotations.slow_ratio(&noise).iter().sum::<f64>()

@@ -14,7 +14,7 @@ use coloured_noise::{CommonNoise, Rotations, SlowGains};
 use nalgebra::DMatrix;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use crate::search::group::{Group, is_believed};
+use crate::search::group::Group;
 use crate::search::selection::{Judgement, WIDENING, columns_of};
 use crate::star::moments::StarMoments;
 
@@ -125,15 +125,11 @@ impl Trial<'_> {
                 let group = &self.groups[g];
                 let own = first..first + group.columns.len();
                 first = own.end;
-                let credible = own
-                    .clone()
-                    .zip(&group.bounds)
-                    .all(|(i, bounds)| is_believed(&estimate, i, *bounds));
                 Part {
+                    credible: group.believes(&group.columns, &estimate, own.start),
                     columns: own,
                     shapes: group.shapes,
                     cost: self.cost[g],
-                    credible,
                 }
             })
             .collect();
