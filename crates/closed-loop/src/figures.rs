@@ -34,8 +34,6 @@ use crate::unexplained::SEARCH_ALPHA;
 
 /// Shares within this factor are the same.
 const SAME: f64 = 3.0;
-/// Nearly as much: what then has fewer columns comes first.
-const NEARLY: f64 = 0.9;
 /// Correlations below this are not worth a reader's time.
 const CONFUSABLE: f64 = 0.3;
 
@@ -435,19 +433,8 @@ pub(crate) fn follows(
         // a dozen columns follow anything a little
         judged.retain(|(d, worth, _)| certain(d) && *worth > 0.0);
     }
-    // nor do all of many against one that explains nearly as much with fewer columns
-    let rank = |d: &Dependence, worth: f64| {
-        let beaten = judged.iter().any(|(o, other, _)| {
-            *other > worth && o.variance_explained > NEARLY * d.variance_explained
-        });
-        d.variance_explained * if beaten { NEARLY } else { 1.0 }
-    };
-    let mut ranked: Vec<(f64, Dependence)> = judged
-        .iter()
-        .map(|(d, worth, _)| (rank(d, *worth), d.clone()))
-        .collect();
-    ranked.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let mut depends_on: Vec<Dependence> = ranked.into_iter().map(|(_, d)| d).collect();
+    // by what they are worth: squares out of fold know nothing of the priors of what is fitted beside them
+    let mut depends_on: Vec<Dependence> = judged.into_iter().map(|(d, ..)| d).collect();
     if depends_on.iter().any(certain) {
         // what chance does as well is not named beside what it does not
         depends_on.retain(certain);

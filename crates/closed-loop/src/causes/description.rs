@@ -17,7 +17,7 @@ use crate::causes::changing_effect::{Changing, Inner, Way};
 use crate::error::CloseError;
 use crate::figures::{self, Followed};
 use crate::gaps::longest_step;
-use crate::search::empirical::{Empirical, Variable, flux_of, range};
+use crate::search::empirical::{Empirical, Variable, about_mean, flux_of, range};
 use crate::search::group::Group;
 use crate::search::selection::{FAMILY_ALPHA, Judgement, columns_of, costs, each};
 use crate::search::{Fitted, Found, borrowed, fit, fit_beside};
@@ -387,6 +387,7 @@ pub(crate) fn terms(
         [steady - largest, steady + largest]
     };
     let range = |values: &[f64]| range(values.iter().copied());
+    let centred = |values: &[f64]| about_mean(values.iter().copied());
     let off: Vec<f64> = (0..2)
         .flat_map(|a| {
             let (at, window) = (&data.modelled[a], &data.window_px[a]);
@@ -397,13 +398,15 @@ pub(crate) fn terms(
     let phase = [0, 1].map(|a| (Variable::Phase(a), [0.0, 1.0]));
     let time = (Variable::Time, range(&data.t_s));
     let rate = (Variable::Rate, motion(&data.velocity));
-    let mag = (Variable::Magnitude, range(&data.mag));
-    let colour = (Variable::Colour, range(&data.bv));
+    let mag = (Variable::Magnitude, centred(&data.mag));
+    let colour = (Variable::Colour, centred(&data.bv));
     let flux: Vec<f64> = data.mag.iter().map(|m| flux_of(*m)).collect();
-    let flux = (Variable::Brightness, range(&flux));
+    let flux = (Variable::Brightness, centred(&flux));
     let channels: Vec<_> = channels_of_interest(&situation.channels)
         .map(|(name, series)| {
-            let known = range(series.value());
+            let mut in_run = vec![0.0; data.t_s.len()];
+            series.at_into(&data.t_s, &mut in_run);
+            let known = centred(&in_run);
             (Variable::Housekeeping(name, series.clone()), known)
         })
         .collect();
@@ -441,7 +444,7 @@ pub(crate) fn terms(
     }
     if mag.1[0] >= mag.1[1] || !mag.1[0].is_finite() {
         // no magnitudes
-        terms.extend(one(&(Variable::Flux, range(&data.log_flux))));
+        terms.extend(one(&(Variable::Flux, centred(&data.log_flux))));
     } else {
         terms.extend(one(&flux));
     }

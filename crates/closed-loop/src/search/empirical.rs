@@ -366,8 +366,8 @@ impl Empirical {
                 parts.extend([(0..own).collect(), vec![own, own + 1], (own..n).collect()]);
             }
         } else if n == FIELDS * ORDERS {
-            // what bends alone
-            parts.extend([vec![4, 5], (4..8).collect()]);
+            // what bends alone, and the scale
+            parts.extend([vec![4, 5], (4..8).collect(), vec![3]]);
         }
         parts.push((0..n).collect());
         parts
@@ -410,6 +410,19 @@ pub(crate) fn range(values: impl IntoIterator<Item = f64>) -> [f64; 2] {
     known.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| {
         [low.min(v), high.max(v)]
     })
+}
+
+/// The range about their mean that holds all values that are known: what a variable adds up to over a run has been
+/// calibrated away, and a scale that follows it about another value is a constant one as well, which is not fitted.
+pub(crate) fn about_mean(values: impl Iterator<Item = f64> + Clone) -> [f64; 2] {
+    let known = values.filter(|v| v.is_finite());
+    let (count, sum) = known
+        .clone()
+        .fold((0.0, 0.0), |(n, sum), v| (n + 1.0, sum + v));
+    let mean = sum / f64::max(count, 1.0);
+    let [low, high] = range(known);
+    let half = (high - mean).max(mean - low);
+    [mean - half, mean + half]
 }
 
 fn coefficients(count: usize) -> Vec<Coefficient> {

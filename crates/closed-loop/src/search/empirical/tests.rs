@@ -253,3 +253,14 @@ fn what_bends_as_well_hides_no_effect() {
     let phase = Empirical::new(Variable::Phase(0), range, true).unwrap();
     assert_eq!(phase.bending(&[0]).len(), phase.coefficients().len());
 }
+
+/// Of what is known: four magnitudes, most of them faint.
+#[test]
+fn a_range_about_the_mean_holds_all_values() {
+    let [low, high] = about_mean([2.0, f64::NAN, 6.0, 6.0, 6.0].into_iter());
+    assert!((0.5 * (low + high) - 5.0).abs() < 1e-12);
+    assert!((low - 2.0).abs() < 1e-12 && (high - 8.0).abs() < 1e-12);
+    // of nothing there is no range
+    let [low, high] = about_mean([f64::NAN].into_iter());
+    assert!(low >= high || !low.is_finite());
+}
