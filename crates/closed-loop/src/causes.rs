@@ -36,7 +36,7 @@ use crate::star::landing::Elsewhere;
 use crate::star::search::{Attempt, Searched, attempt, declared_noise};
 use changing_effect::{Changing, Inner, Way};
 use commonness::Slow;
-use description::{Described, Kept, Part};
+use description::{Described, Kept, Part, grown};
 use invariance::{Change, changing};
 use stand_ins::{BY_FAR, describe, stand_ins};
 use star_constants::Constants;
@@ -202,7 +202,8 @@ pub(crate) fn run<'a>(
         {
             return Ok(Outcome::Elsewhere(elsewhere));
         }
-        let terms = (quest.terms)(searched.wander.is_some());
+        let mut terms = (quest.terms)(searched.wander.is_some());
+        terms.extend(grown(level, inside.as_deref()));
         let described = Described::new(level, folds, &searched.found, terms, quest.ways)?;
         let agreed = |set: &[usize], instead: &[Part]| {
             constants
@@ -315,7 +316,8 @@ pub(crate) fn run<'a>(
         let all = borrowed(&found.candidates);
         let fitted = fit_beside(level, folds, &all, &found.selection.chosen)?;
         let found = Found { fitted, ..found };
-        let terms = (quest.terms)(wander.is_some());
+        let mut terms = (quest.terms)(wander.is_some());
+        terms.extend(grown(level, inside.as_deref()));
         let described = Described::new(level, folds, &found, terms, quest.ways)?;
         // how an effect changes may be among what is described
         let beside = best_beside(&found, &may);
@@ -570,7 +572,7 @@ fn in_place_of_wander(coloured: &Described, plain: &Described, axes: usize) -> O
 }
 
 /// Slow noise that is left of the stars themselves.
-fn slow_left(level: &StarEvidence<'_>, inside: Option<&[Vec<f64>]>) -> Option<Slow> {
+pub(crate) fn slow_left(level: &StarEvidence<'_>, inside: Option<&[Vec<f64>]>) -> Option<Slow> {
     let span = level.data.frames.t_s.last()? - level.data.frames.t_s.first()?;
     commonness::slow(level.data, inside?, [true; 3], SLOW_SHARE * span)
 }

@@ -319,6 +319,7 @@ pub(crate) fn unattributed(
                 parts: vec![found.fitted.groups[g].columns.clone()],
                 group: &found.fitted.groups[g],
                 of_many: false,
+                scanned: 0.0,
             })
         })
         .collect();
@@ -349,6 +350,8 @@ pub(crate) struct Followed<'a> {
     pub(crate) group: &'a Group,
     /// Its parts are single stars or slots, and all.
     pub(crate) of_many: bool,
+    /// What it pays beside its columns, nats.
+    pub(crate) scanned: f64,
 }
 
 /// What the leftover beside columns `set` follows: of `terms`, each by the part that is worth
@@ -375,15 +378,15 @@ pub(crate) fn follows(
             return None;
         }
         let p = estimate.p_value(&which);
-        let tried = term.parts.len() * tried;
+        let tried = (term.parts.len() * tried) as f64 * term.scanned.exp();
         let share = if base > 0.0 {
             1.0 - fold.total_sse() / base
         } else {
             0.0
         };
-        let worth = fold.total_loglik() - before - each * part.len() as f64;
+        let worth = fold.total_loglik() - before - each * part.len() as f64 - term.scanned;
         Some(Part {
-            p_value: (p * tried as f64).min(1.0),
+            p_value: (p * tried).min(1.0),
             share,
             worth,
             columns: part.len(),
@@ -439,11 +442,9 @@ pub(crate) fn follows(
         // what chance does as well is not named beside what it does not
         depends_on.retain(certain);
     }
-    let share = depends_on
-        .iter()
-        .filter(|d| certain(d))
-        .map(|d| d.variance_explained)
-        .fold(0.0, f64::max);
+    // what is certain is all that is listed then
+    let told = depends_on.iter().any(certain);
+    let share = if told { largest(&depends_on) } else { 0.0 };
     Unattributed {
         present: share > 0.0,
         variance_fraction: Some(share * left),
@@ -464,6 +465,12 @@ pub(crate) fn first_of_each<T>(entries: Vec<T>, variable: impl Fn(&T) -> &String
 /// Whether that is beyond chance.
 pub(crate) fn certain(d: &Dependence) -> bool {
     d.p_value < SEARCH_ALPHA && d.variance_explained > 0.0
+}
+
+/// The largest share among these, 0 where there is none.
+pub(crate) fn largest(list: &[Dependence]) -> f64 {
+    let shares = list.iter().map(|d| d.variance_explained);
+    shares.fold(0.0, f64::max)
 }
 
 /// The empirical term that explains most of what is left, if one that a model can declare does.

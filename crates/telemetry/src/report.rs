@@ -330,7 +330,7 @@ pub struct Unattributed {
     pub present: bool,
     /// Its share of the before variance.
     pub variance_fraction: Option<f64>,
-    /// What it follows, largest first.
+    /// What it follows, what the data say most for first.
     pub depends_on: Vec<Dependence>,
     /// Frequencies of lines, Hz.
     pub lines_hz: Vec<f64>,

@@ -115,7 +115,7 @@ impl Slow {
     pub(crate) fn tell(&self, unattributed: &mut Unattributed, left: f64) {
         let share = self.stars.max(0.0);
         let first = unattributed.depends_on.first();
-        let known = first.map_or(0.0, |d| d.variance_explained);
+        let known = figures::largest(&unattributed.depends_on);
         // the logarithm of a chance is half a square, and slow noise makes squares larger
         let certain = |d: &Dependence| {
             let p = d.p_value.powf(self.inflation().recip());

@@ -26,6 +26,7 @@ use crate::situation::channels_of_interest;
 use crate::star::columns::star_columns_of;
 use crate::star::data::StarData;
 use crate::star::evidence::StarEvidence;
+use crate::unexplained::leftover::jumps::{self, SharedJump};
 use nalgebra::Vector3;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use telemetry::report::{Dependence, Unattributed};
@@ -186,6 +187,7 @@ impl Described {
                 parts: t.parts.clone(),
                 group: &t.group,
                 of_many: t.term.is_of_many(),
+                scanned: t.term.scanned(),
             })
             .collect();
         let tried = terms.len();
@@ -272,6 +274,7 @@ impl Described {
             parts: all,
             group: &stars.group,
             of_many: false,
+            scanned: 0.0,
         };
         let whole = figures::follows(fits, set, &[term], tried, 0.0, 1.0);
         let Some(entry) = whole.depends_on.into_iter().find(figures::certain) else {
@@ -484,6 +487,12 @@ pub(crate) fn terms(
         );
     }
     terms
+}
+
+/// A scale that is another one from an instant on: the likeliest in what is left, `inside`, arcsec.
+pub(crate) fn grown(level: &StarEvidence<'_>, inside: Option<&[Vec<f64>]>) -> Option<Empirical> {
+    let SharedJump { at_s, tried } = jumps::growth(level.data, inside?, &level.weight)?;
+    Empirical::new(Variable::Since { at_s, tried }, [0.0, 1.0], true)
 }
 
 /// Whether the rotation from one frame to the next is the same all the time, but for [`UNSTEADY`] of it.

@@ -239,10 +239,11 @@ fn describe_at(described: &Described, rest: &[usize], times: f64) -> Option<(f64
                     continue;
                 };
                 // what is in the description already has been paid for
-                let more = price.worth(likelihood - base, part.len());
+                let scanned = term.term.scanned();
+                let more = price.worth(likelihood - base, part.len()) - scanned;
                 let certain = || {
                     beside(fits, &with, part).is_some_and(|(e, which)| {
-                        e.p_value(&which) * (tried as f64) < FAMILY_ALPHA
+                        e.p_value(&which) * (tried as f64) * scanned.exp() < FAMILY_ALPHA
                             && term.group.believes(part, &e, with.len())
                     })
                 };
@@ -263,7 +264,8 @@ fn describe_at(described: &Described, rest: &[usize], times: f64) -> Option<(f64
         if !described.terms[best.term].term.is_of_many() {
             let (its, fewer) = needed(fits, &with, part.clone(), price)?;
             let picked = ln_binomial(part.len() as u64, fewer.len() as u64);
-            let worth = price.worth(its - base, fewer.len()) - picked;
+            let scanned = described.terms[best.term].term.scanned();
+            let worth = price.worth(its - base, fewer.len()) - picked - scanned;
             if worth > more {
                 (more, likelihood, part) = (worth, its, fewer);
             }

@@ -24,6 +24,7 @@ use telemetry::report::{Dependence, Unattributed};
 use crate::causes::commonness::IN_TIME;
 use crate::causes::description::{Described, Part};
 use crate::causes::stand_ins::BY_FAR;
+use crate::figures;
 use crate::search::selection::columns_of;
 use crate::search::{Found, without};
 use crate::star::data::StarData;
@@ -238,8 +239,7 @@ impl<'a> Constants<'a> {
             p_value,
         });
         before.extend(behind);
-        let most = before.iter().map(|d| d.variance_explained);
-        unattributed.variance_fraction = Some(left * most.fold(0.0, f64::max));
+        unattributed.variance_fraction = Some(left * figures::largest(&before));
         unattributed.depends_on = before;
     }
 }

@@ -17,7 +17,8 @@
 //! P_1(a) times the first columns of b, of a motion those of its size, too
 //! ```
 //!
-//! A half or a quarter of the detector that is shifted as a whole, for its output or its mosaic, has two values.
+//! A half or a quarter of the detector that is shifted as a whole, for its output or its mosaic, has two values. The
+//! scale may be another one from an instant on: what bends with the time takes three columns for it.
 //!
 //! Such a term predicts; it never explains.
 //!
@@ -69,6 +70,11 @@ pub(crate) enum Variable {
     /// Pixel phase along one axis.
     Phase(usize),
     Time,
+    /// Before and after an instant that was looked for among so many.
+    Since {
+        at_s: f64,
+        tried: usize,
+    },
     /// Velocity of the image.
     Rate,
     /// Acceleration of the image.
@@ -98,7 +104,7 @@ impl Variable {
             Self::Quarter => "x_px*y_px".into(),
             Self::Phase(0) => "pixel_phase_x".into(),
             Self::Phase(_) => "pixel_phase_y".into(),
-            Self::Time => "time".into(),
+            Self::Time | Self::Since { .. } => "time".into(),
             Self::Rate => "rate".into(),
             Self::Acceleration => "acceleration".into(),
             Self::Magnitude => "mag".into(),
@@ -147,7 +153,7 @@ impl Variable {
             Self::Position(axis) | Self::Half(axis) => *axis,
             Self::Quarter => 0,
             Self::Phase(axis) => 2 + axis,
-            Self::Time => 4,
+            Self::Time | Self::Since { .. } => 4,
             Self::Rate => 5,
             Self::Acceleration => 6,
             Self::Magnitude => 7,
@@ -166,6 +172,7 @@ impl Variable {
             Self::Position(0) => rows.x_px[i],
             Self::Position(_) => rows.y_px[i],
             Self::Time => rows.t_s[i],
+            Self::Since { at_s, .. } => f64::from(u8::from(rows.t_s[i] > *at_s)),
             Self::Magnitude => rows.mag[i],
             Self::Colour => rows.bv[i],
             Self::Flux => rows.log_flux[i],
@@ -233,7 +240,7 @@ impl Empirical {
             Variable::Slot(slots) => 2 * slots.len(),
             Variable::Phase(_) => 2 * (HARMONICS + ACROSS),
             Variable::Position(_) | Variable::Window => 2 * ORDERS,
-            Variable::Half(_) | Variable::Quarter => 2,
+            Variable::Half(_) | Variable::Quarter | Variable::Since { .. } => 2,
             Variable::Time if stars => FIELDS * ORDERS,
             // A polynomial in time is only good outside its fold if it is straight.
             Variable::Time => 3,
@@ -310,7 +317,16 @@ impl Empirical {
 
     /// Whether it is the time alone.
     pub(crate) fn is_of_time(&self) -> bool {
-        matches!(self.variable, Variable::Time) && self.by.is_none()
+        let of_time = matches!(self.variable, Variable::Time | Variable::Since { .. });
+        of_time && self.by.is_none()
+    }
+
+    /// What it pays for the instant that was looked for, nats.
+    pub(crate) fn scanned(&self) -> f64 {
+        match self.variable {
+            Variable::Since { tried, .. } => (tried.max(1) as f64).ln(),
+            _ => 0.0,
+        }
     }
 
     /// Whether it is a housekeeping channel alone.
@@ -365,6 +381,9 @@ impl Empirical {
             if n > own {
                 parts.extend([(0..own).collect(), vec![own, own + 1], (own..n).collect()]);
             }
+        } else if matches!(self.variable, Variable::Since { .. }) {
+            // nothing before it
+            parts.push(vec![0]);
         } else if n == FIELDS * ORDERS {
             // what bends alone, and the scale
             parts.extend([vec![4, 5], (4..8).collect(), vec![3]]);
@@ -571,6 +590,10 @@ impl Candidate for Empirical {
                     put(0, values[i], 0.0);
                     put(1, 0.0, values[i]);
                 }
+                Variable::Since { .. } => {
+                    put(0, x * values[i], y * values[i]);
+                    put(1, x, y);
+                }
                 Variable::Star(ids) => {
                     if let Some(k) = ids.iter().position(|&id| id == rows.star_id[i]) {
                         put(2 * k, 1.0, 0.0);
@@ -638,11 +661,14 @@ impl Candidate for Empirical {
         values: &[f64],
         surroundings: &Surroundings<'_>,
     ) -> Result<Box<dyn Effect>, EffectError> {
-        if matches!(self.variable, Variable::Half(_) | Variable::Quarter) {
+        if matches!(
+            self.variable,
+            Variable::Half(_) | Variable::Quarter | Variable::Since { .. }
+        ) {
             return Err(EffectError::WrongType {
                 effect: EMPIRICAL,
                 name: "variable".to_owned(),
-                expected: "a place, not a half of the detector",
+                expected: "a place or a time, not a half of the detector or of the run",
             });
         }
         let parameters = effects::empirical_parameters(

@@ -11,6 +11,7 @@ use telemetry::{DarkMap, Model, StarResiduals};
 
 use crate::causes::commonness::Slow;
 use crate::causes::description::{self, Described};
+use crate::causes::slow_left;
 use crate::causes::star_constants::Constants;
 use crate::error::CloseError;
 use crate::evidence::Residuals;
@@ -209,8 +210,13 @@ pub(crate) fn finish(
         || {
             // what is described is no noise
             let beside = f.beside_description()?;
+            let slow = match &beside {
+                Some(beside) => slow_left(f.level, Some(beside)),
+                None => f.slow,
+            };
             let residual = beside.as_deref().unwrap_or(residual);
-            noise_effects::claim(f.situation, f.level, residual, f.folds)
+            let noise = noise_effects::claim(f.situation, f.level, residual, f.folds)?;
+            Ok::<_, CloseError>((noise, slow))
         },
         || {
             let order = f.situation.model.noise.distortion_order;
@@ -236,7 +242,7 @@ pub(crate) fn finish(
         },
     );
     drop(turned);
-    let mut noise = noise?;
+    let (mut noise, slow) = noise?;
     let mut noise_left = noise_effects::NoiseFollows::default();
     if f.image.is_some_and(ImageLevel::new_noise) {
         noise = noise.without_magnitude();
@@ -256,7 +262,7 @@ pub(crate) fn finish(
     if let Some(pattern) = pattern {
         pattern.tell(&mut unattributed, last / whole);
     }
-    if let Some(slow) = f.slow {
+    if let Some(slow) = slow {
         slow.tell(&mut unattributed, last / whole);
     }
     own.tell(&mut unattributed, last / whole);

@@ -140,12 +140,14 @@ impl Pattern {
             return;
         }
         list.retain(|d| d.variable != variable);
-        list.push(Dependence {
+        let smaller = |d: &Dependence| d.variance_explained < self.explained;
+        let at = list.iter().position(smaller).unwrap_or(list.len());
+        let entry = Dependence {
             variable: variable.to_owned(),
             variance_explained: self.explained,
             p_value: self.p_value,
-        });
-        list.sort_by(|a, b| b.variance_explained.total_cmp(&a.variance_explained));
+        };
+        list.insert(at, entry);
     }
 }
 

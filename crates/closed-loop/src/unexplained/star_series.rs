@@ -26,6 +26,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
 use telemetry::report::Unattributed;
 
 use crate::causes::commonness::{self, IN_TIME, MOSTLY, stars_first};
+use crate::figures;
 use crate::star::data::StarData;
 use crate::unexplained::around::Around;
 use crate::unexplained::grid::{Grid, top};
@@ -99,7 +100,7 @@ impl OwnSeries {
         let share = unattributed.variance_fraction.unwrap_or(0.0);
         unattributed.variance_fraction = Some(share.max(self.explained * left));
         let list = &mut unattributed.depends_on;
-        let known = list.first().map_or(0.0, |d| d.variance_explained);
+        let known = figures::largest(list);
         if self.explained >= MOSTLY * known {
             stars_first(list, IN_TIME, self.explained, self.p_value);
         }

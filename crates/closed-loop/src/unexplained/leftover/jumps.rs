@@ -15,9 +15,10 @@ use coloured_noise::Coloured;
 use effects::{Candidate, Scene};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use super::{MOST, Series, Track, WORTH_A_SEARCH};
+use super::{MIN_POINTS, MOST, Series, Track, WORTH_A_SEARCH, star_tracks};
 use crate::attitude::spatial_errors::SpatialErrors;
 use crate::search::selection::WIDENING;
+use crate::star::data::StarData;
 
 /// Instants tried before the neighbours of the best are.
 const MOST_STEPS: usize = 1200;
@@ -73,12 +74,34 @@ impl Series {
     }
 }
 
+/// The instant from which on the image of what is left (arcsec, per axis over all rows) is likeliest another size: in
+/// white noise, whatever that is.
+pub(crate) fn growth(data: &StarData, residual: &[Vec<f64>], weight: &[f64]) -> Option<SharedJump> {
+    let tracks = star_tracks(data, residual, weight);
+    // the first of the stretches
+    let track = tracks.iter().find(|t| !t.turns)?.thinned();
+    if track.t_s.len() < MIN_POINTS {
+        return None;
+    }
+    let at = best_step(&[&track], &[WHITE])?;
+    Some(SharedJump {
+        at_s: track.before(at),
+        tried: track.instants(),
+    })
+}
+
+/// Of any size: where a step is best does not depend on it.
+const WHITE: Coloured = Coloured {
+    slow: 0.0,
+    white: 1.0,
+    tau_s: 1.0,
+};
+
 /// All of it as white noise.
 fn whole(noise: &Coloured) -> Coloured {
     Coloured {
-        slow: 0.0,
         white: noise.white.hypot(noise.slow),
-        tau_s: 1.0,
+        ..WHITE
     }
 }
 
