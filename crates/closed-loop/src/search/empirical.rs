@@ -32,9 +32,13 @@ use effects::{
     AttitudeRows, Candidate, Coefficient, Effect, EffectError, LARGEST_WAVE_PX, StarRows,
     Surroundings,
 };
-use focal_plane::{Camera, PointsMut, Series, VectorsMut};
+use focal_plane::{Camera, PointsMut, VectorsMut};
 
 use crate::search::LEADING;
+use variable::{Scale, orders};
+pub(crate) use variable::{Variable, about_mean, flux_of, range};
+
+mod variable;
 
 /// Id under which empirical terms are listed.
 pub(crate) const EMPIRICAL: &str = "empirical";
@@ -58,152 +62,6 @@ const DIRECTION: usize = BENT + 2;
 const OF_A_RATE: usize = DIRECTION + 2;
 /// Share of the largest rate below which a direction fades: it has none at rest.
 const AT_REST: f64 = 0.02;
-
-/// A variable that a leftover may follow.
-#[derive(Clone, Debug)]
-pub(crate) enum Variable {
-    /// Detector position along one axis (0 = x).
-    Position(usize),
-    /// The half of the detector along one axis, and the quarter: each may have an output of its own.
-    Half(usize),
-    Quarter,
-    /// Pixel phase along one axis.
-    Phase(usize),
-    Time,
-    /// Before and after an instant that was looked for among so many.
-    Since {
-        at_s: f64,
-        tried: usize,
-    },
-    /// Velocity of the image.
-    Rate,
-    /// Acceleration of the image.
-    Acceleration,
-    Magnitude,
-    Colour,
-    /// Measured flux, logarithm.
-    Flux,
-    /// The flux of the catalogue's magnitude: charge acts in proportion.
-    Brightness,
-    /// One constant shift a star.
-    Star(Vec<i64>),
-    /// One constant shift a slot.
-    Slot(Vec<i32>),
-    /// Place within the star's window.
-    Window,
-    /// A housekeeping channel.
-    Housekeeping(String, Series),
-}
-
-impl Variable {
-    /// The name in `unattributed.depends_on`.
-    pub(crate) fn name(&self) -> String {
-        match self {
-            Self::Position(0) | Self::Half(0) => "x_px".into(),
-            Self::Position(_) | Self::Half(_) => "y_px".into(),
-            Self::Quarter => "x_px*y_px".into(),
-            Self::Phase(0) => "pixel_phase_x".into(),
-            Self::Phase(_) => "pixel_phase_y".into(),
-            Self::Time | Self::Since { .. } => "time".into(),
-            Self::Rate => "rate".into(),
-            Self::Acceleration => "acceleration".into(),
-            Self::Magnitude => "mag".into(),
-            Self::Colour => "colour".into(),
-            Self::Flux | Self::Brightness => "flux".into(),
-            Self::Star(_) => "star".into(),
-            Self::Slot(_) => "slot".into(),
-            Self::Window => "window".into(),
-            Self::Housekeeping(channel, _) => format!("housekeeping:{channel}"),
-        }
-    }
-}
-
-/// Middle and half range of a variable: scale it to -1..1. Of a motion the mean of its size where that is steady,
-/// and its largest component.
-#[derive(Clone, Copy, Debug)]
-struct Scale {
-    middle: f64,
-    half: f64,
-}
-
-impl Scale {
-    fn new(range: [f64; 2]) -> Self {
-        Self {
-            middle: 0.5 * (range[0] + range[1]),
-            half: 0.5 * (range[1] - range[0]),
-        }
-    }
-
-    /// Whether there is anything to scale.
-    fn varies(self) -> bool {
-        self.half > 0.0
-    }
-
-    /// 0 where the value is not known.
-    fn of(self, value: f64) -> f64 {
-        let z = (value - self.middle) / self.half;
-        if z.is_finite() { z } else { 0.0 }
-    }
-}
-
-impl Variable {
-    /// Place among the names, for pairs.
-    fn rank(&self) -> usize {
-        match self {
-            Self::Position(axis) | Self::Half(axis) => *axis,
-            Self::Quarter => 0,
-            Self::Phase(axis) => 2 + axis,
-            Self::Time | Self::Since { .. } => 4,
-            Self::Rate => 5,
-            Self::Acceleration => 6,
-            Self::Magnitude => 7,
-            Self::Colour => 8,
-            Self::Flux | Self::Brightness => 9,
-            Self::Star(_) => 10,
-            Self::Slot(_) => 11,
-            Self::Window => 12,
-            Self::Housekeeping(..) => 13,
-        }
-    }
-
-    /// Its value in a row, where that is one number; NaN where it is unknown.
-    pub(crate) fn value(&self, rows: &StarRows<'_>, i: usize) -> f64 {
-        match self {
-            Self::Position(0) => rows.x_px[i],
-            Self::Position(_) => rows.y_px[i],
-            Self::Time => rows.t_s[i],
-            Self::Since { at_s, .. } => f64::from(u8::from(rows.t_s[i] > *at_s)),
-            Self::Magnitude => rows.mag[i],
-            Self::Colour => rows.bv[i],
-            Self::Flux => rows.log_flux[i],
-            Self::Brightness => flux_of(rows.mag[i]),
-            Self::Rate => rows.vx_px_s[i].hypot(rows.vy_px_s[i]),
-            Self::Acceleration => rows.ax_px_s2[i].hypot(rows.ay_px_s2[i]),
-            Self::Housekeeping(_, series) => series.at(rows.t_s[i]).unwrap_or(f64::NAN),
-            Self::Half(axis) => [rows.x_px, rows.y_px][*axis][i].signum(),
-            Self::Quarter => (rows.x_px[i] * rows.y_px[i]).signum(),
-            Self::Phase(_) | Self::Star(_) | Self::Slot(_) | Self::Window => f64::NAN,
-        }
-    }
-
-    /// Its values in all rows; none where they are not one number.
-    pub(crate) fn values(&self, rows: &StarRows<'_>) -> Vec<f64> {
-        match self {
-            Self::Phase(_) | Self::Star(_) | Self::Slot(_) | Self::Window => Vec::new(),
-            Self::Housekeeping(_, series) => {
-                let mut out = vec![0.0; rows.len()];
-                series.at_into(rows.t_s, &mut out);
-                out
-            }
-            _ => (0..rows.len()).map(|i| self.value(rows, i)).collect(),
-        }
-    }
-}
-
-/// Flux over that of magnitude 5.
-pub(crate) fn flux_of(mag: f64) -> f64 {
-    10_f64.powf(-0.4 * (mag - 5.0))
-}
 
 /// One variable, or two, as columns.
 #[derive(Clone, Debug)]
@@ -423,48 +281,10 @@ impl Empirical {
     }
 }
 
-/// Least and largest of the values that are known.
-pub(crate) fn range(values: impl IntoIterator<Item = f64>) -> [f64; 2] {
-    let known = values.into_iter().filter(|v| v.is_finite());
-    known.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| {
-        [low.min(v), high.max(v)]
-    })
-}
-
-/// The range about their mean that holds all values that are known: what a variable adds up to over a run has been
-/// calibrated away, and a scale that follows it about another value is a constant one as well, which is not fitted.
-pub(crate) fn about_mean(values: impl Iterator<Item = f64> + Clone) -> [f64; 2] {
-    let known = values.filter(|v| v.is_finite());
-    let (count, sum) = known
-        .clone()
-        .fold((0.0, 0.0), |(n, sum), v| (n + 1.0, sum + v));
-    let mean = sum / f64::max(count, 1.0);
-    let [low, high] = range(known);
-    let half = (high - mean).max(mean - low);
-    [mean - half, mean + half]
-}
-
 fn coefficients(count: usize) -> Vec<Coefficient> {
     (0..count)
         .map(|k| Coefficient::new(format!("c{k}"), "arcsec", f64::INFINITY))
         .collect()
-}
-
-/// Orders that a variable can tell apart: a switch has two values, and all its polynomials are one.
-fn orders(variable: &Variable) -> usize {
-    let Variable::Housekeeping(_, series) = variable else {
-        return ORDERS;
-    };
-    let mut known: Vec<f64> = Vec::new();
-    for value in series.value().iter().filter(|v| v.is_finite()) {
-        if known.iter().all(|k| k.to_bits() != value.to_bits()) {
-            known.push(*value);
-        }
-        if known.len() > ORDERS {
-            break;
-        }
-    }
-    known.len().saturating_sub(1).clamp(1, ORDERS)
 }
 
 /// Legendre polynomials `P_1`..`P_3`.
