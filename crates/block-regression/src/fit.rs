@@ -451,6 +451,13 @@ impl Fits {
         eliminated.left(set, beta)
     }
 
+    /// Gram matrix of the nuisance columns of all data, without their priors.
+    pub fn nuisance_gram(&self) -> DMatrix<f64> {
+        let n = self.layout.nuisance_precision.nrows();
+        let (total, _) = self.grams.total();
+        total.view((0, 0), (n, n)).into_owned()
+    }
+
     /// Joint estimate of `set` on all data; `None` if its columns cannot be told apart.
     pub fn estimate(&self, set: &[usize]) -> Option<Estimate> {
         if self.inner.len() != self.grams.gram.len() {

@@ -208,7 +208,16 @@ pub(crate) fn run<'a>(
         let agreed = |set: &[usize], instead: &[Part]| {
             constants
                 .as_ref()
-                .is_some_and(|constants| constants.agree(&described, set, instead))
+                .is_some_and(|constants| constants.say_as_much(&described, set, instead))
+        };
+        // constants of the stars are in no fit, and half a dozen of them follow any variable
+        let left = || {
+            let left = described.left()?;
+            let left = match &constants {
+                Some(constants) => constants.beyond(&described, left),
+                None => left,
+            };
+            (!left.is_empty()).then_some(left)
         };
         if let Some(wander) = searched.wander.as_ref().filter(|_| !last) {
             let plain = Described::new(&beside, folds, &searched.found, (quest.terms)(false), &[])?;
@@ -229,7 +238,7 @@ pub(crate) fn run<'a>(
             let doubtful = doubtful(&described, &searched.found, slow.inflation(), &may);
             // what is slow may be what is described
             if !doubtful.is_empty()
-                && let Some(left) = described.left()
+                && let Some(left) = left()
             {
                 kept.extend(whole(&described, left));
                 continue;
@@ -266,15 +275,10 @@ pub(crate) fn run<'a>(
             // what is named has to stand beside what is left, and may stand there alone
             let named = !described.chosen.is_empty() || searched.wander.is_some();
             if (named || kept.is_empty())
-                && let Some(mut left) = described.left()
+                && let Some(left) = left()
             {
-                if let Some(constants) = &constants {
-                    left = constants.beyond(&described, left);
-                }
-                if !left.is_empty() {
-                    kept.extend(whole(&described, left));
-                    continue;
-                }
+                kept.extend(whole(&described, left));
+                continue;
             }
         }
         if last {

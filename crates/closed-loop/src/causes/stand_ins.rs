@@ -24,6 +24,9 @@
 //! alone, it is no part of what is described, and the two are held against the description of all:
 //! of an effect of 10 sigma beside a cause of 30 that no effect explains the terms describe the cause.
 //!
+//! A star or a pixel is not named where a slope in what the catalogue says of stars explains the same, whatever each was
+//! looked for among: there are as many stars as places on a slope.
+//!
 //! A line that the motion describes nearly as well is the motion's: of all frequencies it would have come
 //! upon that at which the tracker moves. An orbit that no channel tells takes the shape of whatever is slow: one
 //! that channels describe nearly as well is theirs.
@@ -43,6 +46,8 @@ use crate::search::without;
 pub(crate) const BY_FAR: f64 = 4.0;
 /// The effect that a periodic motion may be taken for.
 const LINE: &str = "periodic_misalignment";
+/// What may be on one star in place of a slope.
+const OF_ONE: [&str; 2] = ["catalogue_position", "hot_pixel"];
 /// Terms of a description.
 const MOST_TERMS: usize = 3;
 /// Nats that a further term must be worth.
@@ -77,8 +82,14 @@ pub(crate) fn stand_ins(
         let motion = |(k, _): &Part| described.terms[*k].term.is_of_motion();
         let free = set.iter().all(|&k| groups[k].slopes > 0);
         let channel = |(k, _): &Part| described.terms[*k].term.is_of_channel();
+        let star = set.iter().all(|&k| OF_ONE.contains(&described.names[k]));
+        let slope = |(k, _): &Part| described.terms[*k].term.is_of_a_star();
         let least = if lines && parts.iter().all(motion) {
             -BY_FAR
+        } else if star && parts.iter().all(slope) {
+            // what both pay for having been looked for
+            let paid: f64 = set.iter().map(|&k| described.paid[k]).sum();
+            paid - parts.len() as f64 * looked
         } else if free && parts.iter().all(channel) {
             -OWN_SHAPE
         } else {

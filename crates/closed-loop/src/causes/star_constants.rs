@@ -68,14 +68,23 @@ impl<'a> Constants<'a> {
         let inside = inside.filter(|_| told)?;
         let set = columns_of(&found.fitted.groups, &found.selection.chosen);
         let values = found.fitted.fits.estimate(&set)?.value;
-        let nuisance = found.fitted.fits.nuisance(None, &set, &values);
+        let fits = &found.fitted.fits;
+        let distorted = level.nuisance.distorted();
+        let distortion = fits.nuisance(None, &set, &values).select_rows(&distorted);
+        // under coloured noise rows count otherwise than here
+        let alike = level.noise.is_none() && level.drawn.is_none();
+        let told = (alike && !distorted.is_empty()).then(|| {
+            let of_all = fits.nuisance_gram();
+            of_all.select_rows(&distorted).select_columns(&distorted)
+        });
         Some(Self {
             level,
             found,
             values,
             left: Left {
                 inside,
-                distortion: level.nuisance.distortion_of(&nuisance),
+                distortion: distortion.as_slice().to_vec(),
+                told,
             },
         })
     }
@@ -143,9 +152,16 @@ impl<'a> Constants<'a> {
         disputed
     }
 
-    /// Whether stars that rest agree on `set`, places among the chosen, and not on the description that explains more: a
-    /// dozen columns describe the constants of half a dozen stars, whatever these are.
-    pub(crate) fn agree(&self, described: &Described, set: &[usize], instead: &[Part]) -> bool {
+    /// Whether the description that explains more than `set`, places among the chosen, says no more of stars that rest
+    /// than that each has a constant of its own: a dozen columns describe those of half a dozen stars, whatever these
+    /// are. It then speaks against nothing; whether the stars agree on the set is asked of them
+    /// ([`disputed`](Self::disputed)).
+    pub(crate) fn say_as_much(
+        &self,
+        described: &Described,
+        set: &[usize],
+        instead: &[Part],
+    ) -> bool {
         let (places, mut shifts) = self.shifting();
         let own: Vec<usize> = (0..places.len())
             .filter(|&e| set.contains(&places[e]))
@@ -157,14 +173,12 @@ impl<'a> Constants<'a> {
         shifts.extend(instead.iter().map(|part| term_of(described, part)));
         let means = Means::of(self.level, &shifts, &self.left);
         let terms: Vec<usize> = (chosen.len()..shifts.len()).collect();
-        let price_of = |of: &[usize]| of.iter().map(|&e| price(&shifts[e].columns)).sum::<f64>();
-        let paid: f64 = set.iter().map(|&k| described.paid[k]).sum();
-        let gain = means.between(&chosen, &own) - paid - price_of(&own);
+        let price: f64 = terms.iter().map(|&e| price(&shifts[e].columns)).sum();
         let with = [without(&chosen, &own), terms.clone()].concat();
         let looked = described.looked() * instead.len() as f64;
-        let described = means.between(&with, &terms) - looked - price_of(&terms);
+        let worth = means.between(&with, &terms) - looked - price;
         let rests = means.beside(&own) < BESIDE * means.taken(&chosen, &own);
-        rests && gain > 0.0 && described < 0.0
+        rests && worth < 0.0
     }
 
     /// Those of `parts` that say more of the stars than that each has a constant of its own.

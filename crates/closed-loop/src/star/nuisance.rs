@@ -157,11 +157,10 @@ impl StarNuisance {
         self.distortion.as_ref().map(|(_, precision)| precision)
     }
 
-    /// The distortion among the amplitudes of the columns, arcsec: those of x, then those of y.
-    pub(crate) fn distortion_of(&self, amplitudes: &DVector<f64>) -> Vec<f64> {
+    /// Columns of the distortion: those of x, then those of y.
+    pub(crate) fn distorted(&self) -> Vec<usize> {
         let (misalignment, polynomials, _) = self.parts();
-        let of_axis =
-            |axis| (0..polynomials).map(move |k| amplitudes[shared_at(misalignment, k, axis)]);
+        let of_axis = |axis| (0..polynomials).map(move |k| shared_at(misalignment, k, axis));
         (0..2).flat_map(of_axis).collect()
     }
 

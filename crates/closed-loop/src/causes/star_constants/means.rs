@@ -1,14 +1,18 @@
 //! Mean errors of the stars, and what columns explain of them.
 //!
 //! What a rotation of the frames does is taken off where these are free, and in every fit where a reference may be
-//! misaligned. What the declared distortion D may do by its prior, of covariance P, is no constant of a star's own, and
-//! hides what is no larger: means and columns are whitened,
+//! misaligned. What the declared distortion D may do is no constant of a star's own, and hides what is no larger: means
+//! and columns are whitened. How much it may do is what its prior, of precision L, and the rows beside their means leave
+//! of it, which see its slope as stars move,
 //!
 //! ```text
+//! P = (L + N - D'D)^-1           N: what all rows say of it, D: mean columns, in units of what noise leaves of a mean
 //! e -> (I + D P D')^-1/2 e = e - U diag(1 - (1 + s^2)^-1/2) U' e        D P^1/2 = U diag(s) V'
+//! e = r + D P D' r                                                      r: mean residuals of the fit
 //! ```
 //!
-//! with the fitted distortion back in e: a fit beside what was chosen has put into it whatever contradicts that.
+//! with that part of the fitted distortion back in e which the means have put into it, for the fit has
+//! `L d = D' r + D_beside' r_beside`; under coloured noise, where rows count otherwise, all of it, and P is the prior's.
 //! See [`super`] for the likelihoods.
 //!
 //! Source: generalised least squares of the means; a row beside its star's mean has what is left.
@@ -143,6 +147,7 @@ impl Means {
             from: end,
             values: &left.distortion,
             precision: level.nuisance.distortion_precision(),
+            told: left.told.as_ref(),
         };
         let squares: Vec<(f64, f64)> = parts.iter().map(|part| part.residual_means()).collect();
         let mut all = design.sums(0..0);
@@ -181,6 +186,8 @@ impl Means {
         let freedom = 2.0 * (sums.rows - seen) - 3.0 * sums.turned;
         let noise = (squares / freedom.max(1.0)).max(f64::MIN_POSITIVE);
         let mut error = columns.column(last).into_owned();
+        let modes = distortion.modes(&columns, noise);
+        distortion.put_back(&columns, &modes, &mut error);
         let mut within = Vec::new();
         for ((shift, own), products) in shifts.iter().zip(&of_shift).zip(&sums.products) {
             for (column, value) in own.clone().zip(&shift.values) {
@@ -192,9 +199,7 @@ impl Means {
             let beside = products - means.tr_mul(&with);
             within.push(taken(products, &beside, &shift.values) / noise);
         }
-        distortion.put_back(&columns, &mut error);
         error /= noise.sqrt();
-        let modes = distortion.modes(&columns, noise.sqrt());
         modes.whiten(&mut error);
         let mut columns = columns.remove_columns(distortion.from, last + 1 - distortion.from);
         modes.whiten(&mut columns);
@@ -287,6 +292,8 @@ pub(super) struct Left<'a> {
     pub(super) inside: &'a [Vec<f64>],
     /// Coefficients of the distortion, those of x, then those of y, arcsec.
     pub(super) distortion: Vec<f64>,
+    /// What all rows say of them, in the weights of the rows, where that is known.
+    pub(super) told: Option<DMatrix<f64>>,
 }
 
 /// The distortion's columns among others.
@@ -295,57 +302,76 @@ struct Prior<'a> {
     values: &'a [f64],
     /// Precision of the coefficients of an axis, 1/arcsec^2.
     precision: Option<&'a DMatrix<f64>>,
+    /// [`Left::told`].
+    told: Option<&'a DMatrix<f64>>,
 }
 
 impl Prior<'_> {
-    /// Puts the fitted distortion back into errors in the unit of the columns.
-    fn put_back(&self, columns: &DMatrix<f64>, error: &mut DVector<f64>) {
+    /// What it does to means of squared noise `noise` by all that their rows do not say of it beside them.
+    fn modes(&self, columns: &DMatrix<f64>, noise: f64) -> Modes {
+        let Some(of_axis) = self.precision else {
+            return Modes::default();
+        };
+        let (count, all) = (of_axis.nrows(), self.values.len());
+        let means = columns.columns(self.from, all);
+        let mut precision = DMatrix::zeros(all, all);
+        for first in [0, count] {
+            let mut own = precision.view_mut((first, first), (count, count));
+            own.copy_from(&(of_axis * noise));
+        }
+        if let Some(told) = self.told {
+            precision += told - means.tr_mul(&means);
+        }
+        let Some(root) = precision.cholesky() else {
+            return Modes::default();
+        };
+        // root of the covariance: the inverse of that of the precision
+        let mut scaled = means.transpose();
+        root.l_dirty().solve_lower_triangular_mut(&mut scaled);
+        let svd = scaled.transpose().svd(true, false);
+        let sizes = svd.singular_values;
+        svd.u
+            .map_or_else(Modes::default, |along| Modes { along, sizes })
+    }
+
+    /// Puts back into errors what the means, and not the rows beside them, have put into the fitted distortion; all of
+    /// it where that is not known.
+    fn put_back(&self, columns: &DMatrix<f64>, modes: &Modes, error: &mut DVector<f64>) {
+        if self.told.is_some() {
+            let size = modes.along.tr_mul(error);
+            let square = modes.sizes.component_mul(&modes.sizes);
+            error.gemv(1.0, &modes.along, &size.component_mul(&square), 1.0);
+            return;
+        }
         for (k, value) in self.values.iter().enumerate() {
             error.axpy(*value, &columns.column(self.from + k), 1.0);
         }
     }
-
-    /// What its prior does to errors in this unit.
-    fn modes(&self, columns: &DMatrix<f64>, unit: f64) -> Modes {
-        let Some(root) = self.precision.and_then(|p| p.clone().cholesky()) else {
-            return Modes::default();
-        };
-        let of_axis = root.l_dirty().nrows();
-        let mut scaled = columns.columns(self.from, self.values.len()).transpose() / unit;
-        for axis in 0..2 {
-            // root of the covariance: the inverse of that of the precision
-            let own = &mut scaled.rows_mut(axis * of_axis, of_axis);
-            root.l_dirty().solve_lower_triangular_mut(own);
-        }
-        let svd = scaled.transpose().svd(true, false);
-        let less = svd.singular_values.map(|s| 1.0 - s.hypot(1.0).recip());
-        svd.u
-            .map_or_else(Modes::default, |along| Modes { along, less })
-    }
 }
 
-/// Directions in which errors are larger than noise, and the share by which each is to be less.
+/// Directions in which errors are larger than noise, and how much larger what the distortion does is.
 struct Modes {
     along: DMatrix<f64>,
-    less: DVector<f64>,
+    sizes: DVector<f64>,
 }
 
 impl Default for Modes {
     fn default() -> Self {
         Self {
             along: DMatrix::zeros(0, 0),
-            less: DVector::zeros(0),
+            sizes: DVector::zeros(0),
         }
     }
 }
 
 impl Modes {
     fn whiten<C: Dim, S: StorageMut<f64, Dyn, C>>(&self, errors: &mut Matrix<f64, Dyn, C, S>) {
-        if self.less.is_empty() {
+        if self.sizes.is_empty() {
             return;
         }
+        let less = self.sizes.map(|s| 1.0 - s.hypot(1.0).recip());
         for mut error in errors.column_iter_mut() {
-            let size = self.along.tr_mul(&error).component_mul(&self.less);
+            let size = self.along.tr_mul(&error).component_mul(&less);
             error.gemv(-1.0, &self.along, &size, 1.0);
         }
     }
@@ -566,6 +592,36 @@ fn without_rotation(
 
 #[cfg(test)]
 mod tests {
+    /// Two stars that a distortion of one coefficient an axis shifts along x and y, by 3 sigmas of a mean for one of the
+    /// prior. What is known of it from the rows beside the means hides nothing; where those say nothing, the means put
+    /// all of what they fit back: an error of 10 becomes one of 10 / (1 + 2 * 9).
+    #[test]
+    fn what_rows_say_of_the_distortion_hides_no_star() {
+        let means = 3.0 * DMatrix::from_row_slice(4, 2, &[1.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 1.0]);
+        let precision = DMatrix::identity(1, 1);
+        let of = |beside: f64| {
+            let told = means.tr_mul(&means) + beside * DMatrix::identity(2, 2);
+            let prior = Prior {
+                from: 0,
+                values: &[0.0; 2],
+                precision: Some(&precision),
+                told: Some(&told),
+            };
+            let modes = prior.modes(&means, 1.0);
+            // both stars off along x, less what a fit of both priors takes
+            let mut error = DVector::from_row_slice(&[1.0, 0.0, 1.0, 0.0]);
+            error *= 10.0 / (1.0 + 18.0 / (1.0 + beside));
+            prior.put_back(&means, &modes, &mut error);
+            let whole = error[0];
+            modes.whiten(&mut error);
+            [whole, error[0]]
+        };
+        let [whole, white] = of(0.0);
+        assert!((whole - 10.0).abs() < 1e-9 && (white - 10.0 / 19.0_f64.sqrt()).abs() < 1e-9);
+        let [whole, white] = of(1e9);
+        assert!((whole - 10.0).abs() < 1e-6 && (white - 10.0).abs() < 1e-6);
+    }
+
     use rand_core::SeedableRng;
     use rand_distr::{Distribution, StandardNormal};
     use rand_xoshiro::Xoshiro256PlusPlus;
