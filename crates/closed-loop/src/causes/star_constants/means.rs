@@ -1,18 +1,7 @@
 //! Mean errors of the stars, and what columns explain of them.
 //!
 //! What a rotation of the frames does is taken off where these are free, and in every fit where a reference may be
-//! misaligned. What the declared distortion D may do is no constant of a star's own, and hides what is no larger: means
-//! and columns are whitened. How much it may do is what its prior, of precision L, and the rows beside their means leave
-//! of it, which see its slope as stars move,
-//!
-//! ```text
-//! P = (L + N - D'D)^-1           N: what all rows say of it, D: mean columns, in units of what noise leaves of a mean
-//! e -> (I + D P D')^-1/2 e = e - U diag(1 - (1 + s^2)^-1/2) U' e        D P^1/2 = U diag(s) V'
-//! e = r + D P D' r                                                      r: mean residuals of the fit
-//! ```
-//!
-//! with that part of the fitted distortion back in e which the means have put into it, for the fit has
-//! `L d = D' r + D_beside' r_beside`; under coloured noise, where rows count otherwise, all of it, and P is the prior's.
+//! misaligned. What the declared distortion may do is no constant of a star's own ([`distorted`]).
 //! See [`super`] for the likelihoods.
 //!
 //! Source: generalised least squares of the means; a row beside its star's mean has what is left.
@@ -20,7 +9,7 @@
 use std::ops::{AddAssign, Range};
 
 use effects::Candidate;
-use nalgebra::{DMatrix, DVector, Dim, Dyn, Matrix, Matrix3, Matrix3xX, StorageMut, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3, Matrix3xX, Vector3};
 use rayon::prelude::*;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
@@ -29,6 +18,9 @@ use crate::star::columns::star_columns_of;
 use crate::star::data::StarData;
 use crate::star::evidence::StarEvidence;
 use crate::star::frame_rotation::rotation_row;
+use distorted::Distorted;
+
+mod distorted;
 
 /// Parts of the run that are summed side by side.
 const PARTS: usize = 16;
@@ -143,7 +135,7 @@ impl Means {
             .par_windows(2)
             .map(|ends| design.sums(ends[0]..ends[1]))
             .collect();
-        let prior = Prior {
+        let prior = Distorted {
             from: end,
             values: &left.distortion,
             precision: level.nuisance.distortion_precision(),
@@ -167,7 +159,7 @@ impl Means {
         of_shift: Vec<Range<usize>>,
         always: usize,
         turned: bool,
-        distortion: &Prior<'_>,
+        distortion: &Distorted<'_>,
     ) -> Self {
         let seen = sums.weight.iter().filter(|w| **w > 0.0).count() as f64;
         let mut columns = sums.columns.transpose();
@@ -294,87 +286,6 @@ pub(super) struct Left<'a> {
     pub(super) distortion: Vec<f64>,
     /// What all rows say of them, in the weights of the rows, where that is known.
     pub(super) told: Option<DMatrix<f64>>,
-}
-
-/// The distortion's columns among others.
-struct Prior<'a> {
-    from: usize,
-    values: &'a [f64],
-    /// Precision of the coefficients of an axis, 1/arcsec^2.
-    precision: Option<&'a DMatrix<f64>>,
-    /// [`Left::told`].
-    told: Option<&'a DMatrix<f64>>,
-}
-
-impl Prior<'_> {
-    /// What it does to means of squared noise `noise` by all that their rows do not say of it beside them.
-    fn modes(&self, columns: &DMatrix<f64>, noise: f64) -> Modes {
-        let Some(of_axis) = self.precision else {
-            return Modes::default();
-        };
-        let (count, all) = (of_axis.nrows(), self.values.len());
-        let means = columns.columns(self.from, all);
-        let mut precision = DMatrix::zeros(all, all);
-        for first in [0, count] {
-            let mut own = precision.view_mut((first, first), (count, count));
-            own.copy_from(&(of_axis * noise));
-        }
-        if let Some(told) = self.told {
-            precision += told - means.tr_mul(&means);
-        }
-        let Some(root) = precision.cholesky() else {
-            return Modes::default();
-        };
-        // root of the covariance: the inverse of that of the precision
-        let mut scaled = means.transpose();
-        root.l_dirty().solve_lower_triangular_mut(&mut scaled);
-        let svd = scaled.transpose().svd(true, false);
-        let sizes = svd.singular_values;
-        svd.u
-            .map_or_else(Modes::default, |along| Modes { along, sizes })
-    }
-
-    /// Puts back into errors what the means, and not the rows beside them, have put into the fitted distortion; all of
-    /// it where that is not known.
-    fn put_back(&self, columns: &DMatrix<f64>, modes: &Modes, error: &mut DVector<f64>) {
-        if self.told.is_some() {
-            let size = modes.along.tr_mul(error);
-            let square = modes.sizes.component_mul(&modes.sizes);
-            error.gemv(1.0, &modes.along, &size.component_mul(&square), 1.0);
-            return;
-        }
-        for (k, value) in self.values.iter().enumerate() {
-            error.axpy(*value, &columns.column(self.from + k), 1.0);
-        }
-    }
-}
-
-/// Directions in which errors are larger than noise, and how much larger what the distortion does is.
-struct Modes {
-    along: DMatrix<f64>,
-    sizes: DVector<f64>,
-}
-
-impl Default for Modes {
-    fn default() -> Self {
-        Self {
-            along: DMatrix::zeros(0, 0),
-            sizes: DVector::zeros(0),
-        }
-    }
-}
-
-impl Modes {
-    fn whiten<C: Dim, S: StorageMut<f64, Dyn, C>>(&self, errors: &mut Matrix<f64, Dyn, C, S>) {
-        if self.sizes.is_empty() {
-            return;
-        }
-        let less = self.sizes.map(|s| 1.0 - s.hypot(1.0).recip());
-        for mut error in errors.column_iter_mut() {
-            let size = self.along.tr_mul(&error).component_mul(&less);
-            error.gemv(-1.0, &self.along, &size, 1.0);
-        }
-    }
 }
 
 /// h of the module's header.
@@ -592,36 +503,6 @@ fn without_rotation(
 
 #[cfg(test)]
 mod tests {
-    /// Two stars that a distortion of one coefficient an axis shifts along x and y, by 3 sigmas of a mean for one of the
-    /// prior. What is known of it from the rows beside the means hides nothing; where those say nothing, the means put
-    /// all of what they fit back: an error of 10 becomes one of 10 / (1 + 2 * 9).
-    #[test]
-    fn what_rows_say_of_the_distortion_hides_no_star() {
-        let means = 3.0 * DMatrix::from_row_slice(4, 2, &[1.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 1.0]);
-        let precision = DMatrix::identity(1, 1);
-        let of = |beside: f64| {
-            let told = means.tr_mul(&means) + beside * DMatrix::identity(2, 2);
-            let prior = Prior {
-                from: 0,
-                values: &[0.0; 2],
-                precision: Some(&precision),
-                told: Some(&told),
-            };
-            let modes = prior.modes(&means, 1.0);
-            // both stars off along x, less what a fit of both priors takes
-            let mut error = DVector::from_row_slice(&[1.0, 0.0, 1.0, 0.0]);
-            error *= 10.0 / (1.0 + 18.0 / (1.0 + beside));
-            prior.put_back(&means, &modes, &mut error);
-            let whole = error[0];
-            modes.whiten(&mut error);
-            [whole, error[0]]
-        };
-        let [whole, white] = of(0.0);
-        assert!((whole - 10.0).abs() < 1e-9 && (white - 10.0 / 19.0_f64.sqrt()).abs() < 1e-9);
-        let [whole, white] = of(1e9);
-        assert!((whole - 10.0).abs() < 1e-6 && (white - 10.0).abs() < 1e-6);
-    }
-
     use rand_core::SeedableRng;
     use rand_distr::{Distribution, StandardNormal};
     use rand_xoshiro::Xoshiro256PlusPlus;
