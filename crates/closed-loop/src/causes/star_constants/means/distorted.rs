@@ -34,15 +34,15 @@ impl Distorted<'_> {
         };
         let (count, all) = (of_axis.nrows(), self.values.len());
         let means = columns.columns(self.from, all);
-        let mut precision = DMatrix::zeros(all, all);
+        let mut prior = DMatrix::zeros(all, all);
         for first in [0, count] {
-            let mut own = precision.view_mut((first, first), (count, count));
+            let mut own = prior.view_mut((first, first), (count, count));
             own.copy_from(&(of_axis * noise));
         }
-        if let Some(told) = self.told {
-            precision += told - means.tr_mul(&means);
-        }
-        let Some(root) = precision.cholesky() else {
+        let beside = |told: &DMatrix<f64>| (&prior + told - means.tr_mul(&means)).cholesky();
+        let told = self.told.and_then(beside);
+        let by_rows = told.is_some();
+        let Some(root) = told.or_else(|| prior.cholesky()) else {
             return Modes::default();
         };
         // root of the covariance: the inverse of that of the precision
@@ -50,14 +50,17 @@ impl Distorted<'_> {
         root.l_dirty().solve_lower_triangular_mut(&mut scaled);
         let svd = scaled.transpose().svd(true, false);
         let sizes = svd.singular_values;
-        svd.u
-            .map_or_else(Modes::default, |along| Modes { along, sizes })
+        svd.u.map_or_else(Modes::default, |along| Modes {
+            along,
+            sizes,
+            by_rows,
+        })
     }
 
     /// Puts back into errors what the means, and not the rows beside them, have put into the fitted distortion; all of
     /// it where that is not known.
     pub(super) fn put_back(&self, columns: &DMatrix<f64>, modes: &Modes, error: &mut DVector<f64>) {
-        if self.told.is_some() {
+        if modes.by_rows {
             let size = modes.along.tr_mul(error);
             let square = modes.sizes.component_mul(&modes.sizes);
             error.gemv(1.0, &modes.along, &size.component_mul(&square), 1.0);
@@ -73,6 +76,8 @@ impl Distorted<'_> {
 pub(super) struct Modes {
     along: DMatrix<f64>,
     sizes: DVector<f64>,
+    /// What the rows say beside their means is in them.
+    by_rows: bool,
 }
 
 impl Default for Modes {
@@ -80,6 +85,7 @@ impl Default for Modes {
         Self {
             along: DMatrix::zeros(0, 0),
             sizes: DVector::zeros(0),
+            by_rows: false,
         }
     }
 }
