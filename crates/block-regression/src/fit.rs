@@ -454,8 +454,10 @@ impl Fits {
     /// Gram matrix of the nuisance columns of all data, without their priors.
     pub fn nuisance_gram(&self) -> DMatrix<f64> {
         let n = self.layout.nuisance_precision.nrows();
-        let (total, _) = self.grams.total();
-        total.view((0, 0), (n, n)).into_owned()
+        let blocks = self.grams.gram.iter();
+        let mut sum = DMatrix::zeros(n, n);
+        blocks.for_each(|block| sum += block.leading(n));
+        sum
     }
 
     /// Joint estimate of `set` on all data; `None` if its columns cannot be told apart.

@@ -202,9 +202,14 @@ pub(crate) fn run<'a>(
         {
             return Ok(Outcome::Elsewhere(elsewhere));
         }
-        let mut terms = (quest.terms)(searched.wander.is_some());
-        terms.extend(grown(level, inside.as_deref()));
-        let described = Described::new(level, folds, &searched.found, terms, quest.ways)?;
+        let grown = grown(level, inside.as_deref());
+        let terms = |wander: bool| {
+            let mut terms = (quest.terms)(wander);
+            terms.extend(grown.clone());
+            terms
+        };
+        let all = terms(searched.wander.is_some());
+        let described = Described::new(level, folds, &searched.found, all, quest.ways)?;
         let agreed = |set: &[usize], instead: &[Part]| {
             constants
                 .as_ref()
@@ -320,9 +325,7 @@ pub(crate) fn run<'a>(
         let all = borrowed(&found.candidates);
         let fitted = fit_beside(level, folds, &all, &found.selection.chosen)?;
         let found = Found { fitted, ..found };
-        let mut terms = (quest.terms)(wander.is_some());
-        terms.extend(grown(level, inside.as_deref()));
-        let described = Described::new(level, folds, &found, terms, quest.ways)?;
+        let described = Described::new(level, folds, &found, terms(wander.is_some()), quest.ways)?;
         // how an effect changes may be among what is described
         let beside = best_beside(&found, &may);
         if let Some(change) = changing(&described, beside).filter(|_| !last) {

@@ -438,12 +438,11 @@ pub(crate) fn follows(
     }
     // by what they are worth: squares out of fold know nothing of the priors of what is fitted beside them
     let mut depends_on: Vec<Dependence> = judged.into_iter().map(|(d, ..)| d).collect();
-    if depends_on.iter().any(certain) {
+    let told = depends_on.iter().any(certain);
+    if told {
         // what chance does as well is not named beside what it does not
         depends_on.retain(certain);
     }
-    // what is certain is all that is listed then
-    let told = depends_on.iter().any(certain);
     let share = if told { largest(&depends_on) } else { 0.0 };
     Unattributed {
         present: share > 0.0,

@@ -179,6 +179,14 @@ impl Series {
         }
     }
 
+    /// The same as new numbers.
+    #[must_use]
+    pub fn at_all(&self, t_s: &[f64]) -> Vec<f64> {
+        let mut out = vec![0.0; t_s.len()];
+        self.at_into(t_s, &mut out);
+        out
+    }
+
     /// `hint` is the sample at or before the last time asked for.
     fn at_from(&self, t_s: f64, hint: &mut usize) -> Option<f64> {
         let (&first_s, &last_s) = (self.t_s.first()?, self.t_s.last()?);

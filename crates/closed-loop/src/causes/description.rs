@@ -407,9 +407,7 @@ pub(crate) fn terms(
     let flux = (Variable::Brightness, centred(&flux));
     let channels: Vec<_> = channels_of_interest(&situation.channels)
         .map(|(name, series)| {
-            let mut in_run = vec![0.0; data.t_s.len()];
-            series.at_into(&data.t_s, &mut in_run);
-            let known = centred(&in_run);
+            let known = centred(&series.at_all(&data.t_s));
             (Variable::Housekeeping(name, series.clone()), known)
         })
         .collect();

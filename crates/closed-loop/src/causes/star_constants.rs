@@ -83,7 +83,7 @@ impl<'a> Constants<'a> {
             values,
             left: Left {
                 inside,
-                distortion: distortion.as_slice().to_vec(),
+                distortion,
                 told,
             },
         })

@@ -55,11 +55,8 @@ fn at(gyro: &RateTable, t_s: &[f64]) -> Option<Vec<Vector3<f64>>> {
     let axis = |axis: usize| {
         let values = gyro.w.iter().map(|w| w[axis]).collect();
         let series = Series::new(gyro.t_s.clone(), values).ok()?;
-        let mut out = vec![0.0; t_s.len()];
-        series
-            .with_max_gap_s(longest_step(&gyro.t_s))
-            .at_into(t_s, &mut out);
-        Some(out)
+        let series = series.with_max_gap_s(longest_step(&gyro.t_s));
+        Some(series.at_all(t_s))
     };
     let [x, y, z] = [axis(0)?, axis(1)?, axis(2)?];
     Some(

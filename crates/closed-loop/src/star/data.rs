@@ -312,9 +312,7 @@ impl StarData {
         frames.flux = from.flux.as_ref().map(|m| pick(m));
         let star: Vec<usize> = rows.iter().map(|&r| star[r]).collect();
         let n = rows.len();
-        let t_s = (0..frames.frames())
-            .flat_map(|k| std::iter::repeat_n(frames.t_s[k], frames.rows_of(k).len()))
-            .collect();
+        let t_s = frames.t_of_rows_s();
         let pair = || [vec![0.0; n], vec![0.0; n]];
         Self {
             camera: inputs.camera.clone(),

@@ -3,6 +3,7 @@
 //! Not physics: scenario files, made from parts.
 
 use closed_loop::{CloseError, Closed, close};
+use focal_plane::{Catalogue, CatalogueStar};
 use scenarios::{Scenario, simulate};
 use telemetry::report::Report;
 use telemetry::{Bundle, Model};
@@ -230,6 +231,11 @@ pub(crate) fn reported(scenario: &Scenario) -> Report {
 
 pub(crate) fn closed(model: &Model, bundle: &Bundle) -> Result<Closed, CloseError> {
     close(model, bundle, &|_| {})
+}
+
+/// The star of that number.
+pub(crate) fn star(catalog: &Catalogue, id: i64) -> &CatalogueStar {
+    &catalog.stars()[catalog.index_of(id).expect("a known star")]
 }
 
 /// Names of the effects, in the order added.

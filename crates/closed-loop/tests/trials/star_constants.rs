@@ -8,7 +8,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use scenarios::simulate;
 use telemetry::report::{Report, Verdict};
 
-use crate::kit::{Case, Path, closed, named};
+use crate::kit::{Case, Path, closed, named, star};
 
 /// Noise of a centroid, circular, arcsec.
 const NOISE: f64 = 0.5;
@@ -114,8 +114,7 @@ fn a_misplaced_star_shows_beside_a_distortion_that_its_motion_shows() {
             *rows.entry(*id).or_default() += 1;
         }
         let seen = rows.into_iter().filter(|(_, rows)| *rows > 600);
-        let mag = |id: i64| catalog.stars()[catalog.index_of(id).expect("a known star")].mag;
-        let mut seen: Vec<(f64, i64)> = seen.map(|(id, _)| (mag(id), id)).collect();
+        let mut seen: Vec<(f64, i64)> = seen.map(|(id, _)| (star(catalog, id).mag, id)).collect();
         seen.sort_by(|a, b| a.0.total_cmp(&b.0));
         let id = seen[seen.len() / 2].1;
         let (north, east) = (seed as f64 - 700.0).sin_cos();

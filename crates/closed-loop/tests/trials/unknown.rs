@@ -4,7 +4,7 @@ use scenarios::simulate;
 use telemetry::Bundle;
 use telemetry::report::{Report, Verdict};
 
-use crate::kit::{Case, Path, closed};
+use crate::kit::{Case, Path, closed, star};
 
 /// Magnitude and colour of a star to the variable that it is moved by.
 type Of = fn(&[f64; 2]) -> f64;
@@ -13,8 +13,7 @@ type Of = fn(&[f64; 2]) -> f64;
 fn shifted(bundle: &mut Bundle, size_px: f64, of: Of) {
     let catalog = bundle.catalog.as_ref().expect("a catalogue").clone();
     let value = |id: i64| {
-        let at = catalog.index_of(id).expect("a known star");
-        let star = &catalog.stars()[at];
+        let star = star(&catalog, id);
         of(&[star.mag, star.bv])
     };
     let stars = bundle.stars.as_mut().expect("stars");
@@ -68,10 +67,11 @@ fn grown(seed: u64, share: impl Fn(&[[f64; 2]]) -> Vec<f64>) -> Report {
     let mut bundle = simulate(&scenario).expect("a bundle");
     let catalog = bundle.catalog.as_ref().expect("a catalogue").clone();
     let stars = bundle.stars.as_mut().expect("stars");
-    let mag = |id: &i64| catalog.stars()[catalog.index_of(*id).expect("a known star")].mag;
     let t_s = stars.t_of_rows_s();
     let at = t_s.iter().zip(&stars.star_id);
-    let rows: Vec<[f64; 2]> = at.map(|(t, id)| [t / 900.0, mag(id)]).collect();
+    let rows: Vec<[f64; 2]> = at
+        .map(|(t, id)| [t / 900.0, star(&catalog, *id).mag])
+        .collect();
     for (row, share) in share(&rows).into_iter().enumerate() {
         // arcsec per pixel: 20 degrees over 1024 pixels
         let scale = 0.45 / 70.5 / 512.0 * share;

@@ -283,7 +283,7 @@ pub(super) struct Left<'a> {
     /// Residual of each row in sample, arcsec.
     pub(super) inside: &'a [Vec<f64>],
     /// Coefficients of the distortion, those of x, then those of y, arcsec.
-    pub(super) distortion: Vec<f64>,
+    pub(super) distortion: DVector<f64>,
     /// What all rows say of them, in the weights of the rows, where that is known.
     pub(super) told: Option<DMatrix<f64>>,
 }

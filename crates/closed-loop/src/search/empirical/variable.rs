@@ -142,11 +142,7 @@ impl Variable {
     pub(crate) fn values(&self, rows: &StarRows<'_>) -> Vec<f64> {
         match self {
             Self::Phase(_) | Self::Star(_) | Self::Slot(_) | Self::Window => Vec::new(),
-            Self::Housekeeping(_, series) => {
-                let mut out = vec![0.0; rows.len()];
-                series.at_into(rows.t_s, &mut out);
-                out
-            }
+            Self::Housekeeping(_, series) => series.at_all(rows.t_s),
             _ => (0..rows.len()).map(|i| self.value(rows, i)).collect(),
         }
     }

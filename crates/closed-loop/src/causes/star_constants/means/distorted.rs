@@ -19,7 +19,7 @@ use nalgebra::{DMatrix, DVector, Dim, Dyn, Matrix, StorageMut};
 /// The distortion's columns among others.
 pub(super) struct Distorted<'a> {
     pub(super) from: usize,
-    pub(super) values: &'a [f64],
+    pub(super) values: &'a DVector<f64>,
     /// Precision of the coefficients of an axis, 1/arcsec^2.
     pub(super) precision: Option<&'a DMatrix<f64>>,
     /// What all rows say of them, in the weights of the rows, where that is known.
@@ -66,9 +66,8 @@ impl Distorted<'_> {
             error.gemv(1.0, &modes.along, &size.component_mul(&square), 1.0);
             return;
         }
-        for (k, value) in self.values.iter().enumerate() {
-            error.axpy(*value, &columns.column(self.from + k), 1.0);
-        }
+        let means = columns.columns(self.from, self.values.len());
+        error.gemv(1.0, &means, self.values, 1.0);
     }
 }
 
@@ -121,7 +120,7 @@ mod tests {
             let told = means.tr_mul(&means) + DMatrix::from_diagonal_element(2, 2, beside);
             let prior = Distorted {
                 from: 0,
-                values: &[0.0; 2],
+                values: &DVector::zeros(2),
                 precision: Some(&precision),
                 told: Some(&told),
             };
