@@ -81,16 +81,35 @@ pub(crate) fn change(value: f64) -> String {
     }
 }
 
+/// Below it a probability is told by this bound alone.
+const NEXT_TO_NEVER: f64 = 1e-300;
+
 /// A probability.
 pub(crate) fn probability(p: f64) -> String {
     if p.is_nan() {
         "–".to_owned()
-    } else if p < 1e-300 {
+    } else if p < NEXT_TO_NEVER {
         "< 10⁻³⁰⁰".to_owned()
     } else if p < 1e-3 {
         scientific(p, 1)
     } else {
         format!("{p:.3}")
+    }
+}
+
+/// The same within a sentence.
+pub(crate) fn p_is(p: f64) -> String {
+    let told = probability(p);
+    let sign = if told.starts_with('<') { "" } else { "= " };
+    format!("p {sign}{told}")
+}
+
+/// The same in plain text.
+pub(crate) fn p_is_plain(p: f64) -> String {
+    if p < NEXT_TO_NEVER {
+        format!("p < {NEXT_TO_NEVER:e}")
+    } else {
+        format!("p = {p:.1e}")
     }
 }
 
@@ -174,6 +193,9 @@ mod tests {
         assert_eq!(probability(2.4e-33), "2.4 × 10⁻³³");
         assert_eq!(probability(0.0), "< 10⁻³⁰⁰");
         assert_eq!(probability(0.26), "0.260");
+        assert_eq!([p_is(0.0), p_is(0.26)], ["p < 10⁻³⁰⁰", "p = 0.260"]);
+        let plain = [0.0, 1.4e-5].map(p_is_plain);
+        assert_eq!(plain, ["p < 1e-300", "p = 1.4e-5"]);
         assert_eq!(percent(0.243), "24.3");
         assert_eq!(percent(8.02e-5), "0.01");
         assert_eq!(percent(-1e-6), "0.00");

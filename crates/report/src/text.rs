@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 use closed_loop::Closed;
 use telemetry::report::{Dependence, Errors, RefusedSize, Report, Selector, listed};
 
-use crate::number::number;
+use crate::number::{number, p_is_plain};
 use crate::order::by_number;
 use crate::set_aside;
 use crate::verdict::sentence;
@@ -153,9 +153,9 @@ fn effects(out: &mut String, report: &Report) {
         });
         line!(
             out,
-            "            gain {:.1} nats out of fold, p = {:.1e}{share}",
+            "            gain {:.1} nats out of fold, {}{share}",
             effect.delta_loglik,
-            effect.p_value
+            p_is_plain(effect.p_value)
         );
         let alike: Vec<String> = effect
             .confusable_with
@@ -341,10 +341,10 @@ fn follows(out: &mut String, list: &[Dependence]) {
     for d in list.iter().filter(|d| is_certain(d)).take(5) {
         line!(
             out,
-            "  {:<34} {:>6.1} %   p = {:.1e}",
+            "  {:<34} {:>6.1} %   {}",
             d.variable,
             100.0 * d.variance_explained,
-            d.p_value
+            p_is_plain(d.p_value)
         );
     }
 }

@@ -5,7 +5,7 @@ use telemetry::report::{ConsideredEffect, Dependence, Errors, Estimate, FoundEff
 
 use super::Page;
 use super::write::{Cell, datum, escaped, step};
-use crate::number::{change, hertz, percent, probability, short, with_sigma};
+use crate::number::{change, hertz, p_is, percent, probability, short, with_sigma};
 use crate::order::by_number;
 use crate::text::{is_certain, of_size, selectors};
 
@@ -24,12 +24,12 @@ pub(super) fn in_a_line_each(page: &mut Page, report: &Report) {
             .map(|(name, estimate)| format!("{name} = {}", size(estimate)))
             .collect();
         page.raw(&format!(
-            "<li><strong>{}{}</strong>, {}: {}; p = {}{}</li>",
+            "<li><strong>{}{}</strong>, {}: {}; {}{}</li>",
             escaped(&effect.id),
             escaped(&selectors(&effect.selectors)),
             escaped(meaning(&effect.id)),
             escaped(&sizes.join(", ")),
-            probability(effect.p_value),
+            p_is(effect.p_value),
             effect
                 .variance_explained
                 .map_or_else(String::new, |v| format!(
