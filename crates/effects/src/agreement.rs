@@ -9,7 +9,7 @@ use star_tracker::{Disturbance, Pbm, TemporalNoise};
 use crate::harness::{Bench, Sway, as_given};
 use crate::{
     Candidate, EffectError, FrameGeometry, Parameters, Surroundings, VectorFrame, WarmPixels,
-    build, catalogue, free_orbit, harmonics_of, hot_pixel_at, kind, line_at, nearest_circle,
+    build, catalogue, free_orbit, harmonics_of, hot_pixel_at, kind, line_at, nearest_circles,
     reported, step_at,
 };
 
@@ -174,7 +174,8 @@ fn an_uncorrected_tracker_errs_by_boresight_cross_velocity() {
 /// An orbit that turns once in 200 s, as a fit without the law of circles would tell it.
 fn circle() -> Box<dyn Candidate> {
     let (span_s, values) = ([0.0, 120.0], [3000.0, 0.0, 4000.0, 0.0, 5000.0, 0.0].into());
-    nearest_circle(200.0, span_s, &values, &Matrix6::identity(), 1).1
+    let mut nearest = nearest_circles(200.0, span_s, &values, &Matrix6::identity(), 1);
+    nearest.swap_remove(0).1
 }
 
 /// The first column of an orbit is all of it, to rounding of positions; of an attitude, as with channels, but for
@@ -495,7 +496,8 @@ fn a_node_near_zero_is_known_as_well_as_any() {
             let both = [turned([3000.0, 0.0, 4000.0]), turned([0.0, 5000.0, 0.0])];
             let values = Vector6::from_iterator(both.into_iter().flatten());
             let span_s = [0.0, 120.0];
-            let (_, orbit) = nearest_circle(200.0, span_s, &values, &Matrix6::identity(), 1);
+            let nearest = nearest_circles(200.0, span_s, &values, &Matrix6::identity(), 1);
+            let orbit = &nearest[0].1;
             let covariance = DMatrix::from_diagonal_element(5, 5, 1e4);
             let values = [5000.0, 0.0, 0.0, 0.0, 0.0];
             let surroundings = bench.surroundings();

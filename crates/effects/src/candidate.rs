@@ -333,16 +333,8 @@ pub fn reported(
         let below = candidate.realise(&moved, surroundings)?.parameters();
         let width = values[j] + step - moved[j];
         for (i, parameter) in parameters.iter().enumerate() {
-            let mut change = above[i].value - below[i].value;
             // a phase or a node may wrap between the two
-            let turn = match parameter.unit {
-                "rad" => core::f64::consts::TAU,
-                "deg" => 360.0,
-                _ => f64::INFINITY,
-            };
-            if turn.is_finite() {
-                change -= turn * (change / turn).round();
-            }
+            let change = parameter.shorter(above[i].value - below[i].value);
             jacobian[(i, j)] = change / width;
         }
     }

@@ -2,12 +2,13 @@
 //!
 //! ```text
 //! dP = 1e-6 ppm_per_c (T(t) - mean T) P        channel form
-//! dP = 1e-6 ppm_per_s (t - middle of the data) P
+//! dP = 1e-6 ppm_per_s (t - from_s) P            from_s: the middle of the data, if it is not said
 //! ```
 //!
-//! P is the position off the boresight, and the mean is that of the run's span. The constant part of the scale is not part of this effect: a
-//! common gain of all centroids cannot be told from the focal length itself. Where the channel is not
-//! known it counts as its mean.
+//! P is the position off the boresight, and the mean is that of the run's span. The constant part of the scale is not
+//! part of this effect: a common gain of all centroids cannot be told from the focal length itself. But a focal length
+//! that was right when the run began has one, on average over the run, which shows where no distortion is declared: a
+//! drift from the start is looked for, too. Where the channel is not known it counts as its mean.
 //!
 //! Source: \[M23\] Section 2.1 names thermal scaling and focal length changes among the causes of LSFE.
 
@@ -20,7 +21,7 @@ use crate::channels::{self, Ending};
 use crate::parameters::Reader;
 use crate::shift::{Shift, ShiftCandidate, Shifted};
 use crate::{
-    ActsOn, Candidate, Coefficient, Effect, EffectError, EffectKind, Parameters, Scene,
+    ActsOn, Candidate, Coefficient, Effect, EffectError, EffectKind, Parameter, Parameters, Scene,
     Surroundings,
 };
 
@@ -54,9 +55,10 @@ impl EffectKind for Kind {
         parameters: &Parameters,
         surroundings: &Surroundings<'_>,
     ) -> Result<Box<dyn Effect>, EffectError> {
-        let reader = Reader::new(ID, parameters, &["channel", "ppm_per_c", "ppm_per_s"])?;
+        let known = ["channel", "ppm_per_c", "ppm_per_s", "from_s"];
+        let reader = Reader::new(ID, parameters, &known)?;
         if let Some(channel) = reader.text("channel")? {
-            reader.exclude("channel", ["ppm_per_s"])?;
+            reader.exclude("channel", ["ppm_per_s", "from_s"])?;
             let series = channels::find(ID, channel, Ending::Temperature, surroundings)?;
             let value = reader.required("ppm_per_c")?;
             return Ok(Box::new(Shifted::new(
@@ -71,8 +73,9 @@ impl EffectKind for Kind {
             });
         }
         let value = reader.required("ppm_per_s")?;
+        let from_s = reader.number("from_s")?;
         Ok(Box::new(Shifted::new(
-            Drift::with_time(surroundings),
+            Drift::with_time(surroundings, from_s),
             vec![value],
         )))
     }
@@ -91,7 +94,11 @@ impl EffectKind for Kind {
             }
         }
         if scene.surroundings.length_s() > 0.0 {
-            all.push(ShiftCandidate::boxed(Drift::with_time(&scene.surroundings)));
+            let [start_s, _] = scene.surroundings.span_s;
+            for from_s in [None, Some(start_s)] {
+                let drift = Drift::with_time(&scene.surroundings, from_s);
+                all.push(ShiftCandidate::boxed(drift));
+            }
         }
         all
     }
@@ -106,6 +113,8 @@ enum Drift {
         mean: f64,
     },
     Time {
+        /// `None`: from the middle of the data.
+        from_s: Option<f64>,
         middle_s: f64,
         length_s: f64,
     },
@@ -120,8 +129,9 @@ impl Drift {
         }
     }
 
-    fn with_time(surroundings: &Surroundings<'_>) -> Self {
+    fn with_time(surroundings: &Surroundings<'_>, from_s: Option<f64>) -> Self {
         Self::Time {
+            from_s,
             middle_s: surroundings.middle_s(),
             length_s: surroundings.length_s(),
         }
@@ -151,9 +161,25 @@ impl Shift for Drift {
             Self::Channel { series, mean, .. } => {
                 series.at(star.t_s).map_or(0.0, |value| value - mean)
             }
-            Self::Time { middle_s, .. } => star.t_s - middle_s,
+            Self::Time {
+                from_s, middle_s, ..
+            } => star.t_s - from_s.unwrap_or(*middle_s),
         };
         out[0] = [1e-6 * cause * star.at.x, 1e-6 * cause * star.at.y];
+    }
+    fn parameters(&self, values: &[f64]) -> Vec<Parameter> {
+        let size = self.coefficients().into_iter().zip(values);
+        let mut all: Vec<Parameter> = size
+            .map(|(c, &value)| Parameter::new(c.name, value, c.unit))
+            .collect();
+        if let Self::Time {
+            from_s: Some(from_s),
+            ..
+        } = self
+        {
+            all.push(Parameter::new("from_s", *from_s, "s"));
+        }
+        all
     }
     fn selectors(&self) -> BTreeMap<String, String> {
         match self {

@@ -27,6 +27,16 @@ impl Parameter {
             unit,
         }
     }
+
+    /// `change` of this parameter; of an angle the shorter way round.
+    pub fn shorter(&self, change: f64) -> f64 {
+        let turn = match self.unit {
+            "rad" => core::f64::consts::TAU,
+            "deg" => 360.0,
+            _ => return change,
+        };
+        change - turn * (change / turn).round()
+    }
 }
 
 /// A number, or a selector such as a channel's name.

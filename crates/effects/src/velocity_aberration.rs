@@ -71,7 +71,7 @@ const CHANNELS: [([&str; 3], f64); 2] = [
 mod orbit;
 
 use orbit::Orbit;
-pub use orbit::{free_orbit, nearest_circle, orbit_could_show};
+pub use orbit::{free_orbit, nearest_circles, orbit_could_show};
 
 /// The kind.
 #[derive(Debug)]

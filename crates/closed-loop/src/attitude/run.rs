@@ -504,11 +504,18 @@ fn finish(
             )
         });
     }
+    orbits::images::complete(
+        &evidence,
+        &data.bins.folds,
+        found,
+        &surroundings,
+        &mut effects,
+    )?;
     instants::complete(
         &evidence,
         &data.bins.folds,
         found,
-        &situation.surroundings(),
+        &surroundings,
         median_step(&data.t_s).unwrap_or(1.0),
         &mut effects,
     )?;

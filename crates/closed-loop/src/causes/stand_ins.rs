@@ -66,7 +66,13 @@ pub(crate) fn stand_ins(
     let looked = described.looked();
     let mut most = None;
     let mut by = 0.0;
+    // those that are beaten by themselves, but by no more than constants of the stars
+    let mut excused: Vec<usize> = Vec::new();
     for set in sets(described) {
+        // what beats one of them says nothing against others
+        if !of_a_kind(described, &set) && set.iter().any(|k| excused.contains(k)) {
+            continue;
+        }
         let rest = columns_of(groups, &without(&described.chosen, &set));
         let Some(times) = too_large(described, &set, &rest) else {
             continue;
@@ -96,7 +102,12 @@ pub(crate) fn stand_ins(
             BY_FAR
         };
         let beyond = worth - parts.len() as f64 * looked - own - least;
-        if beyond > by && !agreed(&set, &parts) {
+        if beyond <= 0.0 {
+            continue;
+        }
+        if agreed(&set, &parts) {
+            excused.extend(set);
+        } else if beyond > by {
             by = beyond;
             most = Some((set, parts));
         }
@@ -288,6 +299,11 @@ fn describe_at(described: &Described, rest: &[usize], times: f64) -> Option<(f64
         with.extend(part);
     }
     (!parts.is_empty()).then_some((worth, parts))
+}
+
+fn of_a_kind(described: &Described, set: &[usize]) -> bool {
+    set.windows(2)
+        .all(|pair| described.names[pair[0]] == described.names[pair[1]])
 }
 
 /// Each effect, each pile of one kind, and all.

@@ -18,7 +18,7 @@ use core::f64::consts::TAU;
 use std::sync::Arc;
 
 use block_regression::Folds;
-use effects::{Candidate, Surroundings, free_orbit, nearest_circle, orbit_could_show};
+use effects::{Candidate, Surroundings, free_orbit, nearest_circles, orbit_could_show};
 use focal_plane::{ARCSEC_PER_RAD, AttitudeSource, SPEED_OF_LIGHT_M_S};
 use nalgebra::{Matrix6, SMatrix, SVector, Vector3, Vector6};
 use telemetry::report::ConsideredEffect;
@@ -26,8 +26,10 @@ use telemetry::report::ConsideredEffect;
 use crate::error::CloseError;
 use crate::evidence::Evidence;
 use crate::search::selection::columns_of;
-use crate::search::{Found, fit};
+use crate::search::{Fitted, Found, fit};
 use crate::unexplained::leftover::Track;
+
+pub(crate) mod images;
 
 /// The effect of a velocity.
 const ABERRATION: &str = "velocity_aberration";
@@ -228,77 +230,38 @@ pub(crate) fn propose(
     let best = (0..periods.len())
         .filter_map(|k| {
             let set = [&[k], &beside[..]].concat();
-            let estimate = fitted.fits.estimate(&columns_of(&fitted.groups, &set))?;
-            // six columns a period, of which some may not show
-            let own = &fitted.groups[k].columns;
-            let white = estimate.white.view((0, 0), (own.len(), own.len()));
-            let inverse = white.clone_owned().cholesky()?.inverse();
-            let mut values = Vector6::zeros();
-            let mut information = Matrix6::zeros();
-            for (i, a) in own.iter().enumerate() {
-                values[a - 6 * k] = estimate.value[i];
-                for (j, b) in own.iter().enumerate() {
-                    information[(a - 6 * k, b - 6 * k)] = inverse[(i, j)];
-                }
-            }
+            let (values, information) = velocities(&fitted, k, &set)?;
             // neighbours overlap by half
             let count = periods.len().div_ceil(2);
-            Some(nearest_circle(
-                periods[k],
-                span_s,
-                &values,
-                &information,
-                count,
-            ))
+            let circles = nearest_circles(periods[k], span_s, &values, &information, count);
+            Some((circles.first()?.0, circles))
         })
         .max_by(|a, b| a.0.total_cmp(&b.0));
-    let Some((explained, orbit)) = best else {
+    let Some((explained, circles)) = best else {
         return Ok(None);
     };
     if 0.5 * explained < WORTH_A_SEARCH {
         return Ok(None);
     }
-    let mut orbit: Arc<dyn Candidate> = orbit.into();
-    let mut nats = 0.0;
-    for _ in 0..ROUNDS {
-        let mut all: Vec<&dyn Candidate> = vec![orbit.as_ref()];
-        all.extend(&not_turn);
-        all.extend(&turn);
-        let fitted = fit(evidence, folds, &all)?;
-        let columns = |groups: std::ops::Range<usize>| {
-            columns_of(&fitted.groups, &groups.collect::<Vec<usize>>())
-        };
-        let first = 1 + not_turn.len();
-        let with = columns(0..first);
-        let without = columns(1..first);
-        let error = |set: &[usize]| fitted.fits.error(set).unwrap_or(f64::INFINITY);
-        let gain = |set: &[usize]| fitted.nats(error(&without), error(set));
-        nats = gain(&with);
-        let others = gain(&columns(1..all.len()));
-        if nats < WORTH_A_SEARCH || nats < RIVAL * others.max(slow.unwrap_or(0.0)) {
-            return Ok(None);
+    let beside = Beside {
+        evidence,
+        folds,
+        not_turn,
+        turn,
+        slow,
+    };
+    // the one that is likelier once it is at its best; of two alike the nearer circle
+    let mut likelier: Option<Likely> = None;
+    for (_, circle) in circles {
+        if let Some(other) = beside.at_its_best(circle.into())?
+            && likelier.as_ref().is_none_or(|l| l.nats < other.nats)
+        {
+            likelier = Some(other);
         }
-        // beside white noise it would be chosen in the place of the best of the others, or beside all of them
-        if slow == Some(0.0) {
-            let one = |g: usize| gain(&[&without[..], &columns(g..g + 1)].concat());
-            let best = (first..all.len()).map(one).fold(0.0, f64::max);
-            let more = gain(&columns(0..all.len())) - others;
-            if nats < best - OWN_SHAPE && more < WORTH_A_SEARCH {
-                return Ok(None);
-            }
-        }
-        let Some(estimate) = fitted.fits.estimate(&with) else {
-            break;
-        };
-        let mut values = vec![0.0; orbit.coefficients().len()];
-        for (i, &column) in fitted.groups[0].columns.iter().enumerate() {
-            values[column] = estimate.value[i];
-        }
-        let Some(better) = orbit.refined(&values) else {
-            break;
-        };
-        orbit = better.into();
     }
+    let Some(Likely { orbit, nats }) = likelier else {
+        return Ok(None);
+    };
     // a fit may end at more turns than it was tried at
     let fastest_s = SHORTEST_S.min(surroundings.length_s() / FEW_TURNS);
     let period_s = period_s(orbit.as_ref(), surroundings).unwrap_or(f64::INFINITY);
@@ -306,6 +269,88 @@ pub(crate) fn propose(
     // where nature has none, a slow error makes one as well as it makes anything
     let slow_makes_it = period_s < SHORTEST_S && nats < slow.unwrap_or(0.0) + OWN_SHAPE;
     Ok((nats >= WORTH_A_SEARCH && !is_fast && !slow_makes_it).then_some(orbit))
+}
+
+/// The six coefficients of candidate `k` of those fitted in `set`, a [`free_orbit`] with none but such before it, and
+/// the inverse of their covariance under white noise.
+fn velocities(fitted: &Fitted, k: usize, set: &[usize]) -> Option<(Vector6<f64>, Matrix6<f64>)> {
+    let estimate = fitted.fits.estimate(&columns_of(&fitted.groups, set))?;
+    // of six columns some may not show
+    let own = &fitted.groups[k].columns;
+    let white = estimate.white.view((0, 0), (own.len(), own.len()));
+    let inverse = white.clone_owned().cholesky()?.inverse();
+    let mut values = Vector6::zeros();
+    let mut information = Matrix6::zeros();
+    for (i, a) in own.iter().enumerate() {
+        values[a - 6 * k] = estimate.value[i];
+        for (j, b) in own.iter().enumerate() {
+            information[(a - 6 * k, b - 6 * k)] = inverse[(i, j)];
+        }
+    }
+    Some((values, information))
+}
+
+/// An orbit, and what it gains, nats.
+struct Likely {
+    orbit: Arc<dyn Candidate>,
+    nats: f64,
+}
+
+/// What an orbit is fitted beside, and held against.
+struct Beside<'a> {
+    evidence: &'a dyn Evidence,
+    folds: &'a Folds,
+    not_turn: Vec<&'a dyn Candidate>,
+    turn: Vec<&'a dyn Candidate>,
+    slow: Option<f64>,
+}
+
+impl Beside<'_> {
+    /// `orbit` after fits about itself; `None` where it is not worth a search, or others explain as much.
+    fn at_its_best(&self, mut orbit: Arc<dyn Candidate>) -> Result<Option<Likely>, CloseError> {
+        let mut nats = 0.0;
+        for _ in 0..ROUNDS {
+            let mut all: Vec<&dyn Candidate> = vec![orbit.as_ref()];
+            all.extend(&self.not_turn);
+            all.extend(&self.turn);
+            let fitted = fit(self.evidence, self.folds, &all)?;
+            let columns = |groups: std::ops::Range<usize>| {
+                columns_of(&fitted.groups, &groups.collect::<Vec<usize>>())
+            };
+            let first = 1 + self.not_turn.len();
+            let with = columns(0..first);
+            let without = columns(1..first);
+            let error = |set: &[usize]| fitted.fits.error(set).unwrap_or(f64::INFINITY);
+            let gain = |set: &[usize]| fitted.nats(error(&without), error(set));
+            nats = gain(&with);
+            let others = gain(&columns(1..all.len()));
+            let rivals = others.max(self.slow.unwrap_or(0.0));
+            if nats < WORTH_A_SEARCH || nats < RIVAL * rivals {
+                return Ok(None);
+            }
+            // beside white noise it would be chosen in the place of the best of the others, or beside all of them
+            if self.slow == Some(0.0) {
+                let one = |g: usize| gain(&[&without[..], &columns(g..g + 1)].concat());
+                let best = (first..all.len()).map(one).fold(0.0, f64::max);
+                let more = gain(&columns(0..all.len())) - others;
+                if nats < best - OWN_SHAPE && more < WORTH_A_SEARCH {
+                    return Ok(None);
+                }
+            }
+            let Some(estimate) = fitted.fits.estimate(&with) else {
+                break;
+            };
+            let mut values = vec![0.0; orbit.coefficients().len()];
+            for (i, &column) in fitted.groups[0].columns.iter().enumerate() {
+                values[column] = estimate.value[i];
+            }
+            let Some(better) = orbit.refined(&values) else {
+                break;
+            };
+            orbit = better.into();
+        }
+        Ok(Some(Likely { orbit, nats }))
+    }
 }
 
 /// The period of an orbit as it stands, at whatever speed.

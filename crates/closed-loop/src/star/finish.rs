@@ -23,7 +23,7 @@ use crate::questions::confusion;
 use crate::questions::hypothesis::{self, Grounds};
 use crate::questions::manoeuvre::stars::Sky;
 use crate::search::instants;
-use crate::search::orbits::Look;
+use crate::search::orbits::{Look, images};
 use crate::search::refusal::Refused;
 use crate::search::selection::columns_of;
 use crate::search::{Found, fit};
@@ -175,6 +175,7 @@ pub(crate) fn finish(
     let (mut effects, mut entries) =
         figures::effects_found(f.found, &added, &explained, &surroundings, questions)?;
     tell_apart(f, &mut effects);
+    images::complete(f.level, f.folds, f.found, &surroundings, &mut effects)?;
     instants::complete(
         f.level,
         f.folds,

@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use telemetry::report::{Report, Verdict};
 use telemetry::{Bundle, EffectEntry, EffectValue};
 
-use crate::kit::{Case, Path, closed, named};
+use crate::kit::{Case, Path, closed, named, reported};
 use crate::snapshots::{Lens, arcsec, pictures, taken};
 
 /// A wide field: some forty stars of 150 in 80 deg.
@@ -236,5 +236,27 @@ fn a_drift_in_few_pictures_is_beyond_doubt() {
         // in time or with a temperature, which in twenty seconds is the same
         let p = report.effects[0].p_value;
         assert!(p < 1e-8, "seed {seed}: {p}");
+    }
+}
+
+/// A scale that was right when the run began, where no distortion is declared: 60 ppm in two minutes, on average 30.
+/// With a drift about the middle alone that was a wrong focal length, of more nats than the drift, and the drift.
+#[test]
+fn a_drift_from_the_start_is_one_effect() {
+    for seed in 3..6 {
+        let mut case = Case::new(Path::Still, seed);
+        case.duration_s = 120.0;
+        case.stars = 20;
+        let case = case.reference("none");
+        let case = case.with("focal_length_drift", "ppm_per_s = 0.5\nfrom_s = 0.0");
+        let report = reported(&case.quiet(5.0));
+        assert_eq!(named(&report), ["focal_length_drift"], "seed {seed}");
+        let drift = &report.effects[0].parameters["ppm_per_s"];
+        let z = (drift.value - 0.5) / drift.sigma.expect("a sigma");
+        assert!(
+            z.abs() < 4.0,
+            "seed {seed}: {} ppm/s, {z} sigma",
+            drift.value
+        );
     }
 }

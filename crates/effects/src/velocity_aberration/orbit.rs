@@ -17,7 +17,7 @@
 //! ```
 //!
 //! six coefficients for each period that is tried ([`free_orbit`]), and the circle nearest to them in units
-//! of their errors ([`nearest_circle`]).
+//! of their errors ([`nearest_circles`]).
 //!
 //! Source: first-order stellar aberration, `focal_plane::aberrated`; Levenberg 1944 for the nearest circle.
 
@@ -37,6 +37,8 @@ const YEAR_S: f64 = 365.256_363 * 86_400.0;
 const PLAUSIBLE_M_S: f64 = 3000.0;
 /// Largest turn, and share of the frequency, by which columns are taken elsewhere at once.
 const STEP: f64 = 0.5;
+/// Circles whose frames differ by more than this are two.
+const APART: f64 = 0.1;
 /// Steps towards the nearest circle.
 const STEPS: usize = 30;
 /// Coefficients of an orbit whose columns are linear about it.
@@ -257,7 +259,8 @@ impl Told for OrbitCandidate<Free> {
     }
     fn orbit(&self, values: &[f64]) -> Orbit {
         let all = Matrix6::identity();
-        let (speed, frame) = circle_of(&Vector6::from_column_slice(values), &all);
+        let nearest = circles_of(&Vector6::from_column_slice(values), &all);
+        let Climbed { speed, frame, .. } = nearest[0];
         let Free { period_s, middle_s } = self.velocities;
         let circle = Circle {
             frame,
@@ -372,32 +375,36 @@ pub fn free_orbit(period_s: f64, span_s: [f64; 2]) -> Box<dyn Candidate> {
     Box::new(OrbitCandidate::of(free, &NAMES, 1))
 }
 
-/// The circular orbit nearest to `values` of [`free_orbit`] (m/s), whose `information` is the inverse of their
-/// covariance, and the square of the errors that it leaves of them less that of nothing at all: what the circle
-/// explains. `picked_from`: so many periods.
-pub fn nearest_circle(
+/// The circular orbits nearest to `values` of [`free_orbit`] (m/s), whose `information` is the inverse of their
+/// covariance: for each the square of the errors that it leaves of them less that of nothing at all, which is what the
+/// circle explains. The nearest is first; second, if there is one, is the nearest of those that no small step leads to
+/// the first: of a velocity along the boresight the stars tell little, and without it an orbit and its mirror image
+/// behind the focal plane are the same. `picked_from`: so many periods.
+pub fn nearest_circles(
     period_s: f64,
     span_s: [f64; 2],
     values: &Vector6<f64>,
     information: &Matrix6<f64>,
     picked_from: usize,
-) -> (f64, Box<dyn Candidate>) {
+) -> Vec<(f64, Box<dyn Candidate>)> {
     // of what the data hardly tells, nothing is known but that it is no surprise
     let known = information + Matrix6::identity() / (PLAUSIBLE_M_S * PLAUSIBLE_M_S);
     let likely = known.cholesky().map(|c| c.solve(&(information * values)));
     let likely = likely.unwrap_or_else(Vector6::zeros);
-    let (speed, frame) = circle_of(&likely, &known);
-    let left = likely - coefficients(speed, &frame);
-    let square = |v: &Vector6<f64>| v.dot(&(known * v));
-    let circle = Circle {
-        frame,
-        period_s,
-        middle_s: 0.5 * (span_s[0] + span_s[1]),
+    let whole = likely.dot(&(known * likely));
+    let orbit = |found: &Climbed| {
+        let circle = Circle {
+            frame: found.frame,
+            period_s,
+            middle_s: 0.5 * (span_s[0] + span_s[1]),
+        };
+        let candidate = OrbitCandidate::<Circle>::about(circle, picked_from);
+        (
+            whole - found.left,
+            Box::new(candidate) as Box<dyn Candidate>,
+        )
     };
-    (
-        square(&likely) - square(&left),
-        Box::new(OrbitCandidate::<Circle>::about(circle, picked_from)),
-    )
+    circles_of(&likely, &known).iter().map(orbit).collect()
 }
 
 /// A and B of a circle.
@@ -406,38 +413,51 @@ fn coefficients(speed: f64, frame: &Rotation3<f64>) -> Vector6<f64> {
     Vector6::new(a.x, a.y, a.z, b.x, b.y, b.z)
 }
 
-/// Speed and frame of the circle nearest to `values`: the best of climbs from 24 frames.
-fn circle_of(values: &Vector6<f64>, information: &Matrix6<f64>) -> (f64, Rotation3<f64>) {
+/// A circle that no small step makes nearer.
+#[derive(Clone, Copy, Debug)]
+struct Climbed {
+    /// Square of what it leaves.
+    left: f64,
+    speed: f64,
+    frame: Rotation3<f64>,
+}
+
+/// The circle nearest to `values`, and the nearest that is another, if there is one: the best of climbs from 24 frames.
+fn circles_of(values: &Vector6<f64>, information: &Matrix6<f64>) -> Vec<Climbed> {
     let quarters = |axis, n: u32| Rotation3::from_axis_angle(&axis, f64::from(n) * FRAC_PI_2);
     let poles = (0..4)
         .map(|n| quarters(Vector3::x_axis(), n))
         .chain([1, 3].map(|n| quarters(Vector3::y_axis(), n)));
     let starts = poles.flat_map(|pole| (0..4).map(move |n| pole * quarters(Vector3::z_axis(), n)));
-    let climbed = starts.map(|frame| climb(values, information, frame));
-    let best = climbed.min_by(|a, b| a.0.total_cmp(&b.0));
-    best.map_or((0.0, Rotation3::identity()), |(_, speed, frame)| {
-        (speed, frame)
-    })
+    let mut climbed: Vec<Climbed> = starts
+        .map(|frame| climb(values, information, frame))
+        .collect();
+    climbed.sort_by(|a, b| a.left.total_cmp(&b.left));
+    let nearest = climbed[0].frame;
+    // the norm is the angle times the root of 2
+    let is_other = |c: &&Climbed| (c.frame.matrix() - nearest.matrix()).norm() > APART;
+    let other = climbed.iter().find(is_other);
+    [climbed[0]].into_iter().chain(other.copied()).collect()
 }
 
-/// Square of what is left, speed and frame, from a start by damped Gauss-Newton steps.
-fn climb(
-    values: &Vector6<f64>,
-    information: &Matrix6<f64>,
-    start: Rotation3<f64>,
-) -> (f64, f64, Rotation3<f64>) {
+/// From a start by damped Gauss-Newton steps.
+fn climb(values: &Vector6<f64>, information: &Matrix6<f64>, start: Rotation3<f64>) -> Climbed {
     // the best speed of a frame
-    let judged = |frame: &Rotation3<f64>| {
-        let unit = coefficients(1.0, frame);
+    let judged = |frame: Rotation3<f64>| {
+        let unit = coefficients(1.0, &frame);
         let weighed = information * unit;
         let speed = (weighed.dot(values) / weighed.dot(&unit)).max(0.0);
         let left = values - unit * speed;
-        (left.dot(&(information * left)), speed)
+        Climbed {
+            left: left.dot(&(information * left)),
+            speed,
+            frame,
+        }
     };
-    let mut frame = start;
-    let (mut square, mut speed) = judged(&frame);
+    let mut at = judged(start);
     let mut damping = 1e-3;
     for _ in 0..STEPS {
+        let Climbed { speed, frame, .. } = at;
         let turned = |axis: Vector3<f64>| {
             let dx = frame * axis.cross(&Vector3::x());
             let dy = frame * axis.cross(&Vector3::y());
@@ -460,16 +480,15 @@ fn climb(
             break;
         };
         let turn = Vector3::new(step[1], step[2], step[3]).map(|s| s.clamp(-STEP, STEP));
-        let next = frame * Rotation3::from_scaled_axis(turn);
-        let (now, at) = judged(&next);
-        if now <= square {
-            (square, speed, frame) = (now, at, next);
+        let next = judged(frame * Rotation3::from_scaled_axis(turn));
+        if next.left <= at.left {
+            at = next;
             damping *= 0.3;
         } else {
             damping *= 10.0;
         }
     }
-    (square, speed, frame)
+    at
 }
 
 #[cfg(test)]
@@ -536,18 +555,23 @@ mod tests {
             let frame = Rotation3::from_scaled_axis(Vector3::from(turn));
             let values = coefficients(7000.0, &frame);
             let mut information = Matrix6::identity();
-            let (speed, found) = circle_of(&values, &information);
-            assert!((speed - 7000.0).abs() < 1e-6);
-            let apart = found.matrix() - frame.matrix();
+            let found = circles_of(&values, &information)[0];
+            assert!((found.speed - 7000.0).abs() < 1e-6);
+            let apart = found.frame.matrix() - frame.matrix();
             assert!(apart.norm() < 1e-9, "{turn:?}: {apart}");
             information[(2, 2)] = 0.0;
             information[(5, 5)] = 0.0;
-            let (speed, found) = circle_of(&values, &information);
-            let left = information * (values - coefficients(speed, &found));
-            assert!(left.norm() < 1.0, "{turn:?}: {left}");
+            let mut there = false;
+            for found in circles_of(&values, &information) {
+                let left = information * (values - coefficients(found.speed, &found.frame));
+                assert!(left.norm() < 1.0, "{turn:?}: {left}");
+                there |= (found.frame.matrix() - frame.matrix()).norm() < 1e-6;
+            }
+            assert!(there, "{turn:?} or its mirror image is lost");
         }
         let values = Vector6::new(0.0, 5.0, 0.0, 0.0, 5.0, 0.0);
-        let (explained, _) = nearest_circle(2000.0, SPAN_S, &values, &Matrix6::identity(), 1);
+        let nearest = nearest_circles(2000.0, SPAN_S, &values, &Matrix6::identity(), 1);
+        let explained = nearest[0].0;
         assert!(
             explained < 49.0,
             "a line is no circle that lies in a plane with z: {explained}"
