@@ -25,7 +25,7 @@
 
 mod around;
 pub(crate) mod gyro;
-mod neighbours;
+pub(crate) mod neighbours;
 mod rates;
 mod stencil;
 

@@ -113,6 +113,13 @@ impl Turns {
             reference,
         }
     }
+
+    /// Sigma of the reference's variance about an axis where all there is is the stars' own noise, arcsec^2.
+    pub(crate) fn chance(&self, axis: usize) -> f64 {
+        let known = || self.frames.iter().flatten();
+        let information: f64 = known().map(|t| t.variance[axis].recip()).sum();
+        self.noise * (2.0 * known().count() as f64).sqrt() / information
+    }
 }
 
 /// Whether a row says anything of its frame's rotation.

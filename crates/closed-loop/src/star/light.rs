@@ -27,18 +27,23 @@
 //! Where the reference's error lasts from frame to frame it is no prior of each frame anew, and would be believed as
 //! often: then p and Q are what the stars around say of that error ([`lasting`]), without S.
 //!
+//! Stars may be too noisy to see that the reference errs. What the attitudes around a frame do not tell of its own is
+//! motion or such an error: as much of that as would not show is taken for S. If it was motion, a position is off by
+//! what has nothing in common with its residual.
+//!
 //! Under slow motion the frames around tell most (6 stars at rest: 0.25 px by a frame's stars, 0.07 px with
 //! them); under fast motion they know nothing, and Q says so, but of an error that is slow.
 //!
 //! Source: Henderson 1975 (best linear unbiased prediction); Katkovnik 1999 (intersection of confidence
 //! intervals, for the stretch of time).
 
-use focal_plane::{ARCSEC_PER_RAD, rotation_from_vector, rotation_vector};
+use focal_plane::{ARCSEC_PER_RAD, AttitudeSeries, rotation_from_vector, rotation_vector};
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use rayon::prelude::*;
 use spectra::robust::median_step;
 
 use crate::gaps::GAP_STEPS;
+use crate::motion::neighbours::{SIDE, of_samples, predicted};
 use crate::star::changes;
 use crate::star::data::{Light, StarData};
 use crate::star::frame_rotation::{Turns, rotation_row};
@@ -57,6 +62,9 @@ const JUDGES: usize = 32;
 /// A reference that errs by less than this leaves the light where it is modelled, px.
 const KNOWN_PX: f64 = 1e-3;
 
+/// Sigmas of what the stars' own noise makes of a reference's variance, by which more would show.
+const HIDDEN: f64 = 3.0;
+
 /// A rotation axis by axis, with its variances.
 type Known = [(f64, f64); 3];
 const NOTHING: Known = [(0.0, f64::INFINITY); 3];
@@ -73,19 +81,27 @@ pub(crate) fn of(data: &StarData, residual: [&[f64]; 2]) -> Light {
         ([0.0; 3], [None; 3])
     } else {
         let known = KNOWN_PX * data.camera.arcsec_per_px()[0];
-        if turns.reference[..2].iter().all(|s| *s < known * known) {
+        let unsteady = unsteady(data);
+        let good = |axis: usize| turns.reference[axis].max(unsteady[axis]) < known * known;
+        if (0..2).all(good) {
             return light;
         }
         // what chance makes of the stars' noise would put that noise into their positions
         let errs: [bool; 3] = std::array::from_fn(|axis| shows(&turns, axis, 1));
         let lasting: [_; 3] = std::array::from_fn(|axis| Lasting::of(&turns, t_s, axis));
-        if errs == [false; 3] && lasting.iter().all(Option::is_none) {
+        // but what the stars are too noisy to see of an error that the path itself may have is none of the light's
+        let hidden: [f64; 3] = std::array::from_fn(|axis| {
+            let most = turns.reference[axis] + HIDDEN * turns.chance(axis);
+            unsteady[axis].min(most)
+        });
+        let steady = (0..2).all(|axis| hidden[axis] < known * known);
+        if steady && errs == [false; 3] && lasting.iter().all(Option::is_none) {
             return light;
         }
         let exact = (1e-3 * known * known).recip();
         let information = |axis: usize| match errs[axis] {
             true => turns.reference[axis].recip().min(exact),
-            false => exact,
+            false => hidden[axis].recip().min(exact),
         };
         (std::array::from_fn(information), lasting)
     };
@@ -135,6 +151,17 @@ pub(crate) fn of(data: &StarData, residual: [&[f64]; 2]) -> Light {
         }
     }
     light
+}
+
+/// Variance of the modelled attitudes that their neighbours do not tell, arcsec^2: of the motion, or of the reference.
+fn unsteady(data: &StarData) -> [f64; 3] {
+    let series = AttitudeSeries::new(data.frames.t_s.clone(), data.attitude.clone(), None);
+    let Ok(series) = series else {
+        return [0.0; 3];
+    };
+    let error = of_samples(&series, SIDE) / predicted(SIDE);
+    let square = ARCSEC_PER_RAD * ARCSEC_PER_RAD;
+    std::array::from_fn(|axis| square * error[axis])
 }
 
 /// What the frames around each frame say of its rotation.

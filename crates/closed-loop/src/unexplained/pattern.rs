@@ -21,12 +21,13 @@
 //! distortion's length are not looked for. The four scores u (cos and sin, both axes) have
 //!
 //! ```text
-//! T^2 = u' V^-1 u,    V = sum over clusters u_c u_c',    P = 8 (2 Lx Ly) F(T^2 (G-4) / (4 (G-1)); 4, G-4)
+//! T^2 = u' V^-1 u,    V = sum over clusters u_c u_c',    P = 8 J K F(T^2 (G-4) / (4 (G-1)); 4, G-4)
 //! ```
 //!
-//! with 2 Lx Ly independent wave vectors in the half plane within one cycle per pixel, 8
+//! with K independent wave vectors in the octave of k, of J octaves from the distortion's waves to one cycle per pixel, 8
 //! for the top between them, and G clusters: frames in one covariance, cells of star and
-//! block of time in another. A third P is that of the power over the mean power around k,
+//! block of time in another. So a wave of five cycles across the detector, of which there are few, does not pay for a
+//! million fringes. A third P is that of the power over the mean power around k,
 //! once the wave is taken out. The largest of the three counts.
 //!
 //! Source: Scargle 1982 (periodogram); Hotelling 1931; Liang and Zeger 1986 (clusters).
@@ -345,10 +346,13 @@ impl Field {
             .chain([[1.0, 1.0], [1.0, -1.0]])
             .map(|k| (power(k), k))
             .collect();
-        peaks.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let trials = (CHANCES * 2.0 * extent[0] * extent[1]).max(1.0);
+        // what is left of the power once its octave is paid
+        let worth = |peak: &(f64, [f64; 2])| peak.0 - 2.0 * own.trials(peak.1).ln();
+        let better = |a: &(f64, [f64; 2]), b: &(f64, [f64; 2])| worth(a).total_cmp(&worth(b));
+        peaks.sort_by(|a, b| better(b, a));
         // chi-square of so little falls short by far, refined or not
-        if 0.5 * peaks.first()?.0 < 0.5 * trials.ln() {
+        let &(most, k) = peaks.first()?;
+        if most < own.trials(k).ln() {
             return None;
         }
         let step = extent.map(|l| 0.25 / l);
@@ -356,12 +360,13 @@ impl Field {
             .into_iter()
             .take(REFINED)
             .map(|peak| climb(&power, peak, step, 1))
-            .max_by(|a, b| a.0.total_cmp(&b.0))?;
+            .max_by(better)?;
         let best = climb(&power, best, step.map(|s| 0.25 * s), 3);
         let wave = best.1;
         if own.excludes(wave) {
             return None;
         }
+        let trials = own.trials(wave);
         let chance = self.chance(wave, folds)?;
         if chance * trials >= SEARCH_ALPHA {
             return None;
@@ -582,6 +587,32 @@ struct Own {
 }
 
 impl Own {
+    /// Squared cycles of a wave over the extent, in units of the longest that is looked for.
+    fn scale(&self, k: [f64; 2]) -> f64 {
+        let cycles = |a: usize| k[a] * self.extent[a];
+        (cycles(0).powi(2) + cycles(1).powi(2)) / self.cycles.powi(2)
+    }
+
+    /// Octaves up to one cycle per pixel along both axes.
+    fn octaves(&self) -> f64 {
+        (0.5 * self.scale([1.0, 1.0]).log2()).ceil().max(1.0)
+    }
+
+    /// The octave of a wave.
+    fn octave(&self, k: [f64; 2]) -> f64 {
+        let octave = (0.5 * self.scale(k).log2()).floor();
+        octave.clamp(0.0, self.octaves() - 1.0)
+    }
+
+    /// Wave vectors that one of this octave pays for: see the module.
+    fn trials(&self, k: [f64; 2]) -> f64 {
+        let all = 2.0 * self.extent[0] * self.extent[1];
+        let longest = self.cycles * self.octave(k).exp2();
+        // between two half circles, but for what lies beyond a cycle per pixel
+        let vectors = (1.5 * PI * longest * longest).min(all);
+        (CHANCES * self.octaves() * vectors).max(1.0)
+    }
+
     fn excludes(&self, k: [f64; 2]) -> bool {
         let within = |x: f64, y: f64, cycles: f64| {
             let (x, y) = (

@@ -1,4 +1,5 @@
-//! The strongest wave vectors of a field, by a transform of its residuals on half pixels.
+//! The strongest wave vectors of a field, by a transform of its residuals on half pixels: by what is left of their power
+//! once they have paid for their octave ([`super`]).
 //!
 //! ```text
 //! F(k) = sum over rows weight (x residual + i y residual) e^(-2 pi i k p)     |X|^2 + |Y|^2 = (|F(k)|^2 + |F(-k)|^2) / 2
@@ -83,7 +84,13 @@ impl Field {
         waves
     }
 
-    /// The strongest wave of every column of the transform, with its power.
+    /// Squares of the weights: rows, if each counts alike.
+    fn weighed_rows(&self) -> f64 {
+        let each = self.stars.iter().zip(&self.weight);
+        each.map(|(rows, w)| rows.len() as f64 * w * w).sum()
+    }
+
+    /// The strongest wave of every column of the transform, with its power less its price.
     fn transform(
         &self,
         cells: [usize; 2],
@@ -147,16 +154,22 @@ impl Field {
         let opposite = |axis: usize, i: usize| {
             (2 * cells[axis] - i - usize::from(shift[axis] > 0.0)) % cells[axis]
         };
+        // the square of a wave's residuals is that of noise, a row each, times the power
+        let rows = self.weighed_rows();
+        let price = |k: [f64; 2]| narrow(2.0 * rows * own.trials(k).ln());
+        let least = price([0.0, 0.0]);
         let strongest = |i: usize, line: &[Complex<f32>], other: &[Complex<f32>]| {
             let kx = frequency(0, i);
             let mut best: Option<(f32, [f64; 2])> = None;
             for (j, of) in line.iter().enumerate().take(ny / 2 + 1) {
                 let p = of.norm_sqr() + other[opposite(1, j)].norm_sqr();
                 // few are higher than all before them: others need not be asked whose they are
-                if best.is_none_or(|(most, _)| p >= most) {
-                    let ky = frequency(1, j);
-                    if !own.excludes([kx, ky.abs()]) {
-                        best = Some((p, [kx, ky]));
+                if best.is_none_or(|(most, _)| p - least >= most) {
+                    let k = [kx, frequency(1, j)];
+                    let worth = p - price(k);
+                    let higher = best.is_none_or(|(most, _)| worth >= most);
+                    if higher && !own.excludes([kx, k[1].abs()]) {
+                        best = Some((worth, k));
                     }
                 }
             }
