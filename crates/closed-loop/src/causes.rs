@@ -266,7 +266,7 @@ pub(crate) fn run<'a>(
                 let g = searched.found.selection.chosen[change.chosen];
                 refused.insert(
                     family(searched.found.candidates[g].as_ref()),
-                    Refusal::Change,
+                    Refusal::Change(change.way.name()),
                 );
                 kept.extend(keep(&searched.found, g, change));
                 continue;
@@ -291,7 +291,8 @@ pub(crate) fn run<'a>(
             let chosen = searched.found.selection.chosen.clone();
             let spoken = stand_ins(&described, &agreed).map(|(set, _)| (set, Refusal::StandIn));
             let beside = best_beside(&searched.found, &may);
-            let changes = changing(&described, beside).map(|c| (vec![c.chosen], Refusal::Change));
+            let changes = changing(&described, beside)
+                .map(|c| (vec![c.chosen], Refusal::Change(c.way.name())));
             let disputed = constants.as_ref().map(|constants| {
                 let paid = paid(&searched.found, &may);
                 (constants.disputed(&paid), Refusal::StarConstants)
@@ -300,7 +301,7 @@ pub(crate) fn run<'a>(
             let (spoken, why) = spoken.unwrap_or((Vec::new(), Refusal::StandIn));
             for k in spoken {
                 let g = chosen[k];
-                refused.insert(family(searched.found.candidates[g].as_ref()), why);
+                refused.insert(family(searched.found.candidates[g].as_ref()), why.clone());
                 searched.found.selection.chosen.retain(|c| *c != g);
             }
         }
@@ -330,7 +331,10 @@ pub(crate) fn run<'a>(
         let beside = best_beside(&found, &may);
         if let Some(change) = changing(&described, beside).filter(|_| !last) {
             let g = found.selection.chosen[change.chosen];
-            refused.insert(family(found.candidates[g].as_ref()), Refusal::Change);
+            refused.insert(
+                family(found.candidates[g].as_ref()),
+                Refusal::Change(change.way.name()),
+            );
             kept.extend(keep(&found, g, change));
             continue;
         }
@@ -371,7 +375,7 @@ pub(crate) fn run<'a>(
 /// Refuses `families`; whether there are any.
 fn refuse(refused: &mut Refused, families: Vec<String>, why: Refusal) -> bool {
     let any = !families.is_empty();
-    refused.extend(families.into_iter().map(|f| (f, why)));
+    refused.extend(families.into_iter().map(|f| (f, why.clone())));
     any
 }
 

@@ -26,7 +26,7 @@ use crate::evidence::Residuals;
 use crate::questions::hypothesis::{Questions, Told};
 use crate::search::empirical::EMPIRICAL;
 use crate::search::group::{Group, is_believed};
-use crate::search::refusal::Refused;
+use crate::search::refusal::{Refusal, Refused};
 use crate::search::selection::{columns_of, each};
 use crate::search::{Found, family, first_column};
 use crate::star::data::StarData;
@@ -236,7 +236,7 @@ fn consider(
         None => of.split('/').next() == Some(id),
     };
     let why = against.iter().find(|(of, _)| is_meant(of));
-    entry.against = why.map(|(_, refusal)| refusal.why().to_owned());
+    entry.against = why.map(|(_, refusal)| refusal.why());
     let Some(g) = best else { return entry };
     let judged = &found.selection.judged[g];
     entry.delta_loglik = Some(judged.delta_loglik);
@@ -257,6 +257,26 @@ fn consider(
         entry.unit = Some(coefficient.unit.to_owned());
     }
     entry
+}
+
+/// What an effect that shows changes with, if that is why it was not added: the likeliest, as the share that it explains
+/// out of fold of what is left.
+pub(crate) fn changing(found: &Found, against: &Refused) -> Option<Dependence> {
+    let changes = (0..found.candidates.len()).filter_map(|g| {
+        let why = against.get(&family(found.candidates[g].as_ref()))?;
+        let Refusal::Change(variable) = why else {
+            return None;
+        };
+        let judged = &found.selection.judged[g];
+        judged.stands().then_some((variable, judged))
+    });
+    let (variable, judged) =
+        changes.max_by(|a, b| a.1.delta_loglik.total_cmp(&b.1.delta_loglik))?;
+    Some(Dependence {
+        variable: variable.clone(),
+        variance_explained: -(-2.0 * judged.delta_loglik / found.fitted.scalars).exp_m1(),
+        p_value: judged.p_value,
+    })
 }
 
 /// Why none of an effect's forms was added although one would be for all but its size.

@@ -30,6 +30,14 @@ pub(crate) enum Way {
 }
 
 impl Way {
+    /// The name in the report of what it goes with.
+    pub(crate) fn name(&self) -> String {
+        match self {
+            Self::With(variable, _) | Self::Bent(variable, _) => variable.name(),
+            Self::Star(ids) => Variable::Star(ids.clone()).name(),
+        }
+    }
+
     fn columns(&self) -> usize {
         match self {
             Self::With(..) | Self::Bent(..) => 1,

@@ -470,6 +470,10 @@ pub(crate) fn terms(
             terms.extend(two(of, by));
         }
     }
+    // spots that are not the same all over the field err with the pixel phase otherwise
+    for of in &phase {
+        terms.extend(position.iter().filter_map(|by| two(of, by)));
+    }
     // charge is held back in proportion to it, the more the farther it is moved
     terms.extend(position.iter().filter_map(|of| two(of, &flux)));
     if moves {

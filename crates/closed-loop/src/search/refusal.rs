@@ -5,7 +5,7 @@
 use std::collections::BTreeMap;
 
 /// What speaks against an effect.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Refusal {
     Wander,
     OwnPath,
@@ -13,7 +13,8 @@ pub(crate) enum Refusal {
     SlowStars,
     StarConstants,
     StandIn,
-    Change,
+    /// With this variable.
+    Change(String),
     Remainder,
     Described,
     NoLessError,
@@ -25,8 +26,8 @@ pub(crate) type Refused = BTreeMap<String, Refusal>;
 
 impl Refusal {
     /// In the words of the report.
-    pub(crate) fn why(self) -> &'static str {
-        match self {
+    pub(crate) fn why(&self) -> String {
+        let why = match self {
             Self::Wander => "a slow error of the reference is the likelier explanation",
             Self::OwnPath => "the slow error of the reference makes as much of its own path",
             Self::Pile => {
@@ -35,13 +36,14 @@ impl Refusal {
             Self::SlowStars => "slow noise of the stars makes as much",
             Self::StarConstants => "stars err by constants of their own, of which it is a part",
             Self::StandIn => "what the residual follows explains the same and more",
-            Self::Change => {
-                "it is not the same at all times, on all stars and all over the detector"
+            Self::Change(variable) => {
+                return format!("it is not the same everywhere, but changes with {variable}");
             }
             Self::Remainder => "it is next to nothing beside what no effect explains",
             Self::Described => "it does not stand beside what the residual follows",
             Self::NoLessError => "the error out of fold is no smaller with it",
             Self::Fallen => "it does not stand beside what was added after it",
-        }
+        };
+        why.to_owned()
     }
 }

@@ -271,6 +271,16 @@ pub(crate) fn finish(
         constants.tell(f.described, last / whole, &mut unattributed);
     }
     noise_left.tell(&mut unattributed);
+    // what no variable predicts may be an effect that changes with one
+    if !unattributed.present
+        && let Some(change) = figures::changing(f.found, f.refused)
+    {
+        unattributed.present = true;
+        unattributed.variance_fraction = Some(change.variance_explained * last / whole);
+        let list = &mut unattributed.depends_on;
+        list.retain(|d| d.variable != change.variable);
+        list.insert(0, change);
+    }
     let weighed = weighed_excess(f, &plain);
     let excess_left = weighed.map_or(0.0, |(excess, _)| excess);
     let mut considered = figures::considered(f.found, excess_left, f.refused, &surroundings);
