@@ -46,6 +46,7 @@ use crate::star::data::StarData;
 use crate::unexplained::SEARCH_ALPHA;
 
 mod pixel_phase;
+mod rings;
 #[cfg(test)]
 mod tests;
 mod transform;
@@ -101,8 +102,10 @@ struct Field {
 /// What was found.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Pattern {
-    /// Cycles per pixel.
+    /// Cycles per pixel; of a ring those outwards, first.
     pub(crate) wave: [f64; 2],
+    /// Whether it is round about the boresight.
+    ring: bool,
     pub(crate) p_value: f64,
     /// Squares that the wave takes, in units of each axis' variance.
     power: f64,
@@ -116,7 +119,9 @@ impl Pattern {
     /// The name of the variable that the residual follows.
     pub(crate) fn variable(&self) -> &'static str {
         let cycles = |axis: usize, k: f64| ((self.wave[axis].abs() - k) * self.extent[axis]).abs();
-        if cycles(0, 0.0) < 1.0 {
+        if self.ring {
+            "x_px*y_px"
+        } else if cycles(0, 0.0) < 1.0 {
             "y_px"
         } else if cycles(1, 0.0) < 1.0 {
             "x_px"
@@ -185,11 +190,20 @@ pub(crate) fn search(
     let as_left = || field([rx, ry]);
     let many = data.t_s.len() >= STARS_TO_TURN * data.frames.frames();
     if !many && turned.share() < TURNS_FEW {
-        return as_left().pattern(&as_left, folds, order);
+        return likeliest(as_left().patterns(&as_left, folds, order));
     }
-    let found = field(turned.known.each_ref()).pattern(&as_left, folds, order)?;
-    let power = field(turned.whole().each_ref()).power_at(found.wave)?;
-    (power > LEAST_OWN * found.power).then_some(found)
+    let mut found = field(turned.known.each_ref()).patterns(&as_left, folds, order);
+    if !found.is_empty() {
+        let whole = turned.whole();
+        let own = |pattern: &Pattern| field(whole.each_ref()).power_of(pattern);
+        found.retain(|pattern| own(pattern).is_some_and(|power| power > LEAST_OWN * pattern.power));
+    }
+    likeliest(found)
+}
+
+fn likeliest(found: Vec<Pattern>) -> Option<Pattern> {
+    let by_chance = |a: &Pattern, b: &Pattern| a.p_value.total_cmp(&b.p_value);
+    found.into_iter().min_by(by_chance)
 }
 
 /// Sums of the columns cos and sin, less the mean of each star, with each other and with
@@ -305,32 +319,42 @@ impl Field {
             .map(|r| r.iter().map(|v| v * v).sum::<f64>() / r.len() as f64)
     }
 
-    /// The power at a wave vector, without a search.
-    fn power_at(mut self, k: [f64; 2]) -> Option<f64> {
+    /// The power of a pattern, without a search.
+    fn power_of(mut self, pattern: &Pattern) -> Option<f64> {
         self.take_out_pixel_phase()?;
-        Some(self.sums(k).power(self.variance()))
+        if pattern.ring {
+            self.round();
+        }
+        Some(self.sums(pattern.wave).power(self.variance()))
     }
 
-    /// The whole search; amplitudes and the share they explain are those of the field `as_left`.
-    fn pattern(
+    /// The whole search, for a wave and for a ring; amplitudes and the share they explain are those of the field
+    /// `as_left`.
+    fn patterns(
         mut self,
         as_left: &dyn Fn() -> Self,
         folds: &Folds,
         order: Option<u32>,
-    ) -> Option<Pattern> {
+    ) -> Vec<Pattern> {
         let extent = self.extent();
-        if self.frame.is_empty() || extent.iter().any(|l| *l < LEAST_EXTENT_PX) {
-            return None;
+        let small = extent.iter().any(|l| *l < LEAST_EXTENT_PX);
+        if self.frame.is_empty() || small || self.take_out_pixel_phase().is_none() {
+            return Vec::new();
         }
-        self.take_out_pixel_phase()?;
+        let cycles = ORDERS * f64::from(order.unwrap_or(USUAL_ORDER).max(3));
+        let wave = self.wave(as_left, folds, &Own { extent, cycles });
+        // in place: there is no room for another
+        self.round();
+        let ring = self.ring(as_left, folds, cycles);
+        wave.into_iter().chain(ring).collect()
+    }
+
+    fn wave(&self, as_left: &dyn Fn() -> Self, folds: &Folds, own: &Own) -> Option<Pattern> {
+        let extent = own.extent;
         let variance = self.variance();
         if variance.iter().any(|v| v.is_nan() || *v <= 0.0) {
             return None;
         }
-        let own = Own {
-            extent,
-            cycles: ORDERS * f64::from(order.unwrap_or(USUAL_ORDER).max(3)),
-        };
         let power = |k: [f64; 2]| {
             let sums = self.sums(k);
             let moves = sums.normal.trace() / self.rows() as f64;
@@ -341,7 +365,7 @@ impl Field {
             }
         };
         let mut peaks: Vec<(f64, [f64; 2])> = self
-            .peaks(variance, &own)
+            .peaks(variance, own)
             .into_iter()
             .chain([[1.0, 1.0], [1.0, -1.0]])
             .map(|k| (power(k), k))
@@ -371,10 +395,12 @@ impl Field {
         if chance * trials >= SEARCH_ALPHA {
             return None;
         }
-        let p_value = trials * chance.max(self.chance_around(wave, variance, extent)?);
+        let p_value =
+            trials * chance.max(self.chance_around(wave, variance, extent, sunflower())?);
         let explained = as_left().share_out_of_fold(wave, folds)?;
         (p_value < SEARCH_ALPHA && explained > 0.0).then_some(Pattern {
             wave,
+            ring: false,
             power: best.0,
             p_value,
             explained,
@@ -478,8 +504,14 @@ impl Field {
         Some(hotelling(&frames)?.max(hotelling(&cells)?))
     }
 
-    /// The chance of the power at `k` where that around it is usual.
-    fn chance_around(&self, k: [f64; 2], variance: [f64; 2], extent: [f64; 2]) -> Option<f64> {
+    /// The chance of the power at `k` where that of wave vectors around it, cycles over the `extent` away, is usual.
+    fn chance_around(
+        &self,
+        k: [f64; 2],
+        variance: [f64; 2],
+        extent: [f64; 2],
+        away: impl Iterator<Item = [f64; 2]>,
+    ) -> Option<f64> {
         let sums = self.sums(k);
         let beta = sums.amplitudes()?;
         let mut left = self.clone();
@@ -492,19 +524,14 @@ impl Field {
                 }
             }
         }
-        // a sunflower of wave vectors 3 to 16 cycles over the extent away
-        let golden = PI * (3.0 - 5.0_f64.sqrt());
-        let around: f64 = (0..AROUND)
-            .map(|j| {
-                let r = 3.0 + 13.0 * ((j as f64 + 0.5) / AROUND as f64).sqrt();
-                let (s, c) = (golden * j as f64).sin_cos();
-                let near = [k[0] + r * c / extent[0], k[1] + r * s / extent[1]];
-                left.sums(near).power(variance)
-            })
-            .sum::<f64>()
-            / AROUND as f64;
-        let law = FisherSnedecor::new(4.0, 4.0 * AROUND as f64).ok()?;
-        Some(law.sf(sums.power(variance) / around))
+        let (mut around, mut count) = (0.0, 0.0);
+        for away in away {
+            let near = std::array::from_fn(|a| k[a] + away[a] / extent[a]);
+            around += left.sums(near).power(variance);
+            count += 1.0;
+        }
+        let law = FisherSnedecor::new(4.0, 4.0 * count).ok()?;
+        Some(law.sf(sums.power(variance) / (around / count)))
     }
 
     /// Share of the variance that the wave explains in each fold with the amplitudes of the others.
@@ -535,6 +562,16 @@ impl Field {
         let total: f64 = self.residual.iter().flatten().map(|r| r * r).sum();
         Some(gain / total)
     }
+}
+
+/// A sunflower of places 3 to 16 cycles away.
+fn sunflower() -> impl Iterator<Item = [f64; 2]> {
+    let golden = PI * (3.0 - 5.0_f64.sqrt());
+    (0..AROUND).map(move |j| {
+        let r = 3.0 + 13.0 * ((j as f64 + 0.5) / AROUND as f64).sqrt();
+        let (s, c) = (golden * j as f64).sin_cos();
+        [r * c, r * s]
+    })
 }
 
 /// The top of `power` near a wave vector: axis by axis that of a parabola through three points, a `step` apart, which

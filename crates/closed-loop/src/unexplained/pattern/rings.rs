@@ -1,0 +1,182 @@
+//! A pattern that is round about the boresight: zones of a lens, a ghost of its rim.
+//!
+//! What is left is split along and across the direction from the boresight, and searched for one wave along the radius,
+//!
+//! ```text
+//! r_a(rho) = c_a cos 2 pi k rho + s_a sin 2 pi k rho      a = outwards, across
+//! ```
+//!
+//! as waves across the detector are ([`super`]): the transform of the residuals on pixels of the radius, the strongest
+//! peaks once they have paid for their octave, the exact sums at these, the same three chances. Of waves along one line
+//! there are as many as cycles.
+//!
+//! Source: as of [`super`].
+
+use block_regression::Folds;
+use fourier::Complex;
+
+use super::{CHANCES, Field, LEAST_EXTENT_PX, LEAST_MOTION, Pattern, REFINED, climb};
+use crate::unexplained::SEARCH_ALPHA;
+
+/// Bins of the radius in a pixel: waves of up to a quarter of a cycle per pixel.
+const BINS: f64 = 0.5;
+/// Waves of the transform in a cycle over the extent.
+const FINER: usize = 4;
+/// Power of those 3 to 16 cycles away on each side is usual, at so many.
+const AROUND: usize = 27;
+
+impl Field {
+    /// Places become radii, and residuals those outwards and across.
+    pub(super) fn round(&mut self) {
+        let [outwards, across] = &mut self.residual;
+        for rows in &self.stars {
+            for row in rows.clone() {
+                let (x, y) = (self.x_px[row], self.y_px[row]);
+                let radius = x.hypot(y);
+                let (c, s) = if radius > 0.0 {
+                    (x / radius, y / radius)
+                } else {
+                    (1.0, 0.0)
+                };
+                let (rx, ry) = (outwards[row], across[row]);
+                (outwards[row], across[row]) = (c * rx + s * ry, c * ry - s * rx);
+                (self.x_px[row], self.y_px[row]) = (radius, 0.0);
+            }
+            // a mean along x and y is none outwards
+            for axis in [&mut *outwards, &mut *across] {
+                let mean = axis[rows.clone()].iter().sum::<f64>() / rows.len() as f64;
+                axis[rows.clone()].iter_mut().for_each(|r| *r -= mean);
+            }
+        }
+    }
+
+    /// The ring that is beyond doubt in a field that is [round](Self::round); the distortion has waves of fewer `cycles`
+    /// across the detector.
+    pub(super) fn ring(
+        &self,
+        as_left: &dyn Fn() -> Self,
+        folds: &Folds,
+        cycles: f64,
+    ) -> Option<Pattern> {
+        let variance = self.variance();
+        let [extent, _] = self.extent();
+        let none = variance.iter().any(|v| v.is_nan() || *v <= 0.0);
+        if none || extent < LEAST_EXTENT_PX {
+            return None;
+        }
+        // across the detector are two radii
+        let range = Range {
+            extent,
+            fewest: 0.5 * cycles,
+        };
+        let power = |[k, _]: [f64; 2]| {
+            let sums = self.sums([k, 0.0]);
+            let moves = sums.normal.trace() / self.rows() as f64;
+            if range.holds(k) && moves > LEAST_MOTION {
+                sums.power(variance)
+            } else {
+                0.0
+            }
+        };
+        let worth = |peak: &(f64, [f64; 2])| peak.0 - 2.0 * range.trials(peak.1[0]).ln();
+        let step = [0.25 / extent, 0.0];
+        let best = self
+            .ring_peaks(variance, range)
+            .into_iter()
+            .map(|k| climb(&power, (power([k, 0.0]), [k, 0.0]), step, 1))
+            .max_by(|a, b| worth(a).total_cmp(&worth(b)))?;
+        let (most, wave) = climb(&power, best, step.map(|s| 0.25 * s), 3);
+        let trials = range.trials(wave[0]);
+        if most < trials.ln() || !range.holds(wave[0]) {
+            return None;
+        }
+        let chance = self.chance(wave, folds)?;
+        if chance * trials >= SEARCH_ALPHA {
+            return None;
+        }
+        let away = (0..AROUND).flat_map(|j| {
+            let cycles = 3.0 + 13.0 * j as f64 / (AROUND - 1) as f64;
+            [[cycles, 0.0], [-cycles, 0.0]]
+        });
+        // a wave and its opposite are the same
+        let away = away.filter(|[c, _]| c + wave[0] * extent > 1.0);
+        let usual = self.chance_around(wave, variance, [extent; 2], away)?;
+        let p_value = trials * chance.max(usual);
+        let mut left = as_left();
+        left.round();
+        let explained = left.share_out_of_fold(wave, folds)?;
+        (p_value < SEARCH_ALPHA && explained > 0.0).then_some(Pattern {
+            wave,
+            ring: true,
+            power: most,
+            p_value,
+            explained,
+            extent: [extent; 2],
+        })
+    }
+
+    /// The waves that are worth most, cycles/px.
+    fn ring_peaks(&self, variance: [f64; 2], range: Range) -> Vec<f64> {
+        let low = self.x_px.iter().copied().fold(f64::INFINITY, f64::min);
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "bins from the lowest radius, of a detector"
+        )]
+        let bin = |at: f64| (BINS * (at - low)) as usize;
+        let n = (FINER * (bin(low + range.extent) + 1)).next_power_of_two();
+        let mut line = vec![Complex::new(0.0, 0.0); n];
+        let scale = variance.map(|v| v.sqrt().recip());
+        let mut rows_weighed = 0.0;
+        for (rows, weight) in self.stars.iter().zip(&self.weight) {
+            for row in rows.clone() {
+                let [out, across] = [0, 1].map(|a| weight * self.residual[a][row] * scale[a]);
+                line[bin(self.x_px[row])] += Complex::new(out, across);
+            }
+            rows_weighed += rows.len() as f64 * weight * weight;
+        }
+        fourier::forward(n).process(&mut line);
+        let mut peaks: Vec<(f64, f64)> = (1..n / 2)
+            .map(|j| {
+                let k = BINS * j as f64 / n as f64;
+                let power = (line[j].norm_sqr() + line[n - j].norm_sqr()) / rows_weighed;
+                (power - 2.0 * range.trials(k).ln(), k)
+            })
+            .filter(|(_, k)| range.holds(*k))
+            .collect();
+        peaks.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let mut waves: Vec<f64> = Vec::new();
+        for (_, k) in peaks {
+            if waves.len() < REFINED && waves.iter().all(|w| (w - k).abs() * range.extent > 0.75) {
+                waves.push(k);
+            }
+        }
+        waves
+    }
+}
+
+/// The waves along the radius that are looked for.
+#[derive(Clone, Copy, Debug)]
+struct Range {
+    /// Of the radii, px.
+    extent: f64,
+    /// Cycles over it.
+    fewest: f64,
+}
+
+impl Range {
+    fn holds(self, k: f64) -> bool {
+        k * self.extent >= self.fewest && k < 0.5 * BINS
+    }
+
+    /// Waves that one of its octave pays for, which share alike.
+    fn trials(self, k: f64) -> f64 {
+        let octaves = (0.5 * BINS * self.extent / self.fewest)
+            .log2()
+            .ceil()
+            .max(1.0);
+        let octave = (k * self.extent / self.fewest).log2().floor();
+        let longest = self.fewest * octave.clamp(0.0, octaves - 1.0).exp2();
+        (CHANCES * octaves * longest).max(1.0)
+    }
+}
