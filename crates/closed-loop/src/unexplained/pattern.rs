@@ -21,18 +21,17 @@
 //! distortion's length are not looked for. The four scores u (cos and sin, both axes) have
 //!
 //! ```text
-//! T^2 = u' V^-1 u,    V = sum over clusters u_c u_c',    P = 8 J K F(T^2 (G-4) / (4 (G-1)); 4, G-4)
+//! T^2 = u' V^-1 u,    V = sum over clusters u_c u_c',    P = 32 J K F(T^2 (G-4) / (4 (G-1)); 4, G-4)
 //! ```
 //!
-//! with K independent wave vectors in the octave of k, of J octaves from the distortion's waves to one cycle per pixel, 8
-//! for the top between them, and G clusters: frames in one covariance, cells of star and
+//! with K independent wave vectors in the octave of k, of J octaves from the distortion's waves to one cycle per pixel
+//! ([`octaves`]), and G clusters: frames in one covariance, cells of star and
 //! block of time in another. So a wave of five cycles across the detector, of which there are few, does not pay for a
-//! million fringes. A third P is that of the power over the mean power around k,
+//! million fringes. A third P is that of the power over the mean power of waves as long, and up to twice,
 //! once the wave is taken out. The largest of the three counts.
 //!
 //! Source: Scargle 1982 (periodogram); Hotelling 1931; Liang and Zeger 1986 (clusters).
 
-use std::f64::consts::PI;
 use std::ops::Range;
 
 use block_regression::Folds;
@@ -45,6 +44,7 @@ use telemetry::report::{Dependence, Unattributed};
 use crate::star::data::StarData;
 use crate::unexplained::SEARCH_ALPHA;
 
+mod octaves;
 mod pixel_phase;
 mod rings;
 #[cfg(test)]
@@ -53,6 +53,7 @@ mod transform;
 mod turn;
 mod waves;
 
+use octaves::{Others, Own};
 pub(crate) use turn::Turned;
 use waves::{RAW, RawSums, wave};
 
@@ -60,14 +61,10 @@ use waves::{RAW, RawSums, wave};
 const REFINED: usize = 6;
 /// How often the middle of three points moves before they come closer, at most.
 const MOST_MOVES: usize = 4;
-/// Chances of a top for each independent wave vector.
-const CHANCES: f64 = 8.0;
 /// Waves fewer than this times the distortion's order across the detector are its own.
 const ORDERS: f64 = 0.5;
 /// The order where none is declared.
 const USUAL_ORDER: u32 = 7;
-/// Cycles over the extent within which a wave is one of pixel phase.
-const PHASE_GUARD: f64 = 3.0;
 /// Share of a wave's power that rotations of whole frames must leave: they take a half of a wave at
 /// most, but all of what a slow error of the reference leaves along the stars' paths.
 const LEAST_OWN: f64 = 0.4;
@@ -75,8 +72,6 @@ const LEAST_OWN: f64 = 0.4;
 const LEAST_MOTION: f64 = 0.1;
 /// Fewest clusters of a covariance.
 const LEAST_CLUSTERS: usize = 40;
-/// Wave vectors that the mean power around the peak is of.
-const AROUND: usize = 64;
 /// From this many stars a frame on, what the reference turns a frame by is left out; of fewer, whose rotation takes
 /// most of a wave, where it is so much of all.
 const STARS_TO_TURN: usize = 5;
@@ -396,7 +391,7 @@ impl Field {
             return None;
         }
         let p_value =
-            trials * chance.max(self.chance_around(wave, variance, extent, sunflower())?);
+            trials * chance.max(self.chance_around(wave, variance, &own.as_long_as(wave))?);
         let explained = as_left().share_out_of_fold(wave, folds)?;
         (p_value < SEARCH_ALPHA && explained > 0.0).then_some(Pattern {
             wave,
@@ -504,14 +499,8 @@ impl Field {
         Some(hotelling(&frames)?.max(hotelling(&cells)?))
     }
 
-    /// The chance of the power at `k` where that of wave vectors around it, cycles over the `extent` away, is usual.
-    fn chance_around(
-        &self,
-        k: [f64; 2],
-        variance: [f64; 2],
-        extent: [f64; 2],
-        away: impl Iterator<Item = [f64; 2]>,
-    ) -> Option<f64> {
+    /// The chance of the power at `k` where that of `others` is usual.
+    fn chance_around(&self, k: [f64; 2], variance: [f64; 2], others: &Others) -> Option<f64> {
         let sums = self.sums(k);
         let beta = sums.amplitudes()?;
         let mut left = self.clone();
@@ -524,14 +513,9 @@ impl Field {
                 }
             }
         }
-        let (mut around, mut count) = (0.0, 0.0);
-        for away in away {
-            let near = std::array::from_fn(|a| k[a] + away[a] / extent[a]);
-            around += left.sums(near).power(variance);
-            count += 1.0;
-        }
-        let law = FisherSnedecor::new(4.0, 4.0 * count).ok()?;
-        Some(law.sf(sums.power(variance) / (around / count)))
+        let waves = others.waves.iter();
+        let powers: Vec<f64> = waves.map(|k| left.sums(*k).power(variance)).collect();
+        others.chance(sums.power(variance), &powers)
     }
 
     /// Share of the variance that the wave explains in each fold with the amplitudes of the others.
@@ -562,16 +546,6 @@ impl Field {
         let total: f64 = self.residual.iter().flatten().map(|r| r * r).sum();
         Some(gain / total)
     }
-}
-
-/// A sunflower of places 3 to 16 cycles away.
-fn sunflower() -> impl Iterator<Item = [f64; 2]> {
-    let golden = PI * (3.0 - 5.0_f64.sqrt());
-    (0..AROUND).map(move |j| {
-        let r = 3.0 + 13.0 * ((j as f64 + 0.5) / AROUND as f64).sqrt();
-        let (s, c) = (golden * j as f64).sin_cos();
-        [r * c, r * s]
-    })
 }
 
 /// The top of `power` near a wave vector: axis by axis that of a parabola through three points, a `step` apart, which
@@ -613,55 +587,6 @@ fn climb(
         step = step.map(|s| 0.25 * s);
     }
     best
-}
-
-/// Wave vectors that others own.
-#[derive(Clone, Copy, Debug)]
-struct Own {
-    extent: [f64; 2],
-    /// Cycles over the extent that the distortion may have.
-    cycles: f64,
-}
-
-impl Own {
-    /// Squared cycles of a wave over the extent, in units of the longest that is looked for.
-    fn scale(&self, k: [f64; 2]) -> f64 {
-        let cycles = |a: usize| k[a] * self.extent[a];
-        (cycles(0).powi(2) + cycles(1).powi(2)) / self.cycles.powi(2)
-    }
-
-    /// Octaves up to one cycle per pixel along both axes.
-    fn octaves(&self) -> f64 {
-        (0.5 * self.scale([1.0, 1.0]).log2()).ceil().max(1.0)
-    }
-
-    /// The octave of a wave.
-    fn octave(&self, k: [f64; 2]) -> f64 {
-        let octave = (0.5 * self.scale(k).log2()).floor();
-        octave.clamp(0.0, self.octaves() - 1.0)
-    }
-
-    /// Wave vectors that one of this octave pays for: see the module.
-    fn trials(&self, k: [f64; 2]) -> f64 {
-        let all = 2.0 * self.extent[0] * self.extent[1];
-        let longest = self.cycles * self.octave(k).exp2();
-        // between two half circles, but for what lies beyond a cycle per pixel
-        let vectors = (1.5 * PI * longest * longest).min(all);
-        (CHANCES * self.octaves() * vectors).max(1.0)
-    }
-
-    fn excludes(&self, k: [f64; 2]) -> bool {
-        let within = |x: f64, y: f64, cycles: f64| {
-            let (x, y) = (
-                (k[0].abs() - x) * self.extent[0],
-                (k[1].abs() - y) * self.extent[1],
-            );
-            x * x + y * y < cycles * cycles
-        };
-        within(0.0, 0.0, self.cycles)
-            || within(1.0, 0.0, PHASE_GUARD)
-            || within(0.0, 1.0, PHASE_GUARD)
-    }
 }
 
 fn block_of_frame(folds: &Folds) -> Vec<usize> {

@@ -3,30 +3,39 @@
 //! What is left is split along and across the direction from the boresight, and searched for one wave along the radius,
 //!
 //! ```text
-//! r_a(rho) = c_a cos 2 pi k rho + s_a sin 2 pi k rho      a = outwards, across
+//! r_a(rho) = c_a cos 2 pi k rho + s_a sin 2 pi k rho      a = outwards, across; rho, phi: radius, px, and angle, turns
 //! ```
 //!
 //! as waves across the detector are ([`super`]): the transform of the residuals on pixels of the radius, the strongest
 //! peaks once they have paid for their octave, the exact sums at these, the same three chances. Of waves along one line
-//! there are as many as cycles.
+//! there are as many as cycles. What power is usual tell spirals,
+//!
+//! ```text
+//! cos 2 pi (k rho + m phi)              m = 2 to 9 turns either way, k as of the ring or a cycle more or less
+//! ```
+//!
+//! which no ring holds.
 //!
 //! Source: as of [`super`].
+
+use core::f64::consts::TAU;
 
 use block_regression::Folds;
 use fourier::Complex;
 
-use super::{CHANCES, Field, LEAST_EXTENT_PX, LEAST_MOTION, Pattern, REFINED, climb};
+use super::octaves::{CHANCES, Others};
+use super::{Field, LEAST_EXTENT_PX, LEAST_MOTION, Pattern, REFINED, climb};
 use crate::unexplained::SEARCH_ALPHA;
 
 /// Bins of the radius in a pixel: waves of up to a quarter of a cycle per pixel.
 const BINS: f64 = 0.5;
 /// Waves of the transform in a cycle over the extent.
 const FINER: usize = 4;
-/// Power of those 3 to 16 cycles away on each side is usual, at so many.
-const AROUND: usize = 27;
+/// Turns of the spirals whose power is usual.
+const TURNS: std::ops::RangeInclusive<i32> = 2..=9;
 
 impl Field {
-    /// Places become radii, and residuals those outwards and across.
+    /// Places become radii and angles, and residuals those outwards and across.
     pub(super) fn round(&mut self) {
         let [outwards, across] = &mut self.residual;
         for rows in &self.stars {
@@ -40,7 +49,7 @@ impl Field {
                 };
                 let (rx, ry) = (outwards[row], across[row]);
                 (outwards[row], across[row]) = (c * rx + s * ry, c * ry - s * rx);
-                (self.x_px[row], self.y_px[row]) = (radius, 0.0);
+                (self.x_px[row], self.y_px[row]) = (radius, y.atan2(x) / TAU);
             }
             // a mean along x and y is none outwards
             for axis in [&mut *outwards, &mut *across] {
@@ -94,13 +103,7 @@ impl Field {
         if chance * trials >= SEARCH_ALPHA {
             return None;
         }
-        let away = (0..AROUND).flat_map(|j| {
-            let cycles = 3.0 + 13.0 * j as f64 / (AROUND - 1) as f64;
-            [[cycles, 0.0], [-cycles, 0.0]]
-        });
-        // a wave and its opposite are the same
-        let away = away.filter(|[c, _]| c + wave[0] * extent > 1.0);
-        let usual = self.chance_around(wave, variance, [extent; 2], away)?;
+        let usual = self.chance_around(wave, variance, &range.spirals(wave[0]))?;
         let p_value = trials * chance.max(usual);
         let mut left = as_left();
         left.round();
@@ -167,6 +170,19 @@ struct Range {
 impl Range {
     fn holds(self, k: f64) -> bool {
         k * self.extent >= self.fewest && k < 0.5 * BINS
+    }
+
+    /// Spirals of such a wave.
+    fn spirals(self, k: f64) -> Others {
+        let waves = TURNS.flat_map(|m| [m, -m]).flat_map(|turns| {
+            let cycles = [-1.0, 0.0, 1.0];
+            cycles.map(|more| [k + more / self.extent, f64::from(turns)])
+        });
+        let waves: Vec<[f64; 2]> = waves.collect();
+        Others {
+            independent: waves.len() as f64,
+            waves,
+        }
     }
 
     /// Waves that one of its octave pays for, which share alike.
