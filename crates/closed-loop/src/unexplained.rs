@@ -4,7 +4,7 @@
 //! leftover        lines and jumps in time, of what all rows of a frame share
 //! star_series     lines and steps in time, of each star by itself
 //! star_freedom    how many numbers those stars tell
-//! pattern         a wave on the detector, of any direction and pitch
+//! pattern         a wave on the detector, of any direction and pitch, or rings about the boresight
 //! ```
 //!
 //! What it follows among the measured variables is described while causes are named

@@ -101,6 +101,8 @@ pub(crate) struct Pattern {
     pub(crate) wave: [f64; 2],
     /// Whether it is round about the boresight.
     ring: bool,
+    /// What p pays for.
+    trials: f64,
     pub(crate) p_value: f64,
     /// Squares that the wave takes, in units of each axis' variance.
     power: f64,
@@ -190,8 +192,12 @@ pub(crate) fn search(
     let mut found = field(turned.known.each_ref()).patterns(&as_left, folds, order);
     if !found.is_empty() {
         let whole = turned.whole();
-        let own = |pattern: &Pattern| field(whole.each_ref()).power_of(pattern);
-        found.retain(|pattern| own(pattern).is_some_and(|power| power > LEAST_OWN * pattern.power));
+        let own = |pattern: &Pattern| field(whole.each_ref()).power_and_chance_of(pattern, folds);
+        found.retain(|pattern| {
+            own(pattern).is_some_and(|(power, chance)| {
+                power > LEAST_OWN * pattern.power && chance * pattern.trials < SEARCH_ALPHA
+            })
+        });
     }
     likeliest(found)
 }
@@ -314,13 +320,14 @@ impl Field {
             .map(|r| r.iter().map(|v| v * v).sum::<f64>() / r.len() as f64)
     }
 
-    /// The power of a pattern, without a search.
-    fn power_of(mut self, pattern: &Pattern) -> Option<f64> {
+    /// The power of a pattern, and the chance of its scores, without a search.
+    fn power_and_chance_of(mut self, pattern: &Pattern, folds: &Folds) -> Option<(f64, f64)> {
         self.take_out_pixel_phase()?;
         if pattern.ring {
             self.round();
         }
-        Some(self.sums(pattern.wave).power(self.variance()))
+        let power = self.sums(pattern.wave).power(self.variance());
+        Some((power, self.chance(pattern.wave, folds)?))
     }
 
     /// The whole search, for a wave and for a ring; amplitudes and the share they explain are those of the field
@@ -396,6 +403,7 @@ impl Field {
         (p_value < SEARCH_ALPHA && explained > 0.0).then_some(Pattern {
             wave,
             ring: false,
+            trials,
             power: best.0,
             p_value,
             explained,

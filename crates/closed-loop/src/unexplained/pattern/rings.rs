@@ -111,6 +111,7 @@ impl Field {
         (p_value < SEARCH_ALPHA && explained > 0.0).then_some(Pattern {
             wave,
             ring: true,
+            trials,
             power: most,
             p_value,
             explained,

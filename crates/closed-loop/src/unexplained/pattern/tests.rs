@@ -229,6 +229,7 @@ fn the_list_stays_sorted_and_keeps_what_explains_more() {
         power: 100.0,
         wave: [0.1, 0.0],
         ring: false,
+        trials: 1.0,
         p_value: 1e-9,
         explained,
         extent: [SIDE; 2],
