@@ -31,6 +31,9 @@ use crate::unexplained::SEARCH_ALPHA;
 const BINS: f64 = 0.5;
 /// Waves of the transform in a cycle over the extent.
 const FINER: usize = 4;
+/// A peak of the transform grows by less than this where it is refined: a quarter of a cycle at most loses
+/// 1 - sinc^2(1/4) = 0.19.
+const REFINES: f64 = 1.25;
 /// Turns of the spirals whose power is usual.
 const TURNS: std::ops::RangeInclusive<i32> = 2..=9;
 
@@ -89,14 +92,22 @@ impl Field {
         };
         let worth = |peak: &(f64, [f64; 2])| peak.0 - 2.0 * range.trials(peak.1[0]).ln();
         let step = [0.25 / extent, 0.0];
-        let best = self
-            .ring_peaks(variance, range)
+        let better = |a: &(f64, [f64; 2]), b: &(f64, [f64; 2])| worth(a).total_cmp(&worth(b));
+        let peaks = self.ring_peaks(variance, range).into_iter();
+        let peaks: Vec<_> = peaks.map(|k| (power([k, 0.0]), [k, 0.0])).collect();
+        let &(most, k) = peaks.iter().max_by(|a, b| better(a, b))?;
+        // chi-squared of 4, of which no covariance makes more
+        let x = 0.5 * REFINES * most;
+        if (1.0 + x) * (-x).exp() * range.trials(k[0]) >= SEARCH_ALPHA {
+            return None;
+        }
+        let best = peaks
             .into_iter()
-            .map(|k| climb(&power, (power([k, 0.0]), [k, 0.0]), step, 1))
-            .max_by(|a, b| worth(a).total_cmp(&worth(b)))?;
+            .map(|peak| climb(&power, peak, step, 1))
+            .max_by(better)?;
         let (most, wave) = climb(&power, best, step.map(|s| 0.25 * s), 3);
         let trials = range.trials(wave[0]);
-        if most < trials.ln() || !range.holds(wave[0]) {
+        if !range.holds(wave[0]) {
             return None;
         }
         let chance = self.chance(wave, folds)?;
