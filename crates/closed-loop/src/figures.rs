@@ -110,8 +110,17 @@ pub(crate) fn amplitudes_of(
     set: &[usize],
     estimate: &block_regression::Estimate,
 ) -> (Vec<f64>, DMatrix<f64>) {
-    let first = first_column(&found.candidates, g);
     let p = found.candidates[g].coefficients().len();
+    amplitudes_from(first_column(&found.candidates, g), p, set, estimate)
+}
+
+/// The same of the `p` columns from `first` on.
+pub(crate) fn amplitudes_from(
+    first: usize,
+    p: usize,
+    set: &[usize],
+    estimate: &block_regression::Estimate,
+) -> (Vec<f64>, DMatrix<f64>) {
     let at: Vec<Option<usize>> = (0..p)
         .map(|j| set.iter().position(|&c| c == first + j))
         .collect();

@@ -18,6 +18,7 @@ use nalgebra::Vector3;
 use star_tracker::{Disturbance, Stages};
 
 use crate::candidate::check_columns;
+use crate::shift::sizes;
 use crate::{
     AttitudeRows, Candidate, Coefficient, Effect, EffectError, Nonlinear, Parameter, StarRows,
     Surroundings,
@@ -87,13 +88,7 @@ impl<B: Bending> Effect for Bent<B> {
         self.bending.id()
     }
     fn parameters(&self) -> Vec<Parameter> {
-        let mut all: Vec<Parameter> = self
-            .bending
-            .coefficients()
-            .into_iter()
-            .zip(&self.values)
-            .map(|(c, &value)| Parameter::new(c.name, value, c.unit))
-            .collect();
+        let mut all = sizes(self.bending.coefficients(), &self.values);
         all.extend(self.bending.fixed());
         all
     }

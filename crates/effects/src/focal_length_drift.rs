@@ -19,7 +19,7 @@ use star_tracker::StarView;
 
 use crate::channels::{self, Ending};
 use crate::parameters::Reader;
-use crate::shift::{Shift, ShiftCandidate, Shifted};
+use crate::shift::{Shift, ShiftCandidate, Shifted, sizes};
 use crate::{
     ActsOn, Candidate, Coefficient, Effect, EffectError, EffectKind, Parameter, Parameters, Scene,
     Surroundings,
@@ -168,10 +168,7 @@ impl Shift for Drift {
         out[0] = [1e-6 * cause * star.at.x, 1e-6 * cause * star.at.y];
     }
     fn parameters(&self, values: &[f64]) -> Vec<Parameter> {
-        let size = self.coefficients().into_iter().zip(values);
-        let mut all: Vec<Parameter> = size
-            .map(|(c, &value)| Parameter::new(c.name, value, c.unit))
-            .collect();
+        let mut all = sizes(self.coefficients(), values);
         if let Self::Time {
             from_s: Some(from_s),
             ..

@@ -52,11 +52,7 @@ pub(crate) trait Shift: Clone + Debug + Send + Sync + 'static {
     }
     /// Reported parameters of these values.
     fn parameters(&self, values: &[f64]) -> Vec<Parameter> {
-        self.coefficients()
-            .into_iter()
-            .zip(values)
-            .map(|(c, &value)| Parameter::new(c.name, value, c.unit))
-            .collect()
+        sizes(self.coefficients(), values)
     }
     /// What tells it from others of its kind.
     fn selectors(&self) -> BTreeMap<String, String> {
@@ -83,6 +79,13 @@ pub(crate) trait Shift: Clone + Debug + Send + Sync + 'static {
         let _ = parts;
         None
     }
+}
+
+/// Each coefficient as a parameter.
+pub(crate) fn sizes(coefficients: Vec<Coefficient>, values: &[f64]) -> Vec<Parameter> {
+    let each = coefficients.into_iter().zip(values);
+    each.map(|(c, &value)| Parameter::new(c.name, value, c.unit))
+        .collect()
 }
 
 /// A shift with its values.

@@ -25,6 +25,7 @@ use telemetry::report::ConsideredEffect;
 
 use crate::error::CloseError;
 use crate::evidence::Evidence;
+use crate::figures::amplitudes_from;
 use crate::search::selection::columns_of;
 use crate::search::{Fitted, Found, fit};
 use crate::unexplained::leftover::Track;
@@ -340,10 +341,8 @@ impl Beside<'_> {
             let Some(estimate) = fitted.fits.estimate(&with) else {
                 break;
             };
-            let mut values = vec![0.0; orbit.coefficients().len()];
-            for (i, &column) in fitted.groups[0].columns.iter().enumerate() {
-                values[column] = estimate.value[i];
-            }
+            let count = orbit.coefficients().len();
+            let (values, _) = amplitudes_from(0, count, &with, &estimate);
             let Some(better) = orbit.refined(&values) else {
                 break;
             };

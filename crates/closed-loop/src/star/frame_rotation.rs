@@ -104,8 +104,7 @@ impl Turns {
             let beyond: f64 = known()
                 .map(|t| t.theta[a].powi(2) / t.variance[a] - noise)
                 .sum();
-            let information: f64 = known().map(|t| t.variance[a].recip()).sum();
-            (beyond / information).max(0.0)
+            (beyond / information(&frames, a)).max(0.0)
         });
         Self {
             frames,
@@ -116,10 +115,15 @@ impl Turns {
 
     /// Sigma of the reference's variance about an axis where all there is is the stars' own noise, arcsec^2.
     pub(crate) fn chance(&self, axis: usize) -> f64 {
-        let known = || self.frames.iter().flatten();
-        let information: f64 = known().map(|t| t.variance[axis].recip()).sum();
-        self.noise * (2.0 * known().count() as f64).sqrt() / information
+        let known = self.frames.iter().flatten().count();
+        self.noise * (2.0 * known as f64).sqrt() / information(&self.frames, axis)
     }
+}
+
+/// What the stars of all frames say of an axis where a row of weight 1 has variance 1.
+fn information(frames: &[Option<Turn>], axis: usize) -> f64 {
+    let known = frames.iter().flatten();
+    known.map(|t| t.variance[axis].recip()).sum()
 }
 
 /// Whether a row says anything of its frame's rotation.

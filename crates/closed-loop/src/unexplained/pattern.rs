@@ -393,21 +393,42 @@ impl Field {
             return None;
         }
         let trials = own.trials(wave);
-        let chance = self.chance(wave, folds)?;
-        if chance * trials >= SEARCH_ALPHA {
-            return None;
-        }
-        let p_value =
-            trials * chance.max(self.chance_around(wave, variance, &own.as_long_as(wave))?);
-        let explained = as_left().share_out_of_fold(wave, folds)?;
-        (p_value < SEARCH_ALPHA && explained > 0.0).then_some(Pattern {
+        let found = Pattern {
             wave,
             ring: false,
             trials,
             power: best.0,
+            p_value: 1.0,
+            explained: 0.0,
+            extent,
+        };
+        self.beyond_doubt(found, || own.as_long_as(wave), as_left, folds)
+    }
+
+    /// `found` with its chance, and what it explains of the field `as_left`; `None` where it may be chance, or explains
+    /// nothing. `others` are waves like it.
+    fn beyond_doubt(
+        &self,
+        found: Pattern,
+        others: impl FnOnce() -> Others,
+        as_left: &dyn Fn() -> Self,
+        folds: &Folds,
+    ) -> Option<Pattern> {
+        let chance = self.chance(found.wave, folds)?;
+        if chance * found.trials >= SEARCH_ALPHA {
+            return None;
+        }
+        let usual = self.chance_around(found.wave, self.variance(), &others())?;
+        let p_value = found.trials * chance.max(usual);
+        let mut left = as_left();
+        if found.ring {
+            left.round();
+        }
+        let explained = left.share_out_of_fold(found.wave, folds)?;
+        (p_value < SEARCH_ALPHA && explained > 0.0).then_some(Pattern {
             p_value,
             explained,
-            extent,
+            ..found
         })
     }
 

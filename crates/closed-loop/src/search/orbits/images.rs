@@ -16,12 +16,12 @@ use std::sync::Arc;
 
 use block_regression::Folds;
 use effects::{Candidate, Parameter, Surroundings, free_orbit, nearest_circles};
-use nalgebra::DMatrix;
 use telemetry::report::FoundEffect;
 
 use super::{ABERRATION, period_s, velocities};
 use crate::error::CloseError;
 use crate::evidence::Evidence;
+use crate::figures::amplitudes_from;
 use crate::search::selection::columns_of;
 use crate::search::{Found, fit, without};
 
@@ -122,16 +122,8 @@ impl Among<'_> {
             else {
                 break;
             };
-            let own = &fitted.groups[0].columns;
-            let n = orbit.coefficients().len();
-            let spread = estimate.cautious_covariance();
-            let at = |column: usize| own.iter().position(|&c| c == column);
-            let values: Vec<f64> = (0..n)
-                .map(|c| at(c).map_or(0.0, |i| estimate.value[i]))
-                .collect();
-            let covariance = DMatrix::from_fn(n, n, |i, j| {
-                at(i).zip(at(j)).map_or(0.0, |(i, j)| spread[(i, j)])
-            });
+            let count = orbit.coefficients().len();
+            let (values, covariance) = amplitudes_from(0, count, &set, &estimate);
             let candidate = orbit.as_ref();
             let parameters =
                 effects::reported(candidate, &values, covariance.as_view(), self.surroundings)?;

@@ -25,8 +25,8 @@ use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 pub(super) const CHANCES: f64 = 8.0 * 4.0;
 /// Cycles over the extent within which a wave is one of pixel phase.
 const PHASE_GUARD: f64 = 3.0;
-/// Wave vectors that the mean power of such waves is of, half of them twice.
-const AROUND: usize = 64;
+/// Wave vectors that the mean power of such waves is of: each and its opposite are one.
+const AROUND: usize = 128;
 /// From which to which part of the cycles of a wave they are, and further from it than how many.
 const SHORTER: f64 = 0.5;
 const LONGER: f64 = 1.1;
@@ -73,8 +73,8 @@ impl Own {
         let (least, most) = (self.cycles.max(SHORTER * longest), LONGER * longest);
         let golden = PI * (3.0 - 5.0_f64.sqrt());
         let squares = |part: f64| least * least + part * (most * most - least * least);
-        let all = (0..2 * AROUND).map(|j| {
-            let r = squares((j as f64 + 0.5) / (2 * AROUND) as f64).sqrt();
+        let all = (0..AROUND).map(|j| {
+            let r = squares((j as f64 + 0.5) / AROUND as f64).sqrt();
             let (s, c) = (golden * j as f64).sin_cos();
             [r * c / self.extent[0], r * s / self.extent[1]]
         });

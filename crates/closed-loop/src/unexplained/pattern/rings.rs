@@ -110,24 +110,16 @@ impl Field {
         if !range.holds(wave[0]) {
             return None;
         }
-        let chance = self.chance(wave, folds)?;
-        if chance * trials >= SEARCH_ALPHA {
-            return None;
-        }
-        let usual = self.chance_around(wave, variance, &range.spirals(wave[0]))?;
-        let p_value = trials * chance.max(usual);
-        let mut left = as_left();
-        left.round();
-        let explained = left.share_out_of_fold(wave, folds)?;
-        (p_value < SEARCH_ALPHA && explained > 0.0).then_some(Pattern {
+        let found = Pattern {
             wave,
             ring: true,
             trials,
             power: most,
-            p_value,
-            explained,
+            p_value: 1.0,
+            explained: 0.0,
             extent: [extent; 2],
-        })
+        };
+        self.beyond_doubt(found, || range.spirals(wave[0]), as_left, folds)
     }
 
     /// The waves that are worth most, cycles/px.
@@ -142,19 +134,18 @@ impl Field {
         let n = (FINER * (bin(low + range.extent) + 1)).next_power_of_two();
         let mut line = vec![Complex::new(0.0, 0.0); n];
         let scale = variance.map(|v| v.sqrt().recip());
-        let mut rows_weighed = 0.0;
         for (rows, weight) in self.stars.iter().zip(&self.weight) {
             for row in rows.clone() {
                 let [out, across] = [0, 1].map(|a| weight * self.residual[a][row] * scale[a]);
                 line[bin(self.x_px[row])] += Complex::new(out, across);
             }
-            rows_weighed += rows.len() as f64 * weight * weight;
         }
         fourier::forward(n).process(&mut line);
+        let rows = self.weighed_rows();
         let mut peaks: Vec<(f64, f64)> = (1..n / 2)
             .map(|j| {
                 let k = BINS * j as f64 / n as f64;
-                let power = (line[j].norm_sqr() + line[n - j].norm_sqr()) / rows_weighed;
+                let power = (line[j].norm_sqr() + line[n - j].norm_sqr()) / rows;
                 (power - 2.0 * range.trials(k).ln(), k)
             })
             .filter(|(_, k)| range.holds(*k))

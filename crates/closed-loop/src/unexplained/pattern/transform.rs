@@ -85,7 +85,7 @@ impl Field {
     }
 
     /// Squares of the weights: rows, if each counts alike.
-    fn weighed_rows(&self) -> f64 {
+    pub(super) fn weighed_rows(&self) -> f64 {
         let each = self.stars.iter().zip(&self.weight);
         each.map(|(rows, w)| rows.len() as f64 * w * w).sum()
     }
