@@ -50,68 +50,97 @@ impl Coloured {
         tau_s: 1.0,
     };
 
-    /// The filter's decay, gain and 1/sqrt(innovation variance) at each row; a row
-    /// that counts for nothing has gain 0 and weight 0.
-    fn gains(&self, t_s: &[f64], count: &[f64]) -> Vec<[f64; 3]> {
+    /// Goes through the rows: the decay up to each, and the filter at those that count.
+    #[inline]
+    fn filter(&self, t_s: &[f64], count: &[f64], mut row: impl FnMut(usize, f64, Option<Step>)) {
         let (r, s) = (self.white * self.white, self.slow * self.slow);
-        let mut variance = s;
-        let mut out = Vec::with_capacity(t_s.len());
+        let (mut variance, mut last_s) = (s, f64::NEG_INFINITY);
         let mut known = Known::default();
-        for k in 0..t_s.len() {
-            let step = if k == 0 {
-                f64::INFINITY
-            } else {
-                t_s[k] - t_s[k - 1]
-            };
-            let decay = known.decay(step, self.tau_s);
-            variance = decay * decay * variance + s * (1.0 - decay * decay);
-            if count[k] <= 0.0 {
-                out.push([decay, 0.0, 0.0]);
-                continue;
-            }
-            let innovation = variance + r / count[k];
-            let gain = variance / innovation;
-            out.push([decay, gain, 1.0 / innovation.sqrt()]);
-            variance *= 1.0 - gain;
-        }
-        out
-    }
-
-    /// Log-likelihood of `y`, nats.
-    pub fn log_likelihood(&self, t_s: &[f64], y: &[f64], count: &[f64]) -> f64 {
-        let Sums {
-            squares,
-            determinant,
-            kept,
-        } = self.sums(t_s, y, count);
-        -0.5 * (squares + determinant + kept * std::f64::consts::TAU.ln())
-    }
-
-    fn sums(&self, t_s: &[f64], y: &[f64], count: &[f64]) -> Sums {
-        let (r, s) = (self.white * self.white, self.slow * self.slow);
-        let (mut variance, mut mean, mut last_s) = (s, 0.0, f64::NEG_INFINITY);
-        let (mut squares, mut kept) = (0.0, 0.0);
-        let mut determinant = LogProduct::default();
-        let mut known = Known::default();
-        for ((&t_s, &y), &count) in t_s.iter().zip(y).zip(count) {
+        for (k, (&t_s, &count)) in t_s.iter().zip(count).enumerate() {
             let decay = known.decay(t_s - last_s, self.tau_s);
             last_s = t_s;
             let square = decay * decay;
             variance = square * variance + s * (1.0 - square);
-            mean *= decay;
             if count <= 0.0 {
+                row(k, decay, None);
                 continue;
             }
             let innovation = variance + r / count;
             let inverse = 1.0 / innovation;
             let gain = variance * inverse;
-            let e = y - mean;
-            mean += gain * e;
+            row(
+                k,
+                decay,
+                Some(Step {
+                    gain,
+                    innovation,
+                    inverse,
+                }),
+            );
             variance *= 1.0 - gain;
-            squares += e * e * inverse;
-            determinant.times(innovation);
-            kept += 1.0;
         }
+    }
+
+    /// The filter's decay, gain and 1/sqrt(innovation variance) at each row; a row
+    /// that counts for nothing has gain 0 and weight 0.
+    fn gains(&self, t_s: &[f64], count: &[f64]) -> Vec<[f64; 3]> {
+        let mut out = Vec::with_capacity(t_s.len());
+        self.filter(t_s, count, |_, decay, step| {
+            let [gain, weight] = step.map_or([0.0; 2], |s| [s.gain, 1.0 / s.innovation.sqrt()]);
+            out.push([decay, gain, weight]);
+        });
+        out
+    }
+
+    /// Log-likelihood of `y`, nats.
+    pub fn log_likelihood(&self, t_s: &[f64], y: &[f64], count: &[f64]) -> f64 {
+        let sums = self.sums(t_s, count, |k| [y[k]]);
+        sums.log_likelihood(sums.squares[0][0], sums.kept)
+    }
+
+    /// That of what `y` tells beside a constant, of which nothing is known: what is fitted of a slow error by its own
+    /// mean makes it look smaller and shorter than it is.
+    ///
+    /// ```text
+    /// ln L_R = ln L(y - m) - 1/2 ln(1' V^-1 1 / 2 pi)        m = 1' V^-1 y / 1' V^-1 1
+    /// ```
+    ///
+    /// Source: restricted likelihood, Patterson & Thompson 1971.
+    pub fn log_likelihood_beside_constant(&self, t_s: &[f64], y: &[f64], count: &[f64]) -> f64 {
+        let sums = self.sums(t_s, count, |k| [y[k], 1.0]);
+        let [[y, both], [_, one]] = sums.squares;
+        if one <= 0.0 {
+            return sums.log_likelihood(y, sums.kept);
+        }
+        sums.log_likelihood(y - both * both / one, sums.kept - 1.0) - 0.5 * one.ln()
+    }
+
+    /// Products of whitened series with each other, and what else a likelihood is made of.
+    #[inline]
+    fn sums<const N: usize>(
+        &self,
+        t_s: &[f64],
+        count: &[f64],
+        of: impl Fn(usize) -> [f64; N],
+    ) -> Sums<N> {
+        let mut mean = [0.0; N];
+        let mut squares = [[0.0; N]; N];
+        let mut determinant = LogProduct::default();
+        let mut kept = 0.0;
+        self.filter(t_s, count, |k, decay, step| {
+            mean.iter_mut().for_each(|m| *m *= decay);
+            let Some(step) = step else { return };
+            let of = of(k);
+            let e: [f64; N] = std::array::from_fn(|i| of[i] - mean[i]);
+            for i in 0..N {
+                mean[i] += step.gain * e[i];
+                for j in i..N {
+                    squares[i][j] += e[i] * e[j] * step.inverse;
+                }
+            }
+            determinant.times(step.innovation);
+            kept += 1.0;
+        });
         Sums {
             squares,
             determinant: determinant.ln(),
@@ -284,14 +313,29 @@ impl Coloured {
     }
 }
 
-/// What a likelihood is made of.
-struct Sums {
-    /// Of squared innovations over their variances.
-    squares: f64,
+/// The filter at a row.
+#[derive(Clone, Copy)]
+struct Step {
+    gain: f64,
+    /// Variance of the innovation, and one over it.
+    innovation: f64,
+    inverse: f64,
+}
+
+/// What likelihoods of some series are made of.
+struct Sums<const N: usize> {
+    /// Products of innovations over their variances; the upper half.
+    squares: [[f64; N]; N],
     /// Of the logarithms of these variances.
     determinant: f64,
     /// How many rows count.
     kept: f64,
+}
+
+impl<const N: usize> Sums<N> {
+    fn log_likelihood(&self, squares: f64, kept: f64) -> f64 {
+        -0.5 * (squares + self.determinant + kept * std::f64::consts::TAU.ln())
+    }
 }
 
 /// Steps repeat: one exponential serves them all.
@@ -403,14 +447,14 @@ impl CostFunction for &Alike<'_> {
 
 /// Usual step and span of some times, s.
 #[derive(Clone, Copy)]
-struct Scales {
-    step: f64,
-    span: f64,
+pub(crate) struct Scales {
+    pub(crate) step: f64,
+    pub(crate) span: f64,
 }
 
 impl Scales {
     /// `None` for times without steps.
-    fn of(t_s: &[f64]) -> Option<Self> {
+    pub(crate) fn of(t_s: &[f64]) -> Option<Self> {
         Some(Self {
             step: spectra::robust::median_step(t_s)?,
             span: t_s.last()? - t_s.first()?,
@@ -518,12 +562,15 @@ impl Scaled<'_> {
         }
     }
 
-    fn sums(self, p: &[f64]) -> Sums {
-        self.relative(p).sums(self.0.t_s, self.0.y, self.0.count)
+    /// Squares of the innovations, logarithms of their variances, and rows that count.
+    fn sums(self, p: &[f64]) -> [f64; 3] {
+        let Likelihood { t_s, y, count, .. } = *self.0;
+        let sums = self.relative(p).sums(t_s, count, |k| [y[k]]);
+        [sums.squares[0][0], sums.determinant, sums.kept]
     }
 
     fn at(self, p: &[f64]) -> Coloured {
-        let Sums { squares, kept, .. } = self.sums(p);
+        let [squares, _, kept] = self.sums(p);
         let size = (squares / kept).sqrt().max(1e-12 * self.0.rms);
         let relative = self.relative(p);
         Coloured {
@@ -539,11 +586,7 @@ impl CostFunction for Scaled<'_> {
     type Output = f64;
 
     fn cost(&self, p: &Vec<f64>) -> Result<f64, argmin::core::Error> {
-        let Sums {
-            squares,
-            determinant,
-            kept,
-        } = self.sums(p);
+        let [squares, determinant, kept] = self.sums(p);
         let known = self.0.known.map_or(0.0, |k| k.log_weight(&self.at(p)));
         Ok(0.5 * (kept * (squares / kept).max(f64::MIN_POSITIVE).ln() + determinant) - known)
     }

@@ -22,7 +22,7 @@
 //! | the noise of a series | [`Coloured::fit`], [`Coloured::refit`] |
 //! | the same beside a known white part | [`Coloured::fit_above`], [`Coloured::refit_above`] |
 //! | the same beside what is known of the slow part | [`Coloured::refit_near`], [`Foreknown`] |
-//! | how well the slow part is known | [`Coloured::relative_sigma`] |
+//! | how well the slow part is known | [`Coloured::slow_bounds`], [`Coloured::relative_sigma`] of a long series |
 //! | the noise taken out of series and regressors | [`Coloured::whiten`] |
 //! | many steps at once | [`Coloured::steps`] |
 //! | likelihoods of rival noises | [`Coloured::log_likelihood`], [`LogProduct`] |
@@ -66,6 +66,7 @@
 //! ```
 #![forbid(unsafe_code)]
 
+mod bounds;
 mod coloured;
 mod common_noise;
 mod filter;
@@ -75,6 +76,7 @@ mod log_product;
 mod rotations;
 mod smoother;
 
+pub use bounds::{Bounds, SlowBounds};
 pub use coloured::Coloured;
 pub use common_noise::CommonNoise;
 pub use filter::Filter;

@@ -19,6 +19,7 @@
 
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
+use crate::bounds::SlowBounds;
 use crate::coloured::{Coloured, fit_alike};
 use crate::common_noise::CommonNoise;
 use crate::filter::Filter;
@@ -243,14 +244,14 @@ impl Rotations {
         start.refit_above(self.centroid, &self.t_s, y, count)
     }
 
-    /// Standard errors of the slow part of an axis, relative: of sigma and of tau. `None`: it has none.
-    pub fn slow_sigma(&self, noise: &CommonNoise, axis: usize) -> Option<[f64; 2]> {
+    /// Bounds of the slow part of an axis. `None`: it has none.
+    pub fn slow_bounds(&self, noise: &CommonNoise, axis: usize) -> Option<SlowBounds> {
         let reference = noise.reference[axis];
         if reference.slow <= 0.0 {
             return None;
         }
         let (own, worth, _) = self.by_itself(axis, reference);
-        own.relative_sigma(&self.t_s, &self.mean[axis], self.of(worth, axis))
+        own.slow_bounds(&self.t_s, &self.mean[axis], self.of(worth, axis))
     }
 
     /// Noise of a rotation with that of its centroids, in the unit of a centroid where bins are worth `count`.

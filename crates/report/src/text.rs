@@ -127,26 +127,17 @@ fn effects(out: &mut String, report: &Report) {
             } else {
                 format!(" {}", estimate.unit)
             };
-            match estimate.sigma {
-                Some(sigma) => {
-                    line!(
-                        out,
-                        "            {name} = {} +- {}{unit}",
-                        number(estimate.value),
-                        number(sigma)
-                    );
-                }
-                None => {
-                    let bounds = estimate.interval.map_or_else(String::new, |[low, high]| {
-                        format!(" (95 %: {} to {})", number(low), number(high))
-                    });
-                    line!(
-                        out,
-                        "            {name} = {}{unit}{bounds}",
-                        number(estimate.value)
-                    );
-                }
-            }
+            let sigma = estimate
+                .sigma
+                .map_or_else(String::new, |s| format!(" +- {}", number(s)));
+            let bounds = estimate.interval.map_or_else(String::new, |[low, high]| {
+                format!(" (95 %: {} to {})", number(low), number(high))
+            });
+            line!(
+                out,
+                "            {name} = {}{sigma}{unit}{bounds}",
+                number(estimate.value)
+            );
         }
         let share = effect.variance_explained.map_or(String::new(), |v| {
             format!(", {:.1} % of the variance before", 100.0 * v)

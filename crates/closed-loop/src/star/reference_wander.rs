@@ -82,16 +82,20 @@ pub(crate) fn effect(wander: &Wander) -> Option<(FoundEffect, EffectEntry)> {
     let mut written = BTreeMap::new();
     for &axis in &axes {
         let slow = wander.noise.reference[axis];
-        let sigma = wander.rotations.slow_sigma(&wander.noise, axis);
-        let values = [(slow.slow, "arcsec"), (slow.tau_s, "s")];
-        for (k, (value, unit)) in values.into_iter().enumerate() {
+        let bounds = wander.rotations.slow_bounds(&wander.noise, axis);
+        let values = [
+            (slow.slow, "arcsec", bounds.map(|b| b.slow)),
+            (slow.tau_s, "s", bounds.map(|b| b.tau_s)),
+        ];
+        for (k, (likeliest, unit, bounds)) in values.into_iter().enumerate() {
+            let value = bounds.map_or(likeliest, |b| b.middle);
             let name = NAMES[axis][k].to_owned();
             written.insert(name.clone(), EffectValue::Number(value));
             let estimate = Estimate {
                 value,
-                sigma: sigma.map(|s| s[k] * value),
+                sigma: bounds.map(|b| b.sigma()),
                 unit: unit.to_owned(),
-                interval: None,
+                interval: bounds.map(|b| b.interval),
             };
             parameters.insert(name, estimate);
         }

@@ -195,7 +195,9 @@ pub(crate) fn search(
         let own = |pattern: &Pattern| field(whole.each_ref()).power_and_chance_of(pattern, folds);
         found.retain(|pattern| {
             own(pattern).is_some_and(|(power, chance)| {
-                power > LEAST_OWN * pattern.power && chance * pattern.trials < SEARCH_ALPHA
+                let kept = (power / pattern.power).min(1.0);
+                // it is not looked for anew: what rotations must take of it is let off the price
+                kept > LEAST_OWN && chance * pattern.trials.powf(kept) < SEARCH_ALPHA
             })
         });
     }
