@@ -28,6 +28,7 @@ use crate::noise_effects;
 use crate::search::empirical::Empirical;
 use crate::search::group::open_beside;
 use crate::search::misplaced::{MISPLACED, piled};
+use crate::search::orbits::is_too_fast;
 use crate::search::refusal::{Refusal, Refused};
 use crate::search::selection::{columns_of, costs};
 use crate::search::{Found, borrowed, family, fit_beside, joined, without};
@@ -45,6 +46,7 @@ mod changing_effect;
 pub(crate) mod commonness;
 pub(crate) mod description;
 pub(crate) mod invariance;
+mod places;
 mod recurrence;
 mod stand_ins;
 pub(crate) mod star_constants;
@@ -146,6 +148,8 @@ pub(crate) fn run<'a>(
     // what was found before anything was described
     let mut seen: Vec<String> = Vec::new();
     let mut oversize = Vec::new();
+    // terms that every round must have: beside what is kept they are not found again
+    let mut found_terms: Vec<Empirical> = Vec::new();
     for round in 0.. {
         let beside = white.keeping(&kept);
         let candidates = (quest.candidates)();
@@ -202,10 +206,25 @@ pub(crate) fn run<'a>(
         {
             return Ok(Outcome::Elsewhere(elsewhere));
         }
+        let too_fast = |k: usize| {
+            let chosen = searched.found.selection.chosen[k];
+            let orbit = searched.found.candidates[chosen].as_ref();
+            is_too_fast(orbit, &quest.surroundings)
+        };
+        // what such an orbit is held against
+        let turns = found_terms.iter().any(Empirical::turns_to_and_fro);
+        if !turns && (0..searched.found.selection.chosen.len()).any(too_fast) {
+            found_terms.extend(description::turning(white.data));
+        }
         let grown = grown(level, inside.as_deref());
+        let places = inside.as_deref().map_or_else(Vec::new, |inside| {
+            places::places(white.data, inside, &level.weight)
+        });
         let terms = |wander: bool| {
             let mut terms = (quest.terms)(wander);
             terms.extend(grown.clone());
+            terms.extend(places.clone());
+            terms.extend(found_terms.iter().cloned());
             terms
         };
         let all = terms(searched.wander.is_some());
@@ -225,15 +244,19 @@ pub(crate) fn run<'a>(
             (!left.is_empty()).then_some(left)
         };
         if let Some(wander) = searched.wander.as_ref().filter(|_| !last) {
-            let plain = Described::new(&beside, folds, &searched.found, (quest.terms)(false), &[])?;
+            // what turns whole frames with the time may be what errs as slowly
+            let mut all = (quest.terms)(false);
+            all.extend(description::turning(white.data));
+            let plain = Described::new(&beside, folds, &searched.found, all, &[])?;
             let axes = wander.axes().iter().filter(|a| **a).count();
             if let Some(instead) = in_place_of_wander(&described, &plain, axes) {
                 let tie = wander.behind.is_some_and(|nats| nats < TIE);
                 // what it beats speaks against no effect
                 if reinstated(&mut refused) || tie && suffice(&beside, folds, quest, &may)? {
                     start = None;
+                    found_terms.extend(looked_for(&plain, &instead));
                 } else {
-                    kept.extend(whole(&plain, instead));
+                    keep_whole(&mut kept, &mut found_terms, &plain, instead);
                 }
                 continue;
             }
@@ -245,7 +268,7 @@ pub(crate) fn run<'a>(
             if !doubtful.is_empty()
                 && let Some(left) = left()
             {
-                kept.extend(whole(&described, left));
+                keep_whole(&mut kept, &mut found_terms, &described, left);
                 continue;
             }
             if refuse(&mut refused, doubtful, Refusal::SlowStars) {
@@ -253,13 +276,13 @@ pub(crate) fn run<'a>(
             }
         }
         if !last {
-            if let Some((set, instead)) = stand_ins(&described, &agreed) {
+            if let Some((set, instead)) = stand_ins(&described, &agreed, &too_fast) {
                 let chosen = &searched.found.selection.chosen;
                 let families = set
                     .iter()
                     .map(|&k| family(searched.found.candidates[chosen[k]].as_ref()));
                 refused.extend(families.map(|f| (f, Refusal::StandIn)));
-                kept.extend(whole(&described, instead));
+                keep_whole(&mut kept, &mut found_terms, &described, instead);
                 continue;
             }
             if let Some(change) = changing(&described, best_beside(&searched.found, &may)) {
@@ -282,14 +305,15 @@ pub(crate) fn run<'a>(
             if (named || kept.is_empty())
                 && let Some(left) = left()
             {
-                kept.extend(whole(&described, left));
+                keep_whole(&mut kept, &mut found_terms, &described, left);
                 continue;
             }
         }
         if last {
             // nothing that is still spoken against is named
             let chosen = searched.found.selection.chosen.clone();
-            let spoken = stand_ins(&described, &agreed).map(|(set, _)| (set, Refusal::StandIn));
+            let spoken =
+                stand_ins(&described, &agreed, &too_fast).map(|(set, _)| (set, Refusal::StandIn));
             let beside = best_beside(&searched.found, &may);
             let changes = changing(&described, beside)
                 .map(|c| (vec![c.chosen], Refusal::Change(c.way.name())));
@@ -393,7 +417,7 @@ fn suffice(
         return Ok(false);
     };
     let described = Described::new(level, folds, &searched.found, (quest.terms)(false), &[])?;
-    Ok(!described.chosen.is_empty() && stand_ins(&described, &|_, _| false).is_none())
+    Ok(!described.chosen.is_empty() && stand_ins(&described, &|_, _| false, &|_| false).is_none())
 }
 
 /// Families of the chosen effects that see the acceleration, where it comes from the samples of a reference
@@ -536,6 +560,17 @@ fn whole(described: &Described, parts: Vec<Part>) -> Vec<Arc<dyn Candidate>> {
     kept
 }
 
+/// Keeps these parts as terms for every fit from now on; those that were looked for are not `found` beside themselves.
+fn keep_whole(
+    kept: &mut Vec<Arc<dyn Candidate>>,
+    found: &mut Vec<Empirical>,
+    described: &Described,
+    parts: Vec<Part>,
+) {
+    found.extend(looked_for(described, &parts));
+    kept.extend(whole(described, parts));
+}
+
 impl Described {
     /// What describes best what is left beside the chosen effects, and its likelihood after all prices, if anything
     /// does.
@@ -568,9 +603,8 @@ impl Described {
     }
 }
 
-/// What the stars follow, where that beats a slow error of the reference about `axes` axes:
-/// `coloured` is beside it, `plain` under white noise. Not the time alone: a slow error is what the time
-/// alone describes, and folds that know nothing of each other's predict it worse.
+/// What the stars follow, where that beats a slow error of the reference about `axes` axes: `coloured` is beside it,
+/// `plain` under white noise. The time alone, too: what lasts as long as the run is a drift by another name.
 fn in_place_of_wander(coloured: &Described, plain: &Described, axes: usize) -> Option<Vec<Part>> {
     let (worth, parts) = plain.rest()?;
     let set = columns_of(&coloured.fitted.groups, &coloured.chosen);
@@ -578,8 +612,13 @@ fn in_place_of_wander(coloured: &Described, plain: &Described, axes: usize) -> O
     // a size and a time each
     let paid = axes as f64 * plain.fitted.scalars.max(2.0).ln();
     let looked = plain.looked() * parts.len() as f64;
-    let time = plain.is_of_time(parts);
-    (!time && worth - looked > with - paid + BY_FAR).then(|| plain.before_time(parts))
+    (worth - looked > with - paid + BY_FAR).then(|| plain.before_time(parts))
+}
+
+/// The terms of a description that were looked for.
+fn looked_for(described: &Described, parts: &[Part]) -> Vec<Empirical> {
+    let terms = parts.iter().map(|(k, _)| &described.terms[*k].term);
+    terms.filter(|t| t.is_looked_for()).cloned().collect()
 }
 
 /// Slow noise that is left of the stars themselves.

@@ -424,6 +424,7 @@ pub(crate) fn terms(
         terms.extend(one(&phase[axis]));
     }
     terms.extend(one(&(Variable::Quarter, [-1.0, 1.0])));
+    terms.extend(one(&(Variable::PhaseProduct, [0.0, 1.0])));
     for single in [&time, &mag, &colour] {
         terms.extend(one(single));
     }
@@ -489,6 +490,11 @@ pub(crate) fn terms(
         );
     }
     terms
+}
+
+/// Frames that turn to and fro with the time.
+pub(crate) fn turning(data: &StarData) -> Option<Empirical> {
+    Empirical::new(Variable::Turning, range(data.t_s.iter().copied()), true)
 }
 
 /// A scale that is another one from an instant on: the likeliest in what is left, `inside`, arcsec.

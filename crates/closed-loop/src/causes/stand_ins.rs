@@ -29,7 +29,7 @@
 //!
 //! A line that the motion describes nearly as well is the motion's: of all frequencies it would have come
 //! upon that at which the tracker moves. An orbit that no channel tells takes the shape of whatever is slow: one
-//! that channels describe nearly as well is theirs.
+//! that channels describe nearly as well is theirs, and one that nature does not have is the time's.
 //!
 //! Source: Schwarz 1978 for the price of a parameter.
 
@@ -57,10 +57,12 @@ const WORTH: f64 = 3.0;
 const APART: f64 = 1.0 - REMAINDER;
 
 /// The chosen set (positions among the chosen) that a description beats by most, if one
-/// does, and that description; what `agreed` holds of counts for the set.
+/// does, and that description; what `agreed` holds of counts for the set. `too_fast`: it is an orbit that nature does
+/// not have.
 pub(crate) fn stand_ins(
     described: &Described,
     agreed: &dyn Fn(&[usize], &[Part]) -> bool,
+    too_fast: &dyn Fn(usize) -> bool,
 ) -> Option<(Vec<usize>, Vec<Part>)> {
     let groups = &described.fitted.groups;
     let looked = described.looked();
@@ -88,6 +90,11 @@ pub(crate) fn stand_ins(
         let motion = |(k, _): &Part| described.terms[*k].term.is_of_motion();
         let free = set.iter().all(|&k| groups[k].slopes > 0);
         let channel = |(k, _): &Part| described.terms[*k].term.is_of_channel();
+        let time = |(k, _): &Part| described.terms[*k].term.is_of_time();
+        let own_shape = |parts: &[Part]| {
+            let fast = set.iter().all(|&k| too_fast(k));
+            parts.iter().all(|part| channel(part) || fast && time(part))
+        };
         let star = set.iter().all(|&k| OF_ONE.contains(&described.names[k]));
         let slope = |(k, _): &Part| described.terms[*k].term.is_of_a_star();
         let least = if lines && parts.iter().all(motion) {
@@ -96,7 +103,7 @@ pub(crate) fn stand_ins(
             // what both pay for having been looked for
             let paid: f64 = set.iter().map(|&k| described.paid[k]).sum();
             paid - parts.len() as f64 * looked
-        } else if free && parts.iter().all(channel) {
+        } else if free && own_shape(&parts) {
             -OWN_SHAPE
         } else {
             BY_FAR

@@ -17,8 +17,9 @@
 //! P_1(a) times the first columns of b, of a motion those of its size, too
 //! ```
 //!
-//! A half or a quarter of the detector that is shifted as a whole, for its output or its mosaic, has two values. The
-//! scale may be another one from an instant on: what bends with the time takes three columns for it.
+//! A half or a quarter of the detector that is shifted as a whole, for its output or its mosaic, has two values, as has
+//! what lies beyond an edge anywhere, or on a patch. The scale may be another one from an instant on: what bends with
+//! the time takes three columns for it. The first waves of both pixel phases have four products.
 //!
 //! Such a term predicts; it never explains.
 //!
@@ -29,8 +30,8 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 use effects::{
-    AttitudeRows, Candidate, Coefficient, Effect, EffectError, LARGEST_WAVE_PX, StarRows,
-    Surroundings,
+    AttitudeRows, Candidate, Coefficient, Effect, EffectError, LARGEST_WAVE_PX, PixelWave,
+    StarRows, Surroundings,
 };
 use focal_plane::{Camera, PointsMut, VectorsMut};
 
@@ -48,6 +49,8 @@ const ORDERS: usize = 3;
 /// Harmonics of a pixel phase along its own axis, and across.
 pub(crate) const HARMONICS: usize = 6;
 const ACROSS: usize = 2;
+/// Products of the first waves in both pixel phases.
+const PRODUCTS: usize = 4;
 /// Fields that a variable of one number drives: a shift along each axis, a roll and a scale.
 const FIELDS: usize = 4;
 /// Columns of a variable that another one may multiply.
@@ -88,7 +91,7 @@ impl Empirical {
         let scale = Scale::new(range);
         let smooth = !matches!(
             variable,
-            Variable::Star(_) | Variable::Slot(_) | Variable::Phase(_)
+            Variable::Star(_) | Variable::Slot(_) | Variable::Phase(_) | Variable::PhaseProduct
         );
         if smooth && !scale.varies() {
             return None;
@@ -98,7 +101,12 @@ impl Empirical {
             Variable::Slot(slots) => 2 * slots.len(),
             Variable::Phase(_) => 2 * (HARMONICS + ACROSS),
             Variable::Position(_) | Variable::Window => 2 * ORDERS,
-            Variable::Half(_) | Variable::Quarter | Variable::Since { .. } => 2,
+            Variable::PhaseProduct => 2 * PRODUCTS,
+            Variable::Half(_)
+            | Variable::Quarter
+            | Variable::Beyond { .. }
+            | Variable::Patch { .. }
+            | Variable::Since { .. } => 2,
             Variable::Time if stars => FIELDS * ORDERS,
             // A polynomial in time is only good outside its fold if it is straight.
             Variable::Time => 3,
@@ -141,12 +149,14 @@ impl Empirical {
     /// The same with waves in the pixel phase no larger than this camera's pixels let them be.
     #[must_use]
     pub(crate) fn on(mut self, camera: &Camera) -> Self {
-        let Variable::Phase(axis) = self.variable else {
-            return self;
-        };
         let scale = camera.arcsec_per_px();
         for (k, coefficient) in self.coefficients.iter_mut().enumerate() {
-            let axis = if k < 2 * HARMONICS { axis } else { 1 - axis };
+            let axis = match self.variable {
+                Variable::Phase(axis) if k < 2 * HARMONICS => axis,
+                Variable::Phase(axis) => 1 - axis,
+                Variable::PhaseProduct => k / PRODUCTS,
+                _ => break,
+            };
             coefficient.upper = LARGEST_WAVE_PX * scale[axis];
             coefficient.lower = -coefficient.upper;
         }
@@ -175,14 +185,35 @@ impl Empirical {
 
     /// Whether it is the time alone.
     pub(crate) fn is_of_time(&self) -> bool {
-        let of_time = matches!(self.variable, Variable::Time | Variable::Since { .. });
+        let of_time = matches!(
+            self.variable,
+            Variable::Time | Variable::Turning | Variable::Since { .. }
+        );
         of_time && self.by.is_none()
     }
 
-    /// What it pays for the instant that was looked for, nats.
+    /// Whether frames turn to and fro with the time.
+    pub(crate) fn turns_to_and_fro(&self) -> bool {
+        matches!(self.variable, Variable::Turning)
+    }
+
+    /// Whether it stands where it was looked for.
+    pub(crate) fn is_looked_for(&self) -> bool {
+        matches!(
+            self.variable,
+            Variable::Turning
+                | Variable::Since { .. }
+                | Variable::Beyond { .. }
+                | Variable::Patch { .. }
+        )
+    }
+
+    /// What it pays for the instant or place that was looked for, nats.
     pub(crate) fn scanned(&self) -> f64 {
         match self.variable {
-            Variable::Since { tried, .. } => (tried.max(1) as f64).ln(),
+            Variable::Since { tried, .. }
+            | Variable::Beyond { tried, .. }
+            | Variable::Patch { tried, .. } => (tried.max(1) as f64).ln(),
             _ => 0.0,
         }
     }
@@ -239,6 +270,8 @@ impl Empirical {
             if n > own {
                 parts.extend([(0..own).collect(), vec![own, own + 1], (own..n).collect()]);
             }
+        } else if matches!(self.variable, Variable::PhaseProduct) {
+            parts = vec![(0..PRODUCTS).collect(), (PRODUCTS..n).collect()];
         } else if matches!(self.variable, Variable::Since { .. }) {
             // nothing before it
             parts.push(vec![0]);
@@ -261,6 +294,7 @@ impl Empirical {
             && matches!(
                 self.variable,
                 Variable::Time
+                    | Variable::Turning
                     | Variable::Magnitude
                     | Variable::Colour
                     | Variable::Flux
@@ -330,6 +364,11 @@ impl Candidate for Empirical {
         let values = self.variable.values(rows);
         let waves = match self.variable {
             Variable::Phase(axis) => rows.pixel_waves(camera, axis),
+            Variable::PhaseProduct => rows.pixel_waves(camera, 0),
+            _ => Cow::default(),
+        };
+        let other_waves = match self.variable {
+            Variable::PhaseProduct => rows.pixel_waves(camera, 1),
             _ => Cow::default(),
         };
         let in_pair = self.has_size();
@@ -406,7 +445,21 @@ impl Candidate for Empirical {
                     put(DIRECTION, a / speed, b / speed);
                     put(DIRECTION + 1, -b / speed, a / speed);
                 }
-                Variable::Half(_) | Variable::Quarter => {
+                Variable::PhaseProduct => {
+                    let first = |waves: &[PixelWave]| waves[i].orders().next();
+                    let (Some(x), Some(y)) = (first(&waves), first(&other_waves)) else {
+                        continue;
+                    };
+                    let products = x.into_iter().flat_map(|x| y.map(|y| x * y));
+                    for (k, product) in products.enumerate() {
+                        put(k, product, 0.0);
+                        put(PRODUCTS + k, 0.0, product);
+                    }
+                }
+                Variable::Half(_)
+                | Variable::Quarter
+                | Variable::Beyond { .. }
+                | Variable::Patch { .. } => {
                     put(0, values[i], 0.0);
                     put(1, 0.0, values[i]);
                 }
@@ -483,12 +536,18 @@ impl Candidate for Empirical {
     ) -> Result<Box<dyn Effect>, EffectError> {
         if matches!(
             self.variable,
-            Variable::Half(_) | Variable::Quarter | Variable::Since { .. }
+            Variable::Half(_)
+                | Variable::Quarter
+                | Variable::Beyond { .. }
+                | Variable::Patch { .. }
+                | Variable::PhaseProduct
+                | Variable::Turning
+                | Variable::Since { .. }
         ) {
             return Err(EffectError::WrongType {
                 effect: EMPIRICAL,
                 name: "variable".to_owned(),
-                expected: "a place or a time, not a half of the detector or of the run",
+                expected: "a place or a time, not a half of the detector or of the run, nor a turn to and fro",
             });
         }
         let parameters = effects::empirical_parameters(

@@ -352,6 +352,11 @@ impl Beside<'_> {
     }
 }
 
+/// Whether it is an orbit that turns faster than nature has any.
+pub(crate) fn is_too_fast(orbit: &dyn Candidate, surroundings: &Surroundings<'_>) -> bool {
+    period_s(orbit, surroundings).is_some_and(|period_s| period_s < SHORTEST_S)
+}
+
 /// The period of an orbit as it stands, at whatever speed.
 fn period_s(orbit: &dyn Candidate, surroundings: &Surroundings<'_>) -> Option<f64> {
     let mut itself = vec![0.0; orbit.coefficients().len()];

@@ -19,9 +19,24 @@ pub(crate) enum Variable {
     /// The half of the detector along one axis, and the quarter: each may have an output of its own.
     Half(usize),
     Quarter,
+    /// Beyond a line across the detector, or on a patch of it, that were looked for among so many.
+    Beyond {
+        axis: usize,
+        at_px: f64,
+        tried: usize,
+    },
+    Patch {
+        from_px: [f64; 2],
+        to_px: [f64; 2],
+        tried: usize,
+    },
     /// Pixel phase along one axis.
     Phase(usize),
+    /// Both, one wave times the other.
+    PhaseProduct,
     Time,
+    /// The time, of frames that turn to and fro with it: what a slow error of the reference does, too.
+    Turning,
     /// Before and after an instant that was looked for among so many.
     Since {
         at_s: f64,
@@ -51,12 +66,13 @@ impl Variable {
     /// The name in `unattributed.depends_on`.
     pub(crate) fn name(&self) -> String {
         match self {
-            Self::Position(0) | Self::Half(0) => "x_px".into(),
-            Self::Position(_) | Self::Half(_) => "y_px".into(),
-            Self::Quarter => "x_px*y_px".into(),
+            Self::Position(0) | Self::Half(0) | Self::Beyond { axis: 0, .. } => "x_px".into(),
+            Self::Position(_) | Self::Half(_) | Self::Beyond { .. } => "y_px".into(),
+            Self::Quarter | Self::Patch { .. } => "x_px*y_px".into(),
             Self::Phase(0) => "pixel_phase_x".into(),
             Self::Phase(_) => "pixel_phase_y".into(),
-            Self::Time | Self::Since { .. } => "time".into(),
+            Self::PhaseProduct => "pixel_phase_x*pixel_phase_y".into(),
+            Self::Time | Self::Turning | Self::Since { .. } => "time".into(),
             Self::Rate => "rate".into(),
             Self::Acceleration => "acceleration".into(),
             Self::Magnitude => "mag".into(),
@@ -102,10 +118,11 @@ impl Variable {
     /// Place among the names, for pairs.
     pub(super) fn rank(&self) -> usize {
         match self {
-            Self::Position(axis) | Self::Half(axis) => *axis,
-            Self::Quarter => 0,
+            Self::Position(axis) | Self::Half(axis) | Self::Beyond { axis, .. } => *axis,
+            Self::Quarter | Self::Patch { .. } => 0,
             Self::Phase(axis) => 2 + axis,
-            Self::Time | Self::Since { .. } => 4,
+            Self::PhaseProduct => 2,
+            Self::Time | Self::Turning | Self::Since { .. } => 4,
             Self::Rate => 5,
             Self::Acceleration => 6,
             Self::Magnitude => 7,
@@ -123,7 +140,7 @@ impl Variable {
         match self {
             Self::Position(0) => rows.x_px[i],
             Self::Position(_) => rows.y_px[i],
-            Self::Time => rows.t_s[i],
+            Self::Time | Self::Turning => rows.t_s[i],
             Self::Since { at_s, .. } => f64::from(u8::from(rows.t_s[i] > *at_s)),
             Self::Magnitude => rows.mag[i],
             Self::Colour => rows.bv[i],
@@ -134,14 +151,26 @@ impl Variable {
             Self::Housekeeping(_, series) => series.at(rows.t_s[i]).unwrap_or(f64::NAN),
             Self::Half(axis) => [rows.x_px, rows.y_px][*axis][i].signum(),
             Self::Quarter => (rows.x_px[i] * rows.y_px[i]).signum(),
-            Self::Phase(_) | Self::Star(_) | Self::Slot(_) | Self::Window => f64::NAN,
+            Self::Beyond { axis, at_px, .. } => {
+                f64::from(u8::from([rows.x_px, rows.y_px][*axis][i] > *at_px))
+            }
+            Self::Patch { from_px, to_px, .. } => {
+                let at = [rows.x_px[i], rows.y_px[i]];
+                let within = |axis: usize| from_px[axis] < at[axis] && at[axis] <= to_px[axis];
+                f64::from(u8::from(within(0) && within(1)))
+            }
+            Self::PhaseProduct | Self::Phase(_) | Self::Star(_) | Self::Slot(_) | Self::Window => {
+                f64::NAN
+            }
         }
     }
 
     /// Its values in all rows; none where they are not one number.
     pub(crate) fn values(&self, rows: &StarRows<'_>) -> Vec<f64> {
         match self {
-            Self::Phase(_) | Self::Star(_) | Self::Slot(_) | Self::Window => Vec::new(),
+            Self::PhaseProduct | Self::Phase(_) | Self::Star(_) | Self::Slot(_) | Self::Window => {
+                Vec::new()
+            }
             Self::Housekeeping(_, series) => series.at_all(rows.t_s),
             _ => (0..rows.len()).map(|i| self.value(rows, i)).collect(),
         }

@@ -1,0 +1,215 @@
+//! Where on the detector what is left is another: beyond an edge, or on a patch.
+//!
+//! A detector of several parts shifts on one side of their border, a blemish within itself; polynomials of the place have
+//! neither. The likeliest of each is looked for in the residuals r of the stars that come by, and is a term among others:
+//!
+//! ```text
+//! u = sum over stars w^2 (sum of r in S - share_S sum of r)     N = sum w^2 n (share_S - share_S^2)     (u_x^2 + u_y^2)/N most
+//! ```
+//!
+//! S: all cells of a grid beyond one of its lines, or a square of an eighth or a quarter of its length. What a star keeps
+//! all the time tells nothing, nor does it cost anything but an exact place: the pass that judges the term has all that
+//! this leaves out.
+//!
+//! Not physics: where to look.
+
+use crate::search::empirical::{Empirical, Variable, range};
+use crate::star::data::StarData;
+
+/// Cells of the grid along an axis.
+const CELLS: usize = 32;
+/// Cells of a patch along an axis; each begins at every half of its length.
+const PATCHES: [usize; 2] = [4, 8];
+/// Squares in units of the variance below which a place is not worth a term.
+const LEAST: f64 = 12.0;
+
+/// What is summed of a set of cells: squares of weights, and of these times the residuals.
+#[derive(Clone, Copy, Debug, Default)]
+struct Sum {
+    rows: f64,
+    residual: [f64; 2],
+}
+
+impl Sum {
+    fn add(&mut self, other: &Self) {
+        self.rows += other.rows;
+        for (sum, more) in self.residual.iter_mut().zip(other.residual) {
+            *sum += more;
+        }
+    }
+}
+
+/// Score and information of a shift of a set of cells.
+#[derive(Clone, Copy, Debug, Default)]
+struct Shift {
+    score: [f64; 2],
+    information: f64,
+}
+
+impl Shift {
+    /// Adds a star, of which `of` all lie in the set.
+    fn add(&mut self, of: &Sum, all: &Sum) {
+        let share = of.rows / all.rows;
+        for axis in 0..2 {
+            self.score[axis] += of.residual[axis] - share * all.residual[axis];
+        }
+        self.information += of.rows * (1.0 - share);
+    }
+
+    /// The squares that it takes.
+    fn power(&self) -> f64 {
+        let [x, y] = self.score;
+        if self.information > 0.0 {
+            (x * x + y * y) / self.information
+        } else {
+            0.0
+        }
+    }
+}
+
+/// The likeliest edge, and the likeliest patch, in `residual` (arcsec, per axis over all rows), as terms; those that are
+/// worth one.
+pub(super) fn places(data: &StarData, residual: &[Vec<f64>], weight: &[f64]) -> Vec<Empirical> {
+    let [rx, ry] = residual else {
+        return Vec::new();
+    };
+    let grid = Grid::of(data);
+    let counts = |row: usize| !data.outlier[row] && rx[row].is_finite() && ry[row].is_finite();
+    let mut of_star: Vec<Vec<usize>> = vec![Vec::new(); data.stars.len()];
+    let (mut squares, mut count) = (0.0, 0.0);
+    for row in (0..data.t_s.len()).filter(|&r| counts(r)) {
+        of_star[data.star[row]].push(row);
+        squares += weight[row].powi(2) * (rx[row].powi(2) + ry[row].powi(2));
+        count += 2.0;
+    }
+    if squares <= 0.0 {
+        return Vec::new();
+    }
+    let mut edges = vec![Shift::default(); 2 * CELLS];
+    let mut patches = vec![Shift::default(); PATCHES.map(|n| Patch::along(n).pow(2)).iter().sum()];
+    let mut cells = vec![Sum::default(); CELLS * CELLS];
+    for rows in of_star.iter().filter(|rows| rows.len() > 1) {
+        cells.fill(Sum::default());
+        let mut all = Sum::default();
+        for &row in rows {
+            let square = weight[row].powi(2);
+            let one = Sum {
+                rows: square,
+                residual: [square * rx[row], square * ry[row]],
+            };
+            cells[grid.cell([data.modelled[0][row], data.modelled[1][row]])].add(&one);
+            all.add(&one);
+        }
+        for axis in 0..2 {
+            let mut before = Sum::default();
+            for line in 0..CELLS - 1 {
+                for k in 0..CELLS {
+                    before.add(&cells[Grid::at([line, k][axis], [k, line][axis])]);
+                }
+                edges[axis * CELLS + line].add(&before, &all);
+            }
+        }
+        for (patch, shift) in Patch::all().zip(&mut patches) {
+            let mut within = Sum::default();
+            for y in patch.from[1]..patch.from[1] + patch.cells {
+                for x in patch.from[0]..patch.from[0] + patch.cells {
+                    within.add(&cells[Grid::at(x, y)]);
+                }
+            }
+            if within.rows > 0.0 {
+                shift.add(&within, &all);
+            }
+        }
+    }
+    let variance = squares / count;
+    let best = |shifts: &[Shift]| {
+        let tried = shifts.iter().filter(|s| s.information > 0.0).count();
+        let powers = shifts.iter().map(Shift::power).enumerate();
+        let best = powers.max_by(|a, b| a.1.total_cmp(&b.1))?;
+        (best.1 > LEAST * variance).then_some((best.0, tried))
+    };
+    let edge = best(&edges).map(|(at, tried)| {
+        let axis = at / CELLS;
+        Variable::Beyond {
+            axis,
+            at_px: grid.line_px(axis, at % CELLS + 1),
+            tried,
+        }
+    });
+    let patch = best(&patches).and_then(|(at, tried)| {
+        let patch = Patch::all().nth(at)?;
+        let bounds = |more: usize| [0, 1].map(|axis| grid.line_px(axis, patch.from[axis] + more));
+        Some(Variable::Patch {
+            from_px: bounds(0),
+            to_px: bounds(patch.cells),
+            tried,
+        })
+    });
+    let terms = edge.into_iter().chain(patch);
+    terms
+        .filter_map(|variable| Empirical::new(variable, [0.0, 1.0], true))
+        .collect()
+}
+
+/// Cells of the part of the detector that the rows cover.
+struct Grid {
+    from_px: [f64; 2],
+    cell_px: [f64; 2],
+}
+
+impl Grid {
+    fn of(data: &StarData) -> Self {
+        let ranges = [0, 1].map(|axis| range(data.modelled[axis].iter().copied()));
+        Self {
+            from_px: ranges.map(|r| r[0]),
+            cell_px: ranges.map(|[from, to]| (to - from) / CELLS as f64),
+        }
+    }
+
+    fn at(x: usize, y: usize) -> usize {
+        CELLS * y + x
+    }
+
+    fn cell(&self, at_px: [f64; 2]) -> usize {
+        let [x, y] = [0, 1].map(|axis| {
+            let along = (at_px[axis] - self.from_px[axis]) / self.cell_px[axis];
+            #[expect(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "cells from the lowest place"
+            )]
+            let cell = along.max(0.0) as usize;
+            cell.min(CELLS - 1)
+        });
+        Self::at(x, y)
+    }
+
+    /// Where a cell begins.
+    fn line_px(&self, axis: usize, line: usize) -> f64 {
+        self.from_px[axis] + self.cell_px[axis] * line as f64
+    }
+}
+
+/// A square of cells.
+#[derive(Clone, Copy, Debug)]
+struct Patch {
+    from: [usize; 2],
+    cells: usize,
+}
+
+impl Patch {
+    /// Squares of so many cells along an axis.
+    const fn along(cells: usize) -> usize {
+        2 * CELLS / cells - 1
+    }
+
+    fn all() -> impl Iterator<Item = Self> {
+        PATCHES.into_iter().flat_map(|cells| {
+            let n = Self::along(cells);
+            (0..n * n).map(move |k| Self {
+                from: [k % n, k / n].map(|at| at * cells / 2),
+                cells,
+            })
+        })
+    }
+}
