@@ -247,6 +247,8 @@ pub(crate) fn run<'a>(
             // what turns whole frames with the time may be what errs as slowly
             let mut all = (quest.terms)(false);
             all.extend(description::turning(white.data));
+            let residual = inside.as_deref();
+            all.extend(residual.and_then(|r| places::stretch(white.data, r, &beside.weight)));
             let plain = Described::new(&beside, folds, &searched.found, all, &[])?;
             let axes = wander.axes().iter().filter(|a| **a).count();
             if let Some(instead) = in_place_of_wander(&described, &plain, axes) {

@@ -1,4 +1,4 @@
-//! Where on the detector what is left is another: beyond an edge, or on a patch.
+//! Where on the detector what is left is another: beyond an edge, or on a patch; and when.
 //!
 //! A detector of several parts shifts on one side of their border, a blemish within itself; polynomials of the place have
 //! neither. The likeliest of each is looked for in the residuals r of the stars that come by, and is a term among others:
@@ -11,6 +11,9 @@
 //! all the time tells nothing, nor does it cost anything but an exact place: the pass that judges the term has all that
 //! this leaves out.
 //!
+//! Frames may be turned for a while, as by one blow, and then back: the stretch is looked for in the same way, in all stars
+//! at once, in stretches of a half to a thirty-second of the time.
+//!
 //! Not physics: where to look.
 
 use crate::search::empirical::{Empirical, Variable, range};
@@ -20,6 +23,8 @@ use crate::star::data::StarData;
 const CELLS: usize = 32;
 /// Cells of a patch along an axis; each begins at every half of its length.
 const PATCHES: [usize; 2] = [4, 8];
+/// Cells of the time.
+const STRETCHES: usize = 64;
 /// Squares in units of the variance below which a place is not worth a term.
 const LEAST: f64 = 12.0;
 
@@ -31,6 +36,14 @@ struct Sum {
 }
 
 impl Sum {
+    fn of(weight: f64, residual: [f64; 2]) -> Self {
+        let square = weight * weight;
+        Self {
+            rows: square,
+            residual: residual.map(|r| square * r),
+        }
+    }
+
     fn add(&mut self, other: &Self) {
         self.rows += other.rows;
         for (sum, more) in self.residual.iter_mut().zip(other.residual) {
@@ -92,11 +105,7 @@ pub(super) fn places(data: &StarData, residual: &[Vec<f64>], weight: &[f64]) -> 
         cells.fill(Sum::default());
         let mut all = Sum::default();
         for &row in rows {
-            let square = weight[row].powi(2);
-            let one = Sum {
-                rows: square,
-                residual: [square * rx[row], square * ry[row]],
-            };
+            let one = Sum::of(weight[row], [rx[row], ry[row]]);
             cells[grid.cell([data.modelled[0][row], data.modelled[1][row]])].add(&one);
             all.add(&one);
         }
@@ -122,13 +131,7 @@ pub(super) fn places(data: &StarData, residual: &[Vec<f64>], weight: &[f64]) -> 
         }
     }
     let variance = squares / count;
-    let best = |shifts: &[Shift]| {
-        let tried = shifts.iter().filter(|s| s.information > 0.0).count();
-        let powers = shifts.iter().map(Shift::power).enumerate();
-        let best = powers.max_by(|a, b| a.1.total_cmp(&b.1))?;
-        (best.1 > LEAST * variance).then_some((best.0, tried))
-    };
-    let edge = best(&edges).map(|(at, tried)| {
+    let edge = likeliest(&edges, variance).map(|(at, tried)| {
         let axis = at / CELLS;
         Variable::Beyond {
             axis,
@@ -136,7 +139,7 @@ pub(super) fn places(data: &StarData, residual: &[Vec<f64>], weight: &[f64]) -> 
             tried,
         }
     });
-    let patch = best(&patches).and_then(|(at, tried)| {
+    let patch = likeliest(&patches, variance).and_then(|(at, tried)| {
         let patch = Patch::all().nth(at)?;
         let bounds = |more: usize| [0, 1].map(|axis| grid.line_px(axis, patch.from[axis] + more));
         Some(Variable::Patch {
@@ -149,6 +152,73 @@ pub(super) fn places(data: &StarData, residual: &[Vec<f64>], weight: &[f64]) -> 
     terms
         .filter_map(|variable| Empirical::new(variable, [0.0, 1.0], true))
         .collect()
+}
+
+/// The likeliest stretch of time in which all stars are shifted alike, as a term, if it is worth one.
+pub(super) fn stretch(data: &StarData, residual: &[Vec<f64>], weight: &[f64]) -> Option<Empirical> {
+    let [rx, ry] = residual else { return None };
+    let [from, to] = range(data.t_s.iter().copied());
+    let cell_s = (to - from) / STRETCHES as f64;
+    let mut cells = vec![Sum::default(); STRETCHES];
+    let mut all = Sum::default();
+    let (mut squares, mut count) = (0.0, 0.0);
+    for row in 0..data.t_s.len() {
+        if data.outlier[row] || !rx[row].is_finite() || !ry[row].is_finite() {
+            continue;
+        }
+        let one = Sum::of(weight[row], [rx[row], ry[row]]);
+        cells[cell((data.t_s[row] - from) / cell_s, STRETCHES)].add(&one);
+        all.add(&one);
+        squares += weight[row].powi(2) * (rx[row].powi(2) + ry[row].powi(2));
+        count += 2.0;
+    }
+    let lengths = (1..).map(|k| 1 << k).take_while(|n| *n < STRETCHES);
+    let stretches: Vec<[usize; 2]> = lengths
+        .flat_map(|n| {
+            (0..=STRETCHES - n)
+                .step_by(n / 2)
+                .map(move |at| [at, at + n])
+        })
+        .collect();
+    let shifts: Vec<Shift> = stretches
+        .iter()
+        .map(|&[start, end]| {
+            let mut within = Sum::default();
+            cells[start..end].iter().for_each(|cell| within.add(cell));
+            let mut shift = Shift::default();
+            if within.rows > 0.0 {
+                shift.add(&within, &all);
+            }
+            shift
+        })
+        .collect();
+    let (at, tried) = likeliest(&shifts, squares / count)?;
+    let [from_s, to_s] = stretches[at].map(|cell| from + cell_s * cell as f64);
+    let variable = Variable::During {
+        from_s,
+        to_s,
+        tried,
+    };
+    Empirical::new(variable, [0.0, 1.0], true)
+}
+
+/// The one of `shifts` that takes most, and how many there are, where it is worth a term.
+fn likeliest(shifts: &[Shift], variance: f64) -> Option<(usize, usize)> {
+    let tried = shifts.iter().filter(|s| s.information > 0.0).count();
+    let powers = shifts.iter().map(Shift::power).enumerate();
+    let best = powers.max_by(|a, b| a.1.total_cmp(&b.1))?;
+    (best.1 > LEAST * variance).then_some((best.0, tried))
+}
+
+/// The cell of what lies so many cells from the first.
+fn cell(along: f64, cells: usize) -> usize {
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "cells from the lowest"
+    )]
+    let cell = along.max(0.0) as usize;
+    cell.min(cells - 1)
 }
 
 /// Cells of the part of the detector that the rows cover.
@@ -173,13 +243,7 @@ impl Grid {
     fn cell(&self, at_px: [f64; 2]) -> usize {
         let [x, y] = [0, 1].map(|axis| {
             let along = (at_px[axis] - self.from_px[axis]) / self.cell_px[axis];
-            #[expect(
-                clippy::cast_possible_truncation,
-                clippy::cast_sign_loss,
-                reason = "cells from the lowest place"
-            )]
-            let cell = along.max(0.0) as usize;
-            cell.min(CELLS - 1)
+            cell(along, CELLS)
         });
         Self::at(x, y)
     }

@@ -25,6 +25,8 @@ use crate::star::evidence::StarEvidence;
 
 /// Chance that any variable of a bundle is told although the noise follows none.
 const ALPHA: f64 = 0.001;
+/// Chance below which a variable says by what stars differ of which it is certain that they do.
+const SAYS: f64 = 0.05;
 
 /// What the noise follows, most certain first.
 #[derive(Clone, Debug, Default)]
@@ -43,6 +45,13 @@ impl NoiseFollows {
         unattributed.present = true;
         unattributed.noise_depends_on = self.0;
     }
+}
+
+/// What stars tell as they move and what they tell by where they are, which know nothing of each other, say the same
+/// (Fisher 1925: P = pq (1 - ln pq)).
+fn together(within: Judged, among: Judged) -> Option<Judged> {
+    let both = (within[0] * among[0]).max(f64::MIN_POSITIVE);
+    Some([both * (1.0 - both.ln()), within[1].max(among[1])])
 }
 
 /// Looks at the squares of `residual`, which the stars leave at `level` beside `claimed`.
@@ -105,7 +114,11 @@ pub(crate) fn noise_follows(
         if matches!(variable, Variable::Position(_) | Variable::Colour) {
             let between =
                 |k: usize| both(all.between(&columns[0], k), fast.between(&columns[1], k));
-            judged.extend([between(0), between(1)]);
+            let among = [between(0), between(1)];
+            let said = |k: usize| together(judged[k]?, among[k]?);
+            let said = [said(0), said(1)];
+            judged.extend(said);
+            judged.extend(among);
         }
         if matches!(variable, Variable::Time) {
             judged.push(burst([all, fast], |row| data.t_s[row.at], [*low, *high]));
@@ -128,20 +141,25 @@ pub(crate) fn noise_follows(
     for d in &mut found {
         d.p_value = (d.p_value * tried as f64).min(1.0);
     }
-    found.retain(|d| d.p_value < ALPHA);
     found.sort_by(|a, b| a.p_value.total_cmp(&b.p_value));
-    // stars that differ all over are told where nothing says by what
-    if found.is_empty()
-        && let Some([p, share]) = both(all.scatter(), fast.scatter())
-    {
-        let p_value = p * (tried + 1) as f64;
-        if p_value < ALPHA {
-            found.push(Dependence {
-                variable: "star".to_owned(),
-                variance_explained: share,
-                p_value,
-            });
-        }
+    let certain = found.iter().take_while(|d| d.p_value < ALPHA).count();
+    // stars that differ all over: by what says most, if anything does
+    let differ = if certain == 0 {
+        both(all.scatter(), fast.scatter())
+    } else {
+        None
+    };
+    let differ = differ.filter(|[p, _]| p * ((tried + 1) as f64) < ALPHA);
+    found.truncate(match differ {
+        Some(_) => found.iter().take_while(|d| d.p_value < SAYS).count(),
+        None => certain,
+    });
+    if let Some([p, share]) = differ {
+        found.push(Dependence {
+            variable: "star".to_owned(),
+            variance_explained: share,
+            p_value: p * (tried + 1) as f64,
+        });
     }
     Ok(NoiseFollows(first_of_each(found, |d| &d.variable)))
 }

@@ -106,6 +106,7 @@ impl Empirical {
             | Variable::Quarter
             | Variable::Beyond { .. }
             | Variable::Patch { .. }
+            | Variable::During { .. }
             | Variable::Since { .. } => 2,
             Variable::Time if stars => FIELDS * ORDERS,
             // A polynomial in time is only good outside its fold if it is straight.
@@ -187,7 +188,7 @@ impl Empirical {
     pub(crate) fn is_of_time(&self) -> bool {
         let of_time = matches!(
             self.variable,
-            Variable::Time | Variable::Turning | Variable::Since { .. }
+            Variable::Time | Variable::Turning | Variable::During { .. } | Variable::Since { .. }
         );
         of_time && self.by.is_none()
     }
@@ -202,6 +203,7 @@ impl Empirical {
         matches!(
             self.variable,
             Variable::Turning
+                | Variable::During { .. }
                 | Variable::Since { .. }
                 | Variable::Beyond { .. }
                 | Variable::Patch { .. }
@@ -211,7 +213,8 @@ impl Empirical {
     /// What it pays for the instant or place that was looked for, nats.
     pub(crate) fn scanned(&self) -> f64 {
         match self.variable {
-            Variable::Since { tried, .. }
+            Variable::During { tried, .. }
+            | Variable::Since { tried, .. }
             | Variable::Beyond { tried, .. }
             | Variable::Patch { tried, .. } => (tried.max(1) as f64).ln(),
             _ => 0.0,
@@ -459,7 +462,8 @@ impl Candidate for Empirical {
                 Variable::Half(_)
                 | Variable::Quarter
                 | Variable::Beyond { .. }
-                | Variable::Patch { .. } => {
+                | Variable::Patch { .. }
+                | Variable::During { .. } => {
                     put(0, values[i], 0.0);
                     put(1, 0.0, values[i]);
                 }
@@ -542,6 +546,7 @@ impl Candidate for Empirical {
                 | Variable::Patch { .. }
                 | Variable::PhaseProduct
                 | Variable::Turning
+                | Variable::During { .. }
                 | Variable::Since { .. }
         ) {
             return Err(EffectError::WrongType {

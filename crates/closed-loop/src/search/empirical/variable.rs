@@ -37,6 +37,12 @@ pub(crate) enum Variable {
     Time,
     /// The time, of frames that turn to and fro with it: what a slow error of the reference does, too.
     Turning,
+    /// Within a stretch of time that was looked for among so many.
+    During {
+        from_s: f64,
+        to_s: f64,
+        tried: usize,
+    },
     /// Before and after an instant that was looked for among so many.
     Since {
         at_s: f64,
@@ -72,7 +78,7 @@ impl Variable {
             Self::Phase(0) => "pixel_phase_x".into(),
             Self::Phase(_) => "pixel_phase_y".into(),
             Self::PhaseProduct => "pixel_phase_x*pixel_phase_y".into(),
-            Self::Time | Self::Turning | Self::Since { .. } => "time".into(),
+            Self::Time | Self::Turning | Self::During { .. } | Self::Since { .. } => "time".into(),
             Self::Rate => "rate".into(),
             Self::Acceleration => "acceleration".into(),
             Self::Magnitude => "mag".into(),
@@ -122,7 +128,7 @@ impl Variable {
             Self::Quarter | Self::Patch { .. } => 0,
             Self::Phase(axis) => 2 + axis,
             Self::PhaseProduct => 2,
-            Self::Time | Self::Turning | Self::Since { .. } => 4,
+            Self::Time | Self::Turning | Self::During { .. } | Self::Since { .. } => 4,
             Self::Rate => 5,
             Self::Acceleration => 6,
             Self::Magnitude => 7,
@@ -141,6 +147,9 @@ impl Variable {
             Self::Position(0) => rows.x_px[i],
             Self::Position(_) => rows.y_px[i],
             Self::Time | Self::Turning => rows.t_s[i],
+            Self::During { from_s, to_s, .. } => {
+                f64::from(u8::from(*from_s < rows.t_s[i] && rows.t_s[i] <= *to_s))
+            }
             Self::Since { at_s, .. } => f64::from(u8::from(rows.t_s[i] > *at_s)),
             Self::Magnitude => rows.mag[i],
             Self::Colour => rows.bv[i],
