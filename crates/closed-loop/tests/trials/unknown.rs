@@ -118,3 +118,26 @@ fn a_scale_that_jumps_is_no_drift() {
     }
     assert!(told >= 7, "{told} of 10");
 }
+
+/// Frames that turn evenly by 3.5 arcsec, or to and fro by as much, in 420 s: 10080 rows of 5.25 arcsec know an even
+/// turn of stars alike to 5.25 sqrt(12/10080) = 0.18 arcsec. A slow error of the reference that lasts as long as the run
+/// and an orbit of twenty minutes look like it, and are neither as likely nor in nature.
+#[test]
+fn a_turn_with_the_time_is_neither_an_error_of_the_reference_nor_an_orbit() {
+    for seed in 0..4 {
+        let (model, mut bundle) = Case::new(Path::Drift, 700 + seed).make();
+        let stars = bundle.stars.as_mut().expect("the trial has stars");
+        let t_s = stars.t_of_rows_s();
+        let last = t_s.last().copied().unwrap_or(0.0);
+        for row in 0..stars.x_px.len() {
+            let t = 2.0 * t_s[row] / last - 1.0;
+            let turn = if seed % 2 == 0 { 0.5 * t } else { t * t };
+            stars.x_px[row] += 3.5 / 70.5 * turn;
+        }
+        let report = closed(&model, &bundle).expect("the loop closes").report;
+        let left = &report.unattributed;
+        assert!(report.effects.is_empty(), "{seed}: {:?}", report.effects);
+        let first = left.depends_on.first().map(|d| d.variable.as_str());
+        assert_eq!(first, Some("time"), "{seed}: {left:?}");
+    }
+}
