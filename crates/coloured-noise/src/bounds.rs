@@ -66,7 +66,7 @@ impl Coloured {
             });
         let summit = self.log_likelihood_beside_constant(t_s, y, count);
         let grid = Grid {
-            widest: (FURTHEST.ln() / steps[0]) as i32,
+            widest: FURTHEST.ln() / steps[0],
             density: |[slow, tau]: [f64; 2]| {
                 let noise = Self {
                     slow: self.slow * (slow * steps[0]).exp(),
@@ -111,7 +111,7 @@ impl Coloured {
 struct Grid<D> {
     density: D,
     /// Steps of ln slow on either side.
-    widest: i32,
+    widest: f64,
 }
 
 /// Densities along ln slow at one tau.
@@ -165,7 +165,7 @@ impl<D: Fn([f64; 2]) -> f64> Grid<D> {
                 let density = (self.density)([f64::from(j), f64::from(at)]);
                 row.densities.push((j, density));
                 highest = highest.max(density);
-                if density <= FAINT * highest || j.abs() >= self.widest {
+                if density <= FAINT * highest || f64::from(j.abs()) >= self.widest {
                     break;
                 }
                 j += towards;

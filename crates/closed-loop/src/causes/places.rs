@@ -277,3 +277,35 @@ impl Patch {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Three rows of a star at 0 and one at 4 in the set: 4 is 3/4 of n (share - share^2) d^2 = 3/4 * 16 = 12, whatever it
+    /// keeps all the time; a star that never leaves the set tells nothing.
+    #[test]
+    fn what_a_star_keeps_tells_nothing() {
+        for constant in [0.0, 7.0] {
+            let row = |shift: f64| Sum::of(1.0, [constant + shift, -constant]);
+            let mut all = row(4.0);
+            (0..3).for_each(|_| all.add(&row(0.0)));
+            let mut shift = Shift::default();
+            shift.add(&row(4.0), &all);
+            assert!((shift.power() - 12.0).abs() < 1e-12, "{shift:?}");
+            shift.add(&all, &all);
+            assert!((shift.power() - 12.0).abs() < 1e-12, "{shift:?}");
+        }
+    }
+
+    /// Squares of an eighth begin at every sixteenth, of a quarter at every eighth, and none goes beyond the grid.
+    #[test]
+    fn patches_cover_the_grid() {
+        let all: Vec<Patch> = Patch::all().collect();
+        assert_eq!(all.len(), 15 * 15 + 7 * 7);
+        let ends = all.iter().flat_map(|p| p.from.map(|from| from + p.cells));
+        assert_eq!(ends.max(), Some(CELLS));
+        assert_eq!(cell(-0.5, 4), 0);
+        assert_eq!(cell(4.0, 4), 3, "the last place is in the last cell");
+    }
+}
