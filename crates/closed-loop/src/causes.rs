@@ -35,6 +35,7 @@ use crate::search::{Found, borrowed, family, fit_beside, joined, without};
 use crate::star::evidence::StarEvidence;
 use crate::star::landing::Elsewhere;
 use crate::star::search::{Attempt, Searched, attempt, declared_noise};
+use by_channel::by_channel;
 use changing_effect::{Changing, Inner, Way};
 use commonness::Slow;
 use description::{Described, Kept, Part, grown};
@@ -42,6 +43,7 @@ use invariance::{Change, changing};
 use stand_ins::{BY_FAR, describe, stand_ins};
 use star_constants::Constants;
 
+mod by_channel;
 mod changing_effect;
 pub(crate) mod commonness;
 pub(crate) mod description;
@@ -224,6 +226,9 @@ pub(crate) fn run<'a>(
             let mut terms = (quest.terms)(wander);
             terms.extend(grown.clone());
             terms.extend(places.clone());
+            let residual = inside.as_deref();
+            let channels = residual.map(|r| by_channel(white.data, r, &beside.weight, &terms));
+            terms.extend(channels.into_iter().flatten());
             terms.extend(found_terms.iter().cloned());
             terms
         };

@@ -32,7 +32,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 use telemetry::report::{Dependence, Unattributed};
 
 /// Stars beyond which none has a term of its own.
-const MOST_STARS: usize = 64;
+pub(crate) const MOST_STARS: usize = 64;
 /// Stars beyond which an effect is not tried with a size for each.
 const MOST_OF_OWN_SIZE: usize = 24;
 /// Chance beyond which stars differ by more than a line through them.
@@ -460,7 +460,9 @@ pub(crate) fn terms(
         terms.extend(two(&star, &time));
     }
     if let Some(slots) = own_slots(data) {
-        terms.extend(one(&(Variable::Slot(slots), [0.0, 1.0])));
+        let slot = (Variable::Slot(slots), [0.0, 1.0]);
+        terms.extend(one(&slot));
+        terms.extend(two(&slot, &time));
     }
     let mut scalars = vec![&time, &mag, &colour];
     if channels.len() <= MOST_CHANNELS {
@@ -535,7 +537,7 @@ pub(crate) fn could_yield(situation: &Situation<'_>, data: &StarData, rms: [f64;
 }
 
 /// The slots, where they are not just the stars under another name.
-fn own_slots(data: &StarData) -> Option<Vec<i32>> {
+pub(crate) fn own_slots(data: &StarData) -> Option<Vec<i32>> {
     let mut pairs: Vec<(i32, i64)> = data
         .frames
         .slot

@@ -33,7 +33,7 @@ use effects::{
     AttitudeRows, Candidate, Coefficient, Effect, EffectError, LARGEST_WAVE_PX, PixelWave,
     StarRows, Surroundings,
 };
-use focal_plane::{Camera, PointsMut, VectorsMut};
+use focal_plane::{Camera, PointsMut, Series, VectorsMut};
 
 use crate::search::LEADING;
 use variable::{Scale, orders};
@@ -73,6 +73,8 @@ pub(crate) struct Empirical {
     scale: Scale,
     /// The variable whose first polynomial multiplies all columns.
     by: Option<(Variable, Scale)>,
+    /// Pairs like it among which it was looked for.
+    among: usize,
     /// Whether it moves stars, or attitudes.
     stars: bool,
     coefficients: Vec<Coefficient>,
@@ -120,6 +122,7 @@ impl Empirical {
             variable,
             scale,
             by: None,
+            among: 1,
             stars,
             coefficients: coefficients(count),
         })
@@ -145,6 +148,12 @@ impl Empirical {
         }
         term.by = Some((by, scale));
         Some(term)
+    }
+
+    /// The same, which was looked for among so many like it.
+    #[must_use]
+    pub(crate) fn looked_for_among(self, among: usize) -> Self {
+        Self { among, ..self }
     }
 
     /// The same with waves in the pixel phase no larger than this camera's pixels let them be.
@@ -200,14 +209,15 @@ impl Empirical {
 
     /// Whether it stands where it was looked for.
     pub(crate) fn is_looked_for(&self) -> bool {
-        matches!(
+        let placed = matches!(
             self.variable,
             Variable::Turning
                 | Variable::During { .. }
                 | Variable::Since { .. }
                 | Variable::Beyond { .. }
                 | Variable::Patch { .. }
-        )
+        );
+        placed || self.among > 1
     }
 
     /// What it pays for the instant or place that was looked for, nats.
@@ -217,13 +227,23 @@ impl Empirical {
             | Variable::Since { tried, .. }
             | Variable::Beyond { tried, .. }
             | Variable::Patch { tried, .. } => (tried.max(1) as f64).ln(),
-            _ => 0.0,
+            _ => (self.among.max(1) as f64).ln(),
         }
     }
 
     /// Whether it is a housekeeping channel alone.
     pub(crate) fn is_of_channel(&self) -> bool {
         matches!(self.variable, Variable::Housekeeping(..)) && self.by.is_none()
+    }
+
+    /// The channel that it is of alone, and the values of it that are -1 and 1.
+    pub(crate) fn channel(&self) -> Option<(&Variable, &Series, [f64; 2])> {
+        let Variable::Housekeeping(_, series) = &self.variable else {
+            return None;
+        };
+        let Scale { middle, half } = self.scale;
+        let alone = self.by.is_none();
+        alone.then_some((&self.variable, series, [middle - half, middle + half]))
     }
 
     /// Whether it is a shift of each star.
