@@ -251,7 +251,10 @@ pub(crate) fn run<'a>(
         if let Some(wander) = searched.wander.as_ref().filter(|_| !last) {
             // what turns whole frames with the time may be what errs as slowly
             let mut all = (quest.terms)(false);
-            all.extend(description::turning(white.data));
+            let turning = description::turning(white.data);
+            // all that the time does otherwise is among it
+            all.retain(|t| turning.is_none() || !t.is_of_time());
+            all.extend(turning);
             let residual = inside.as_deref();
             all.extend(residual.and_then(|r| places::stretch(white.data, r, &beside.weight)));
             let plain = Described::new(&beside, folds, &searched.found, all, &[])?;

@@ -81,13 +81,16 @@ pub(super) fn by_channel(
         })
         .collect();
     let counts = |row: usize| !data.outlier[row] && rx[row].is_finite() && ry[row].is_finite();
-    let rows: Vec<usize> = (0..data.t_s.len()).filter(|&r| counts(r)).collect();
-    let square = |row: usize| weight[row].powi(2) * (rx[row].powi(2) + ry[row].powi(2));
-    let variance = rows.iter().map(|&r| square(r)).sum::<f64>() / (2 * rows.len()).max(1) as f64;
+    let rows = || (0..data.t_s.len()).filter(|&r| counts(r));
+    let (count, squares) = rows().fold((0.0, 0.0), |(n, sum), r| {
+        let square = weight[r].powi(2) * (rx[r].powi(2) + ry[r].powi(2));
+        (n + 2.0, sum + square)
+    });
+    let variance = squares / f64::max(count, 1.0);
     let term = |variable: Variable, of: &dyn Fn(usize) -> usize, count: usize| {
         let powers = z.iter().map(|z| {
             let mut sums = vec![Sums::default(); count];
-            for &row in &rows {
+            for row in rows() {
                 let r = [rx[row], ry[row]];
                 sums[of(row)].add(weight[row].powi(2), z[frame[row] as usize], r);
             }

@@ -88,16 +88,19 @@ pub(super) fn places(data: &StarData, residual: &[Vec<f64>], weight: &[f64]) -> 
     };
     let grid = Grid::of(data);
     let counts = |row: usize| !data.outlier[row] && rx[row].is_finite() && ry[row].is_finite();
-    let mut of_star: Vec<Vec<usize>> = vec![Vec::new(); data.stars.len()];
     let (mut squares, mut count) = (0.0, 0.0);
-    for row in (0..data.t_s.len()).filter(|&r| counts(r)) {
-        of_star[data.star[row]].push(row);
+    let mut rows_of = vec![0; data.stars.len()];
+    let counted = || (0..data.t_s.len()).filter(|&r| counts(r));
+    for row in counted() {
+        rows_of[data.star[row]] += 1;
         squares += weight[row].powi(2) * (rx[row].powi(2) + ry[row].powi(2));
         count += 2.0;
     }
     if squares <= 0.0 {
         return Vec::new();
     }
+    let mut of_star: Vec<Vec<usize>> = rows_of.into_iter().map(Vec::with_capacity).collect();
+    counted().for_each(|row| of_star[data.star[row]].push(row));
     let mut edges = vec![Shift::default(); 2 * CELLS];
     let mut patches = vec![Shift::default(); PATCHES.map(|n| Patch::along(n).pow(2)).iter().sum()];
     let mut cells = vec![Sum::default(); CELLS * CELLS];
