@@ -141,3 +141,26 @@ fn a_turn_with_the_time_is_neither_an_error_of_the_reference_nor_an_orbit() {
         assert_eq!(first, Some("time"), "{seed}: {left:?}");
     }
 }
+
+/// One star that goes by 4 arcsec with a temperature that swings in five minutes: 840 rows of 5.25 arcsec know a swing of
+/// one star to 5.25 sqrt(2/840) = 0.26 arcsec. Shears with the temperature, or with it and the colour, have some of it.
+#[test]
+fn a_star_that_follows_a_temperature_is_told() {
+    for seed in 0..3 {
+        let (model, mut bundle) = Case::new(Path::Drift, 720 + seed).make();
+        let stars = bundle.stars.as_mut().expect("the trial has stars");
+        let (t_s, odd) = (stars.t_of_rows_s(), stars.star_id[3]);
+        for (row, t_s) in t_s.iter().enumerate() {
+            if stars.star_id[row] == odd {
+                let phase = std::f64::consts::TAU * t_s / 300.0 + 40.0_f64.to_radians();
+                stars.x_px[row] += 4.0 / 70.5 * phase.sin();
+            }
+        }
+        let report = closed(&model, &bundle).expect("the loop closes").report;
+        let left = &report.unattributed;
+        assert!(report.effects.is_empty(), "{seed}: {:?}", report.effects);
+        let first = left.depends_on.first().map(|d| d.variable.as_str());
+        let wanted = Some("star*housekeeping:optics_c");
+        assert_eq!(first, wanted, "{seed}: {left:?}");
+    }
+}
