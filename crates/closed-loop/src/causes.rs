@@ -35,10 +35,9 @@ use crate::search::{Found, borrowed, family, fit_beside, joined, without};
 use crate::star::evidence::StarEvidence;
 use crate::star::landing::Elsewhere;
 use crate::star::search::{Attempt, Searched, attempt, declared_noise};
-use by_channel::by_channel;
 use changing_effect::{Changing, Inner, Way};
 use commonness::Slow;
-use description::{Described, Kept, Part, grown};
+use description::{Described, Kept, Part};
 use invariance::{Change, changing};
 use stand_ins::{BY_FAR, describe, stand_ins};
 use star_constants::Constants;
@@ -218,18 +217,12 @@ pub(crate) fn run<'a>(
         if !turns && (0..searched.found.selection.chosen.len()).any(too_fast) {
             found_terms.extend(description::turning(white.data));
         }
-        let grown = grown(level, inside.as_deref());
-        let places = inside.as_deref().map_or_else(Vec::new, |inside| {
-            places::places(white.data, inside, &level.weight)
+        let sought = inside.as_deref().map_or_else(Vec::new, |inside| {
+            description::sought(level, inside, &(quest.terms)(false))
         });
         let terms = |wander: bool| {
             let mut terms = (quest.terms)(wander);
-            terms.extend(grown.clone());
-            terms.extend(places.clone());
-            let residual = inside.as_deref();
-            let channels = residual.map(|r| by_channel(white.data, r, &beside.weight, &terms));
-            terms.extend(channels.into_iter().flatten());
-            terms.extend(found_terms.iter().cloned());
+            terms.extend(sought.iter().chain(&found_terms).cloned());
             terms
         };
         let all = terms(searched.wander.is_some());

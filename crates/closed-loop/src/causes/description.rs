@@ -13,7 +13,9 @@ use focal_plane::{AttitudeSeries, Camera, PointsMut, VectorsMut};
 use spectra::robust::median_step;
 use std::sync::{Arc, OnceLock};
 
+use crate::causes::by_channel::by_channel;
 use crate::causes::changing_effect::{Changing, Inner, Way};
+use crate::causes::places::places;
 use crate::error::CloseError;
 use crate::figures::{self, Followed};
 use crate::gaps::longest_step;
@@ -499,10 +501,22 @@ pub(crate) fn turning(data: &StarData) -> Option<Empirical> {
     Empirical::new(Variable::Turning, range(data.t_s.iter().copied()), true)
 }
 
-/// A scale that is another one from an instant on: the likeliest in what is left, `inside`, arcsec.
-pub(crate) fn grown(level: &StarEvidence<'_>, inside: Option<&[Vec<f64>]>) -> Option<Empirical> {
-    let SharedJump { at_s, tried } = jumps::growth(level.data, inside?, &level.weight)?;
-    Empirical::new(Variable::Since { at_s, tried }, [0.0, 1.0], true)
+/// Terms that stand where what is left, `inside` (arcsec), has them: a scale that is another one from an instant on, an
+/// edge or a patch of the detector, a channel of `terms` that one star or slot follows.
+pub(crate) fn sought(
+    level: &StarEvidence<'_>,
+    inside: &[Vec<f64>],
+    terms: &[Empirical],
+) -> Vec<Empirical> {
+    let (data, weight) = (level.data, &level.weight);
+    let grown = jumps::growth(data, inside, weight);
+    let grown = grown.and_then(|SharedJump { at_s, tried }| {
+        Empirical::new(Variable::Since { at_s, tried }, [0.0, 1.0], true)
+    });
+    let mut sought: Vec<Empirical> = grown.into_iter().collect();
+    sought.extend(places(data, inside, weight));
+    sought.extend(by_channel(data, inside, weight, terms));
+    sought
 }
 
 /// Whether the rotation from one frame to the next is the same all the time, but for [`UNSTEADY`] of it.
