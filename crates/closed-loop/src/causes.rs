@@ -39,7 +39,8 @@ use changing_effect::{Changing, Inner, Way};
 use commonness::Slow;
 use description::{Described, Kept, Part};
 use invariance::{Change, changing};
-use stand_ins::{BY_FAR, describe, stand_ins};
+use one_star::is_one_star;
+use stand_ins::{Known, describe, stand_ins};
 use star_constants::Constants;
 
 mod by_channel;
@@ -47,10 +48,12 @@ mod changing_effect;
 pub(crate) mod commonness;
 pub(crate) mod description;
 pub(crate) mod invariance;
+mod one_star;
 mod places;
 mod recurrence;
 mod stand_ins;
 pub(crate) mod star_constants;
+mod wanders;
 
 /// Nats by which a slow error of the reference is no likelier than effects in its place: a description that
 /// beats it speaks for them.
@@ -227,6 +230,17 @@ pub(crate) fn run<'a>(
         };
         let all = terms(searched.wander.is_some());
         let described = Described::new(level, folds, &searched.found, all, quest.ways)?;
+        let one_star = |k: usize, (term, columns): &Part| {
+            let chosen = searched.found.selection.chosen[k];
+            let selectors = searched.found.candidates[chosen].selectors();
+            let id = selectors.get("star_id").and_then(|id| id.parse().ok());
+            let slope = &described.terms[*term].term;
+            id.is_some_and(|id| is_one_star(white.data, slope, columns, id))
+        };
+        let known = Known {
+            too_fast: &too_fast,
+            one_star: &one_star,
+        };
         let agreed = |set: &[usize], instead: &[Part]| {
             constants
                 .as_ref()
@@ -242,17 +256,15 @@ pub(crate) fn run<'a>(
             (!left.is_empty()).then_some(left)
         };
         if let Some(wander) = searched.wander.as_ref().filter(|_| !last) {
-            // what turns whole frames with the time may be what errs as slowly
             let mut all = (quest.terms)(false);
-            let turning = description::turning(white.data);
-            // all that the time does otherwise is among it
-            all.retain(|t| turning.is_none() || !t.is_of_time());
-            all.extend(turning);
-            let residual = inside.as_deref();
-            all.extend(residual.and_then(|r| places::stretch(white.data, r, &beside.weight)));
+            all.extend(wanders::terms(
+                white.data,
+                inside.as_deref(),
+                &beside.weight,
+            ));
             let plain = Described::new(&beside, folds, &searched.found, all, &[])?;
             let axes = wander.axes().iter().filter(|a| **a).count();
-            if let Some(instead) = in_place_of_wander(&described, &plain, axes) {
+            if let Some(instead) = wanders::in_place(&described, &plain, axes) {
                 let tie = wander.behind.is_some_and(|nats| nats < TIE);
                 // what it beats speaks against no effect
                 if reinstated(&mut refused) || tie && suffice(&beside, folds, quest, &may)? {
@@ -279,7 +291,7 @@ pub(crate) fn run<'a>(
             }
         }
         if !last {
-            if let Some((set, instead)) = stand_ins(&described, &agreed, &too_fast) {
+            if let Some((set, instead)) = stand_ins(&described, &agreed, &known) {
                 let chosen = &searched.found.selection.chosen;
                 let families = set
                     .iter()
@@ -316,7 +328,7 @@ pub(crate) fn run<'a>(
             // nothing that is still spoken against is named
             let chosen = searched.found.selection.chosen.clone();
             let spoken =
-                stand_ins(&described, &agreed, &too_fast).map(|(set, _)| (set, Refusal::StandIn));
+                stand_ins(&described, &agreed, &known).map(|(set, _)| (set, Refusal::StandIn));
             let beside = best_beside(&searched.found, &may);
             let changes = changing(&described, beside)
                 .map(|c| (vec![c.chosen], Refusal::Change(c.way.name())));
@@ -420,7 +432,11 @@ fn suffice(
         return Ok(false);
     };
     let described = Described::new(level, folds, &searched.found, (quest.terms)(false), &[])?;
-    Ok(!described.chosen.is_empty() && stand_ins(&described, &|_, _| false, &|_| false).is_none())
+    let nothing = Known {
+        too_fast: &|_| false,
+        one_star: &|_, _| false,
+    };
+    Ok(!described.chosen.is_empty() && stand_ins(&described, &|_, _| false, &nothing).is_none())
 }
 
 /// Families of the chosen effects that see the acceleration, where it comes from the samples of a reference
@@ -594,28 +610,16 @@ impl Described {
     }
 
     /// Whether these are of the time alone.
-    fn is_of_time(&self, parts: &[Part]) -> bool {
+    pub(super) fn is_of_time(&self, parts: &[Part]) -> bool {
         parts.iter().all(|(k, _)| self.terms[*k].term.is_of_time())
     }
 
     /// `parts` but for the time, where that is not alone: a step looks like it, and is looked for beside the others.
-    fn before_time(&self, parts: &[Part]) -> Vec<Part> {
+    pub(super) fn before_time(&self, parts: &[Part]) -> Vec<Part> {
         let alone = self.is_of_time(parts);
         let first = |(k, _): &&Part| alone || !self.terms[*k].term.is_of_time();
         parts.iter().filter(first).cloned().collect()
     }
-}
-
-/// What the stars follow, where that beats a slow error of the reference about `axes` axes: `coloured` is beside it,
-/// `plain` under white noise. The time alone, too: what lasts as long as the run is a drift by another name.
-fn in_place_of_wander(coloured: &Described, plain: &Described, axes: usize) -> Option<Vec<Part>> {
-    let (worth, parts) = plain.rest()?;
-    let set = columns_of(&coloured.fitted.groups, &coloured.chosen);
-    let with = coloured.fitted.fits.out_of_fold(&set)?.total_loglik() + coloured.fitted.log_scale;
-    // a size and a time each
-    let paid = axes as f64 * plain.fitted.scalars.max(2.0).ln();
-    let looked = plain.looked() * parts.len() as f64;
-    (worth - looked > with - paid + BY_FAR).then(|| plain.before_time(parts))
 }
 
 /// The terms of a description that were looked for.

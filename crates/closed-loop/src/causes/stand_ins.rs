@@ -25,7 +25,8 @@
 //! of an effect of 10 sigma beside a cause of 30 that no effect explains the terms describe the cause.
 //!
 //! A star or a pixel is not named where a slope in what the catalogue says of stars explains the same, whatever each was
-//! looked for among: there are as many stars as places on a slope.
+//! looked for among: there are as many stars as places on a slope. Where that slope is nearly that star
+//! ([`super::one_star`]) it has to be worth far more.
 //!
 //! A line that the motion describes nearly as well is the motion's: of all frequencies it would have come
 //! upon that at which the tracker moves. An orbit that no channel tells takes the shape of whatever is slow: one
@@ -38,6 +39,7 @@ use statrs::function::factorial::ln_binomial;
 
 use crate::causes::REMAINDER;
 use crate::causes::description::{Described, Part};
+use crate::search::empirical::Empirical;
 use crate::search::orbits::OWN_SHAPE;
 use crate::search::selection::{FAMILY_ALPHA, columns_of, each};
 use crate::search::without;
@@ -48,6 +50,8 @@ pub(crate) const BY_FAR: f64 = 4.0;
 const LINE: &str = "periodic_misalignment";
 /// What may be on one star in place of a slope.
 const OF_ONE: [&str; 2] = ["catalogue_position", "hot_pixel"];
+/// Nats by which a slope that is nearly one star must be worth more than that star.
+const OF_THAT_STAR: f64 = 10.0;
 /// Terms of a description.
 const MOST_TERMS: usize = 3;
 /// Nats that a further term must be worth.
@@ -56,13 +60,20 @@ const WORTH: f64 = 3.0;
 /// Share of its gain that an effect has beside the description of another cause: all that is not next to nothing.
 const APART: f64 = 1.0 - REMAINDER;
 
+/// What is known of chosen effects beside their columns.
+pub(crate) struct Known<'a> {
+    /// Whether it is an orbit that nature does not have.
+    pub(crate) too_fast: &'a dyn Fn(usize) -> bool,
+    /// Whether this slope is nothing but the star that it is of.
+    pub(crate) one_star: &'a dyn Fn(usize, &Part) -> bool,
+}
+
 /// The chosen set (positions among the chosen) that a description beats by most, if one
-/// does, and that description; what `agreed` holds of counts for the set. `too_fast`: it is an orbit that nature does
-/// not have.
+/// does, and that description; what `agreed` holds of counts for the set.
 pub(crate) fn stand_ins(
     described: &Described,
     agreed: &dyn Fn(&[usize], &[Part]) -> bool,
-    too_fast: &dyn Fn(usize) -> bool,
+    known: &Known<'_>,
 ) -> Option<(Vec<usize>, Vec<Part>)> {
     let groups = &described.fitted.groups;
     let looked = described.looked();
@@ -79,7 +90,7 @@ pub(crate) fn stand_ins(
         let Some(times) = too_large(described, &set, &rest) else {
             continue;
         };
-        let Some((worth, parts)) = describe_at(described, &rest, times) else {
+        let Some((worth, parts)) = describe_at(described, &rest, times, &|_| true) else {
             continue;
         };
         let Some(own) = at_best(described, &set, &rest, times) else {
@@ -92,13 +103,16 @@ pub(crate) fn stand_ins(
         let channel = |(k, _): &Part| described.terms[*k].term.is_of_channel();
         let time = |(k, _): &Part| described.terms[*k].term.is_of_time();
         let own_shape = |parts: &[Part]| {
-            let fast = set.iter().all(|&k| too_fast(k));
+            let fast = set.iter().all(|&k| (known.too_fast)(k));
             parts.iter().all(|part| channel(part) || fast && time(part))
         };
         let star = set.iter().all(|&k| OF_ONE.contains(&described.names[k]));
         let slope = |(k, _): &Part| described.terms[*k].term.is_of_a_star();
+        let that_star = |part: &Part| set.iter().any(|&k| (known.one_star)(k, part));
         let least = if lines && parts.iter().all(motion) {
             -BY_FAR
+        } else if star && parts.iter().all(slope) && parts.iter().any(that_star) {
+            OF_THAT_STAR
         } else if star && parts.iter().all(slope) {
             // what both pay for having been looked for
             let paid: f64 = set.iter().map(|&k| described.paid[k]).sum();
@@ -129,7 +143,7 @@ fn beside_the_rest(described: &Described, set: &[usize], rest: &[usize], times: 
     let part = columns_of(&described.fitted.groups, set);
     let with = [rest, &part].concat();
     let more = || {
-        let (worth, parts) = describe_at(described, &with, times)?;
+        let (worth, parts) = describe_at(described, &with, times, &|_| true)?;
         let left: Vec<usize> = parts.iter().flat_map(|p| described.columns(p)).collect();
         let gain = |beside: &[usize]| {
             Some(likelihood(fits, beside, &part)? - likelihood(fits, beside, &[])?)
@@ -245,11 +259,25 @@ fn beside(fits: &Fits, rest: &[usize], part: &[usize]) -> Option<(Estimate, Vec<
 
 /// The best description of what `rest` leaves: its likelihood after all prices.
 pub(crate) fn describe(described: &Described, rest: &[usize]) -> Option<(f64, Vec<Part>)> {
-    describe_at(described, rest, 1.0)
+    describe_at(described, rest, 1.0, &|_| true)
+}
+
+/// The same of those terms that `may` be taken.
+pub(super) fn describe_with(
+    described: &Described,
+    rest: &[usize],
+    may: &dyn Fn(&Empirical) -> bool,
+) -> Option<(f64, Vec<Part>)> {
+    describe_at(described, rest, 1.0, may)
 }
 
 /// The same where gains count by `times` less.
-fn describe_at(described: &Described, rest: &[usize], times: f64) -> Option<(f64, Vec<Part>)> {
+fn describe_at(
+    described: &Described,
+    rest: &[usize],
+    times: f64,
+    may: &dyn Fn(&Empirical) -> bool,
+) -> Option<(f64, Vec<Part>)> {
     let fits = &described.fitted.fits;
     let price = Price::of(described, times);
     let tried = described.tried();
@@ -259,7 +287,8 @@ fn describe_at(described: &Described, rest: &[usize], times: f64) -> Option<(f64
     let mut parts = Vec::new();
     while parts.len() < MOST_TERMS {
         let mut best: Option<Best<'_>> = None;
-        for (k, term) in described.terms.iter().enumerate() {
+        let open = described.terms.iter().enumerate();
+        for (k, term) in open.filter(|(_, term)| may(&term.term)) {
             for part in &term.parts {
                 if part.iter().any(|c| with.contains(c)) {
                     continue;

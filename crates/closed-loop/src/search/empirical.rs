@@ -187,6 +187,26 @@ impl Empirical {
         of_star && self.by.is_none()
     }
 
+    /// Its value, scaled, for a star of this magnitude, colour and logarithm of the flux; `None` where it is not of that.
+    pub(crate) fn value_of_star(&self, [mag, bv, log_flux]: [f64; 3]) -> Option<f64> {
+        let value = match self.variable {
+            Variable::Magnitude => mag,
+            Variable::Colour => bv,
+            Variable::Flux => log_flux,
+            Variable::Brightness => flux_of(mag),
+            _ => return None,
+        };
+        Some(self.scale.of(value))
+    }
+
+    /// Orders of the polynomials that these columns have.
+    pub(crate) fn orders_of(&self, columns: &[usize]) -> Vec<usize> {
+        let mut orders: Vec<usize> = columns.iter().map(|k| k / FIELDS + 1).collect();
+        orders.sort_unstable();
+        orders.dedup();
+        orders
+    }
+
     /// Whether it is the motion alone.
     pub(crate) fn is_of_motion(&self) -> bool {
         let of_motion = matches!(self.variable, Variable::Rate | Variable::Acceleration);
@@ -205,6 +225,11 @@ impl Empirical {
     /// Whether frames turn to and fro with the time.
     pub(crate) fn turns_to_and_fro(&self) -> bool {
         matches!(self.variable, Variable::Turning)
+    }
+
+    /// Whether frames turn with the time, to and fro or for a stretch of it.
+    pub(crate) fn turns_frames(&self) -> bool {
+        matches!(self.variable, Variable::Turning | Variable::During { .. })
     }
 
     /// Whether it stands where it was looked for.
