@@ -47,7 +47,7 @@ fn leverage(values: &[f64], rows: &[f64], orders: &[usize], star: usize) -> f64 
     let x = |star: usize| {
         DVector::from_fn(orders.len() + 1, |k, _| match k {
             0 => 1.0,
-            k => values[star].powi(orders[k - 1] as i32),
+            k => values[star].powf(orders[k - 1] as f64),
         })
     };
     let size = orders.len() + 1;
