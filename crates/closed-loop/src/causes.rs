@@ -257,11 +257,8 @@ pub(crate) fn run<'a>(
         };
         if let Some(wander) = searched.wander.as_ref().filter(|_| !last) {
             let mut all = (quest.terms)(false);
-            all.extend(wanders::terms(
-                white.data,
-                inside.as_deref(),
-                &beside.weight,
-            ));
+            let residual = inside.as_deref();
+            all.extend(wanders::terms(white.data, wander, residual, &beside.weight));
             let plain = Described::new(&beside, folds, &searched.found, all, &[])?;
             let axes = wander.axes().iter().filter(|a| **a).count();
             if let Some(instead) = wanders::in_place(&described, &plain, axes) {

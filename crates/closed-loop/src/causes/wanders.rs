@@ -8,7 +8,8 @@
 //! ```
 //!
 //! Where nothing else beats it the time may: frames that turn to and fro with its polynomials, or for a stretch of it that
-//! was looked for ([`super::places`]). A slow error looks like that, so that it takes 5 nats more.
+//! was looked for ([`super::places`]). A slow error looks like that, so that it takes 5 nats more, and the error has to last
+//! for a third of the run: then it is a drift by another name.
 //!
 //! Source: Schwarz 1978 for the price of a parameter.
 
@@ -16,21 +17,34 @@ use crate::causes::Part;
 use crate::causes::description::{Described, turning};
 use crate::causes::places::stretch;
 use crate::causes::stand_ins::{BY_FAR, describe_with};
-use crate::search::empirical::Empirical;
+use crate::search::empirical::{Empirical, range};
 use crate::search::selection::columns_of;
 use crate::star::data::StarData;
+use crate::star::search::Wander;
 
 /// Nats more by which a description by the time must beat a slow error, which looks like it.
 const OF_TIME: f64 = 5.0;
 
+/// Share of the span that a slow error lasts for if the time may take its place.
+const LASTS: f64 = 1.0 / 3.0;
+
 /// Terms by which frames turn with the time, which describe nothing else: a slow error of the reference does that, too.
+/// None where `wander` is too short for that.
 pub(super) fn terms(
     data: &StarData,
+    wander: &Wander,
     inside: Option<&[Vec<f64>]>,
     weight: &[f64],
-) -> impl Iterator<Item = Empirical> {
+) -> Vec<Empirical> {
+    let axes = wander.axes();
+    let claimed = (0..3).filter(|&axis| axes[axis]);
+    let tau_s = claimed.map(|axis| wander.noise.reference[axis].tau_s);
+    let [from, to] = range(data.t_s.iter().copied());
+    if tau_s.fold(0.0, f64::max) < LASTS * (to - from) {
+        return Vec::new();
+    }
     let stretch = inside.and_then(|inside| stretch(data, inside, weight));
-    turning(data).into_iter().chain(stretch)
+    turning(data).into_iter().chain(stretch).collect()
 }
 
 /// What the stars follow, where that beats a slow error of the reference about `axes` axes: `coloured` is beside it,
