@@ -220,15 +220,15 @@ pub(crate) fn run<'a>(
         if !turns && (0..searched.found.selection.chosen.len()).any(too_fast) {
             found_terms.extend(description::turning(white.data));
         }
+        let usual = (quest.terms)(searched.wander.is_some());
         let sought = inside.as_deref().map_or_else(Vec::new, |inside| {
-            description::sought(level, inside, &(quest.terms)(false))
+            description::sought(level, inside, &usual)
         });
-        let terms = |wander: bool| {
-            let mut terms = (quest.terms)(wander);
+        let with_sought = |mut terms: Vec<Empirical>| {
             terms.extend(sought.iter().chain(&found_terms).cloned());
             terms
         };
-        let all = terms(searched.wander.is_some());
+        let all = with_sought(usual);
         let described = Described::new(level, folds, &searched.found, all, quest.ways)?;
         let one_star = |k: usize, (term, columns): &Part| {
             let chosen = searched.found.selection.chosen[k];
@@ -362,7 +362,13 @@ pub(crate) fn run<'a>(
         let all = borrowed(&found.candidates);
         let fitted = fit_beside(level, folds, &all, &found.selection.chosen)?;
         let found = Found { fitted, ..found };
-        let described = Described::new(level, folds, &found, terms(wander.is_some()), quest.ways)?;
+        let described = Described::new(
+            level,
+            folds,
+            &found,
+            with_sought((quest.terms)(wander.is_some())),
+            quest.ways,
+        )?;
         // how an effect changes may be among what is described
         let beside = best_beside(&found, &may);
         if let Some(change) = changing(&described, beside).filter(|_| !last) {

@@ -227,10 +227,6 @@ mod tests {
                 z[i] += ((bounds.middle - truth) / bounds.sigma()).powi(2);
             }
         }
-        eprintln!(
-            "{runs} {held:?} {:?}",
-            z.map(|z| (z / f64::from(runs)).sqrt())
-        );
         for (held, z) in held.into_iter().zip(z) {
             assert!(f64::from(held) > 0.86 * f64::from(runs), "{held} of {runs}");
             assert!(z < 1.6_f64.powi(2) * f64::from(runs), "{z} of {runs}");

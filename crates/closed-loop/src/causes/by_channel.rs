@@ -14,6 +14,7 @@
 use focal_plane::Series;
 
 use crate::causes::description::{MOST_STARS, own_slots};
+use crate::causes::places::Left;
 use crate::search::empirical::{Empirical, Variable};
 use crate::star::data::StarData;
 
@@ -62,11 +63,14 @@ pub(super) fn by_channel(
     weight: &[f64],
     terms: &[Empirical],
 ) -> Vec<Empirical> {
-    let [rx, ry] = residual else {
+    let Some(left) = Left::of(data, residual, weight) else {
         return Vec::new();
     };
     let channels: Vec<(&Variable, &Series, [f64; 2])> =
         terms.iter().filter_map(Empirical::channel).collect();
+    if channels.is_empty() {
+        return Vec::new();
+    }
     let frame = data.frames.frame_of_rows();
     let z: Vec<Vec<f64>> = channels
         .iter()
@@ -80,25 +84,19 @@ pub(super) fn by_channel(
                 .collect()
         })
         .collect();
-    let counts = |row: usize| !data.outlier[row] && rx[row].is_finite() && ry[row].is_finite();
-    let rows = || (0..data.t_s.len()).filter(|&r| counts(r));
-    let (count, squares) = rows().fold((0.0, 0.0), |(n, sum), r| {
-        let square = weight[r].powi(2) * (rx[r].powi(2) + ry[r].powi(2));
-        (n + 2.0, sum + square)
-    });
-    let variance = squares / f64::max(count, 1.0);
+    let variance = left.variance();
     let term = |variable: Variable, of: &dyn Fn(usize) -> usize, count: usize| {
         let powers = z.iter().map(|z| {
             let mut sums = vec![Sums::default(); count];
-            for row in rows() {
-                let r = [rx[row], ry[row]];
+            for row in left.rows() {
+                let r = left.residual.map(|r| r[row]);
                 sums[of(row)].add(weight[row].powi(2), z[frame[row] as usize], r);
             }
             let seen = sums.iter().filter(|s| s.rows > 0.0);
             seen.map(Sums::power).fold(0.0, f64::max)
         });
         let (at, power) = powers.enumerate().max_by(|a, b| a.1.total_cmp(&b.1))?;
-        if power <= LEAST * variance {
+        if variance.is_nan() || power <= LEAST * variance {
             return None;
         }
         let (channel, _, range) = channels[at];

@@ -511,7 +511,8 @@ pub(crate) fn sought(
     let (data, weight) = (level.data, &level.weight);
     let grown = jumps::growth(data, inside, weight);
     let grown = grown.and_then(|SharedJump { at_s, tried }| {
-        Empirical::new(Variable::Since { at_s, tried }, [0.0, 1.0], true)
+        let since = Empirical::new(Variable::Since { at_s }, [0.0, 1.0], true)?;
+        Some(since.looked_for_among(tried))
     });
     let mut sought: Vec<Empirical> = grown.into_iter().collect();
     sought.extend(places(data, inside, weight));

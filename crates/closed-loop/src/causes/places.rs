@@ -18,6 +18,7 @@
 
 use crate::search::empirical::{Empirical, Variable, range};
 use crate::star::data::StarData;
+use crate::star::frame_rotation::counts;
 
 /// Cells of the grid along an axis.
 const CELLS: usize = 32;
@@ -52,6 +53,47 @@ impl Sum {
     }
 }
 
+/// What is left of the rows, arcsec, and how much each counts.
+pub(super) struct Left<'a> {
+    data: &'a StarData,
+    pub(super) residual: [&'a [f64]; 2],
+    weight: &'a [f64],
+}
+
+impl<'a> Left<'a> {
+    /// `None` where the residual has not two axes.
+    pub(super) fn of(
+        data: &'a StarData,
+        residual: &'a [Vec<f64>],
+        weight: &'a [f64],
+    ) -> Option<Self> {
+        let [x, y] = residual else { return None };
+        Some(Self {
+            data,
+            residual: [x, y],
+            weight,
+        })
+    }
+
+    /// Those that count.
+    pub(super) fn rows(&self) -> impl Iterator<Item = usize> + '_ {
+        (0..self.data.t_s.len()).filter(|&row| counts(self.data, self.residual, row))
+    }
+
+    /// Mean square of an axis, weighed; NaN where no row counts.
+    pub(super) fn variance(&self) -> f64 {
+        let (count, squares) = self.rows().fold((0.0, 0.0), |(n, sum), row| {
+            let [x, y] = self.residual.map(|r| r[row].powi(2));
+            (n + 2.0, sum + self.weight[row].powi(2) * (x + y))
+        });
+        squares / count
+    }
+
+    fn sum(&self, row: usize) -> Sum {
+        Sum::of(self.weight[row], self.residual.map(|r| r[row]))
+    }
+}
+
 /// Score and information of a shift of a set of cells.
 #[derive(Clone, Copy, Debug, Default)]
 struct Shift {
@@ -83,24 +125,19 @@ impl Shift {
 /// The likeliest edge, and the likeliest patch, in `residual` (arcsec, per axis over all rows), as terms; those that are
 /// worth one.
 pub(super) fn places(data: &StarData, residual: &[Vec<f64>], weight: &[f64]) -> Vec<Empirical> {
-    let [rx, ry] = residual else {
+    let Some(left) = Left::of(data, residual, weight) else {
         return Vec::new();
     };
     let grid = Grid::of(data);
-    let counts = |row: usize| !data.outlier[row] && rx[row].is_finite() && ry[row].is_finite();
-    let (mut squares, mut count) = (0.0, 0.0);
-    let mut rows_of = vec![0; data.stars.len()];
-    let counted = || (0..data.t_s.len()).filter(|&r| counts(r));
-    for row in counted() {
-        rows_of[data.star[row]] += 1;
-        squares += weight[row].powi(2) * (rx[row].powi(2) + ry[row].powi(2));
-        count += 2.0;
-    }
-    if squares <= 0.0 {
+    let variance = left.variance();
+    if variance.is_nan() || variance <= 0.0 {
         return Vec::new();
     }
+    let mut rows_of = vec![0; data.stars.len()];
+    left.rows().for_each(|row| rows_of[data.star[row]] += 1);
     let mut of_star: Vec<Vec<usize>> = rows_of.into_iter().map(Vec::with_capacity).collect();
-    counted().for_each(|row| of_star[data.star[row]].push(row));
+    left.rows()
+        .for_each(|row| of_star[data.star[row]].push(row));
     let mut edges = vec![Shift::default(); 2 * CELLS];
     let mut patches = vec![Shift::default(); PATCHES.map(|n| Patch::along(n).pow(2)).iter().sum()];
     let mut cells = vec![Sum::default(); CELLS * CELLS];
@@ -108,7 +145,7 @@ pub(super) fn places(data: &StarData, residual: &[Vec<f64>], weight: &[f64]) -> 
         cells.fill(Sum::default());
         let mut all = Sum::default();
         for &row in rows {
-            let one = Sum::of(weight[row], [rx[row], ry[row]]);
+            let one = left.sum(row);
             cells[grid.cell([data.modelled[0][row], data.modelled[1][row]])].add(&one);
             all.add(&one);
         }
@@ -133,47 +170,34 @@ pub(super) fn places(data: &StarData, residual: &[Vec<f64>], weight: &[f64]) -> 
             }
         }
     }
-    let variance = squares / count;
     let edge = likeliest(&edges, variance).map(|(at, tried)| {
         let axis = at / CELLS;
-        Variable::Beyond {
-            axis,
-            at_px: grid.line_px(axis, at % CELLS + 1),
-            tried,
-        }
+        let at_px = grid.line_px(axis, at % CELLS + 1);
+        (Variable::Beyond { axis, at_px }, tried)
     });
     let patch = likeliest(&patches, variance).and_then(|(at, tried)| {
         let patch = Patch::all().nth(at)?;
         let bounds = |more: usize| [0, 1].map(|axis| grid.line_px(axis, patch.from[axis] + more));
-        Some(Variable::Patch {
-            from_px: bounds(0),
-            to_px: bounds(patch.cells),
-            tried,
-        })
+        let [from_px, to_px] = [bounds(0), bounds(patch.cells)];
+        Some((Variable::Patch { from_px, to_px }, tried))
     });
-    let terms = edge.into_iter().chain(patch);
-    terms
-        .filter_map(|variable| Empirical::new(variable, [0.0, 1.0], true))
+    let found = edge.into_iter().chain(patch);
+    found
+        .filter_map(|(variable, tried)| term(variable, tried))
         .collect()
 }
 
 /// The likeliest stretch of time in which all stars are shifted alike, as a term, if it is worth one.
 pub(super) fn stretch(data: &StarData, residual: &[Vec<f64>], weight: &[f64]) -> Option<Empirical> {
-    let [rx, ry] = residual else { return None };
+    let left = Left::of(data, residual, weight)?;
     let [from, to] = range(data.t_s.iter().copied());
     let cell_s = (to - from) / STRETCHES as f64;
     let mut cells = vec![Sum::default(); STRETCHES];
     let mut all = Sum::default();
-    let (mut squares, mut count) = (0.0, 0.0);
-    for row in 0..data.t_s.len() {
-        if data.outlier[row] || !rx[row].is_finite() || !ry[row].is_finite() {
-            continue;
-        }
-        let one = Sum::of(weight[row], [rx[row], ry[row]]);
+    for row in left.rows() {
+        let one = left.sum(row);
         cells[cell((data.t_s[row] - from) / cell_s, STRETCHES)].add(&one);
         all.add(&one);
-        squares += weight[row].powi(2) * (rx[row].powi(2) + ry[row].powi(2));
-        count += 2.0;
     }
     let lengths = (1..).map(|k| 1 << k).take_while(|n| *n < STRETCHES);
     let stretches: Vec<[usize; 2]> = lengths
@@ -195,14 +219,14 @@ pub(super) fn stretch(data: &StarData, residual: &[Vec<f64>], weight: &[f64]) ->
             shift
         })
         .collect();
-    let (at, tried) = likeliest(&shifts, squares / count)?;
+    let (at, tried) = likeliest(&shifts, left.variance())?;
     let [from_s, to_s] = stretches[at].map(|cell| from + cell_s * cell as f64);
-    let variable = Variable::During {
-        from_s,
-        to_s,
-        tried,
-    };
-    Empirical::new(variable, [0.0, 1.0], true)
+    term(Variable::During { from_s, to_s }, tried)
+}
+
+/// A shift where `variable` is 1, which was looked for among so many.
+fn term(variable: Variable, tried: usize) -> Option<Empirical> {
+    Some(Empirical::new(variable, [0.0, 1.0], true)?.looked_for_among(tried))
 }
 
 /// The one of `shifts` that takes most, and how many there are, where it is worth a term.

@@ -60,7 +60,9 @@ pub(super) fn in_place(coloured: &Described, plain: &Described, axes: usize) -> 
         let by = if time { BY_FAR + OF_TIME } else { BY_FAR };
         worth - plain.looked() * parts.len() as f64 > with - paid + by
     };
-    [false, true].into_iter().find_map(|turned| {
+    let turns = plain.terms.iter().any(|t| t.term.turns_frames());
+    let ways: &[bool] = if turns { &[false, true] } else { &[false] };
+    ways.iter().find_map(|&turned| {
         let may = |term: &Empirical| turned || !term.turns_frames();
         let (worth, parts) = describe_with(plain, &beside, &may)?;
         better(worth, &parts).then(|| plain.before_time(&parts))

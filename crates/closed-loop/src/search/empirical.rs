@@ -73,8 +73,8 @@ pub(crate) struct Empirical {
     scale: Scale,
     /// The variable whose first polynomial multiplies all columns.
     by: Option<(Variable, Scale)>,
-    /// Pairs like it among which it was looked for.
-    among: usize,
+    /// How many like it it was looked for among, if it was.
+    among: Option<usize>,
     /// Whether it moves stars, or attitudes.
     stars: bool,
     coefficients: Vec<Coefficient>,
@@ -122,7 +122,7 @@ impl Empirical {
             variable,
             scale,
             by: None,
-            among: 1,
+            among: None,
             stars,
             coefficients: coefficients(count),
         })
@@ -153,7 +153,10 @@ impl Empirical {
     /// The same, which was looked for among so many like it.
     #[must_use]
     pub(crate) fn looked_for_among(self, among: usize) -> Self {
-        Self { among, ..self }
+        Self {
+            among: Some(among),
+            ..self
+        }
     }
 
     /// The same with waves in the pixel phase no larger than this camera's pixels let them be.
@@ -232,28 +235,14 @@ impl Empirical {
         matches!(self.variable, Variable::Turning | Variable::During { .. })
     }
 
-    /// Whether it stands where it was looked for.
+    /// Whether it is none of the usual terms: it stands where it was looked for, or turns frames to and fro.
     pub(crate) fn is_looked_for(&self) -> bool {
-        let placed = matches!(
-            self.variable,
-            Variable::Turning
-                | Variable::During { .. }
-                | Variable::Since { .. }
-                | Variable::Beyond { .. }
-                | Variable::Patch { .. }
-        );
-        placed || self.among > 1
+        self.among.is_some() || self.turns_to_and_fro()
     }
 
-    /// What it pays for the instant or place that was looked for, nats.
+    /// What it pays for having been looked for, nats.
     pub(crate) fn scanned(&self) -> f64 {
-        match self.variable {
-            Variable::During { tried, .. }
-            | Variable::Since { tried, .. }
-            | Variable::Beyond { tried, .. }
-            | Variable::Patch { tried, .. } => (tried.max(1) as f64).ln(),
-            _ => (self.among.max(1) as f64).ln(),
-        }
+        self.among.map_or(0.0, |among| (among.max(1) as f64).ln())
     }
 
     /// Whether it is a housekeeping channel alone.

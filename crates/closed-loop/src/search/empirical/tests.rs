@@ -264,3 +264,17 @@ fn a_range_about_the_mean_holds_all_values() {
     let [low, high] = about_mean([f64::NAN].into_iter());
     assert!(low >= high || !low.is_finite());
 }
+
+/// A star that follows the only channel that there is was looked for all the same, at no price; an instant of many pays.
+#[test]
+fn what_was_looked_for_among_one_was_looked_for() {
+    let pair = || {
+        let star = Variable::Star(vec![7]);
+        Empirical::pair(star, [0.0, 1.0], Variable::Time, [0.0, 1.0]).expect("a range")
+    };
+    assert!(!pair().is_looked_for());
+    let one = pair().looked_for_among(1);
+    assert!(one.is_looked_for() && one.scanned().abs() < 1e-12);
+    let many = pair().looked_for_among(20);
+    assert!((many.scanned() - 20.0_f64.ln()).abs() < 1e-12);
+}

@@ -19,16 +19,14 @@ pub(crate) enum Variable {
     /// The half of the detector along one axis, and the quarter: each may have an output of its own.
     Half(usize),
     Quarter,
-    /// Beyond a line across the detector, or on a patch of it, that were looked for among so many.
+    /// Beyond a line across the detector, or on a patch of it.
     Beyond {
         axis: usize,
         at_px: f64,
-        tried: usize,
     },
     Patch {
         from_px: [f64; 2],
         to_px: [f64; 2],
-        tried: usize,
     },
     /// Pixel phase along one axis.
     Phase(usize),
@@ -37,16 +35,14 @@ pub(crate) enum Variable {
     Time,
     /// The time, of frames that turn to and fro with it: what a slow error of the reference does, too.
     Turning,
-    /// Within a stretch of time that was looked for among so many.
+    /// Within a stretch of time.
     During {
         from_s: f64,
         to_s: f64,
-        tried: usize,
     },
-    /// Before and after an instant that was looked for among so many.
+    /// Before and after an instant.
     Since {
         at_s: f64,
-        tried: usize,
     },
     /// Velocity of the image.
     Rate,
@@ -147,10 +143,10 @@ impl Variable {
             Self::Position(0) => rows.x_px[i],
             Self::Position(_) => rows.y_px[i],
             Self::Time | Self::Turning => rows.t_s[i],
-            Self::During { from_s, to_s, .. } => {
+            Self::During { from_s, to_s } => {
                 f64::from(u8::from(*from_s < rows.t_s[i] && rows.t_s[i] <= *to_s))
             }
-            Self::Since { at_s, .. } => f64::from(u8::from(rows.t_s[i] > *at_s)),
+            Self::Since { at_s } => f64::from(u8::from(rows.t_s[i] > *at_s)),
             Self::Magnitude => rows.mag[i],
             Self::Colour => rows.bv[i],
             Self::Flux => rows.log_flux[i],
@@ -160,10 +156,10 @@ impl Variable {
             Self::Housekeeping(_, series) => series.at(rows.t_s[i]).unwrap_or(f64::NAN),
             Self::Half(axis) => [rows.x_px, rows.y_px][*axis][i].signum(),
             Self::Quarter => (rows.x_px[i] * rows.y_px[i]).signum(),
-            Self::Beyond { axis, at_px, .. } => {
+            Self::Beyond { axis, at_px } => {
                 f64::from(u8::from([rows.x_px, rows.y_px][*axis][i] > *at_px))
             }
-            Self::Patch { from_px, to_px, .. } => {
+            Self::Patch { from_px, to_px } => {
                 let at = [rows.x_px[i], rows.y_px[i]];
                 let within = |axis: usize| from_px[axis] < at[axis] && at[axis] <= to_px[axis];
                 f64::from(u8::from(within(0) && within(1)))
