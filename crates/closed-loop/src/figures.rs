@@ -136,8 +136,8 @@ pub(crate) fn amplitudes_from(
     (values, covariance)
 }
 
-/// Other catalogue effects whose columns resemble those of `g`, or that were asked about, and the same on
-/// another channel or star.
+/// Other catalogue effects whose columns resemble those of `g`, or that were asked about, the same on
+/// another channel or star, and its twin.
 fn confusable(found: &Found, g: usize, questions: &Questions) -> Vec<Confusable> {
     let own = found.candidates[g].id();
     let mut list: Vec<Confusable> = effects::catalogue()
@@ -156,6 +156,14 @@ fn confusable(found: &Found, g: usize, questions: &Questions) -> Vec<Confusable>
             })
         })
         .collect();
+    list.extend(found.candidates[g].twin().map(|twin| Confusable {
+        id: twin.id.to_owned(),
+        selectors: told(&twin.selectors),
+        correlation: twin.correlation,
+        delta_loglik: None,
+        separation_sigma: None,
+        manoeuvre: None,
+    }));
     list.sort_by(|a, b| b.correlation.abs().total_cmp(&a.correlation.abs()));
     list
 }

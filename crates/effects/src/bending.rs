@@ -21,7 +21,7 @@ use crate::candidate::check_columns;
 use crate::shift::sizes;
 use crate::{
     AttitudeRows, Candidate, Coefficient, Effect, EffectError, Nonlinear, Parameter, StarRows,
-    Surroundings,
+    Surroundings, Twin,
 };
 
 /// Most functions of time of one effect.
@@ -52,6 +52,10 @@ pub(crate) trait Bending: Clone + Debug + Send + Sync + 'static {
     /// See [`Candidate::stands_for`].
     fn stands_for(&self) -> f64 {
         1.0
+    }
+    /// See [`Candidate::twin`].
+    fn twin(&self) -> Option<Twin> {
+        None
     }
     /// With other non-linear parameters.
     fn with_nonlinear(&self, values: &[f64]) -> Option<Self> {
@@ -129,6 +133,9 @@ impl<B: Bending> Candidate for BendingCandidate<B> {
     }
     fn stands_for(&self) -> f64 {
         self.bending.stands_for()
+    }
+    fn twin(&self) -> Option<Twin> {
+        self.bending.twin()
     }
     fn with_nonlinear(&self, values: &[f64]) -> Option<Box<dyn Candidate>> {
         assert_eq!(

@@ -189,6 +189,17 @@ pub struct Nonlinear {
     pub step: f64,
 }
 
+/// Another effect of the catalogue that looks like a candidate whatever the data.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Twin {
+    /// Identity in the catalogue.
+    pub id: &'static str,
+    /// What tells which form of it.
+    pub selectors: BTreeMap<String, String>,
+    /// Correlation of the two.
+    pub correlation: f64,
+}
+
 /// One way in which an effect could be in the data.
 pub trait Candidate: Debug + Send + Sync {
     /// Identity of the effect in the catalogue.
@@ -233,6 +244,10 @@ pub trait Candidate: Debug + Send + Sync {
     /// `values`; `None` when the columns are exact already.
     fn refined(&self, values: &[f64]) -> Option<Box<dyn Candidate>> {
         let _ = values;
+        None
+    }
+    /// Another effect of the catalogue that may have made the same columns in any data, where there is one.
+    fn twin(&self) -> Option<Twin> {
         None
     }
     /// Whether it moves stars.

@@ -47,7 +47,7 @@ mod time_tag_offset;
 mod velocity_aberration;
 mod warm_pixels;
 
-pub use candidate::{AttitudeRows, Candidate, Coefficient, Nonlinear, StarRows, reported};
+pub use candidate::{AttitudeRows, Candidate, Coefficient, Nonlinear, StarRows, Twin, reported};
 pub use catalogue::{build, catalogue, kind};
 pub use effect::{ActsOn, Effect, EffectKind, ReferenceWander};
 pub use empirical::empirical_parameters;

@@ -8,15 +8,19 @@
 //! phase by 2 pi `s_f` (t - from), so that amplitudes far from the data are those of no line: where t = 0 lies more
 //! than the data's own span from their middle, a line is found with the middle as `from_s`.
 //!
+//! A heater that cycles without a channel bends the frame at its fundamental (`thermal_misalignment` with a
+//! `period_s`): the same but for harmonics, of which a frame much slower than its heater leaves 1/9, 1/25, ... So a
+//! line as slow as heaters are has that for a twin, alike by sqrt(96 / pi^4) = 0.993, the fundamental's share of a triangle.
+//!
 //! Source: definition; harmonics of the orbit, for instance.
 
-use core::f64::consts::TAU;
+use core::f64::consts::{PI, TAU};
 
 use crate::bending::{Bending, BendingCandidate, Bent};
 use crate::parameters::Reader;
 use crate::{
     ActsOn, Candidate, Coefficient, Effect, EffectError, EffectKind, Nonlinear, Parameter,
-    Parameters, Scene, Surroundings,
+    Parameters, Scene, Surroundings, Twin,
 };
 
 const ID: &str = "periodic_misalignment";
@@ -32,6 +36,8 @@ const NAMES: [&str; 6] = [
 
 /// A line goes round at least twice in the data: what does not is a drift.
 const FEWEST_CYCLES: u32 = 2;
+/// Heaters that cycle faster are none, s.
+const FASTEST_HEATER_S: f64 = 30.0;
 /// Frequencies that the catalogue proposes: the first harmonics of the span. A line above them, or
 /// between them, is found in a spectrum, and [`line_at`] makes its candidate.
 const HARMONICS: u32 = 24;
@@ -158,6 +164,15 @@ impl Bending for Line {
     fn stands_for(&self) -> f64 {
         self.picked_from as f64
     }
+    fn twin(&self) -> Option<Twin> {
+        let period_s = self.frequency_hz.recip();
+        let selectors = [("period_s".to_owned(), format!("{period_s:.0}"))];
+        (period_s >= FASTEST_HEATER_S).then(|| Twin {
+            id: "thermal_misalignment",
+            selectors: selectors.into(),
+            correlation: (96.0 / PI.powi(4)).sqrt(),
+        })
+    }
     fn with_nonlinear(&self, values: &[f64]) -> Option<Self> {
         let [low, high] = self.range;
         (low..=high).contains(&values[0]).then(|| Self {
@@ -190,8 +205,36 @@ mod tests {
                 .iter()
                 .map(|p| (p - f).abs() / bin)
                 .fold(f64::INFINITY, f64::min);
-            let turns = core::f64::consts::PI * off.max(1e-9);
+            let turns = PI * off.max(1e-9);
             assert!((turns.sin() / turns).powi(2) > 0.8, "{f} Hz: {off} bins");
         }
+    }
+
+    /// A cycling heater's bending, made by its own effect, against the sinusoid of its period: as alike as its twin says.
+    #[test]
+    fn a_cycling_heater_is_a_twin() {
+        let bench = Bench::new();
+        let scene = bench.scene(None);
+        let period_s = 183.0;
+        let line = line_at(1.0 / period_s, [0.0, 3660.0], 1);
+        let twin = line.twin().unwrap();
+        assert_eq!(twin.selectors["period_s"], "183");
+        let values = [("period_s", period_s), ("x_arcsec", 2.0)];
+        let values = values.map(|(name, value)| (name.to_owned(), value.into()));
+        let heater = crate::build(twin.id, &values.into(), &scene.surroundings).unwrap();
+        let (mut cos, mut sin, mut power) = (0.0, 0.0, 0.0);
+        let n = 3660;
+        for k in 0..n {
+            let t = f64::from(k);
+            let x = heater.misalignment_rad(t).x;
+            let (s, c) = (TAU * t / period_s).sin_cos();
+            cos += x * c;
+            sin += x * s;
+            power += x * x;
+        }
+        let alike = ((cos * cos + sin * sin) / (0.5 * f64::from(n) * power)).sqrt();
+        assert!((alike - twin.correlation).abs() < 2e-3, "{alike}");
+        // heaters do not cycle within seconds
+        assert_eq!(line_at(0.5, [0.0, 3660.0], 1).twin(), None);
     }
 }

@@ -15,7 +15,7 @@ use effects::Candidate;
 use nalgebra::{DMatrix, UnitQuaternion};
 use telemetry::report::{FoundEffect, Selector, listed};
 
-use crate::figures::{amplitudes_of, most_alike};
+use crate::figures::{amplitudes_of, most_alike, told};
 use crate::questions::manoeuvre::{Flown, Pair, recommend};
 use crate::search::selection::columns_of;
 use crate::search::{Found, without};
@@ -56,6 +56,10 @@ pub(crate) fn compare<'a>(found: &'a Found, effects: &mut [FoundEffect]) -> Conf
             let Some((other, _)) = most_alike(found, g, &confusable.id) else {
                 continue;
             };
+            if told(&found.candidates[other].selectors()) != confusable.selectors {
+                // a twin: no column of its own
+                continue;
+            }
             let mut instead = without.clone();
             instead.extend(&found.fitted.groups[other].columns);
             confusable.delta_loglik = fits

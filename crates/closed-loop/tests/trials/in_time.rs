@@ -69,6 +69,10 @@ fn assert_named(report: &Report, frequency_hz: f64) {
     let z = (f.value - frequency_hz) / f.sigma.unwrap();
     assert!(z.abs() < 5.0, "{frequency_hz}: {f:?}");
     assert!(report.unattributed.lines_hz.is_empty());
+    // a heater without a channel makes the same
+    let alike = &report.effects[0].confusable_with;
+    let heater = alike.iter().any(|c| c.id == "thermal_misalignment");
+    assert_eq!(heater, frequency_hz < 1.0 / 30.0, "{frequency_hz}");
 }
 
 const STARS: &str = "\"stars\", \"catalog\"";
@@ -78,8 +82,15 @@ const ATTITUDE: &str = "\"attitude\"";
 /// of 1.5 arcsec are 10 sigma each, q = 200: 70 nats after all that a scan of 1200 frequencies costs.
 /// 61.3 and 107.5 cycles lie beyond all harmonics.
 #[test]
-fn a_line_beyond_the_harmonics_is_named() {
-    for (tables, seed, cycles) in [(STARS, 1, 61.3), (ATTITUDE, 2, 107.5), (STARS, 3, 140.0)] {
+fn lines_at_any_frequency_are_named() {
+    // the last is slow enough for a heater
+    let cases = [
+        (STARS, 1, 61.3),
+        (ATTITUDE, 2, 107.5),
+        (STARS, 3, 140.0),
+        (STARS, 4, 6.3),
+    ];
+    for (tables, seed, cycles) in cases {
         let f = cycles / 300.0;
         assert_named(&report(tables, 300.0, 2.0, seed, &line(f, 1.5)), f);
     }
