@@ -235,10 +235,14 @@ fn grouped(fits: &Fits, candidates: &[&dyn Candidate]) -> Vec<Group> {
             .iter()
             .map(|c| credible(&candidate.coefficients()[c - column]))
             .collect();
+        // axis by axis
+        let about_z = |c: &usize| candidate.turns_camera() && c - column >= 2 * p / 3;
+        let across = columns.iter().filter(|&c| !about_z(c)).count() % columns.len().max(1);
         groups.push(Group {
             columns,
             bounds,
             choices: candidate.choices(),
+            across,
             shapes: candidate.nonlinear().len(),
             slopes: candidate.slopes(),
             family: match candidate.part() {

@@ -50,7 +50,7 @@ pub(crate) const BY_FAR: f64 = 4.0;
 const LINE: &str = "periodic_misalignment";
 /// What may be on one star in place of a slope.
 const OF_ONE: [&str; 2] = ["catalogue_position", "hot_pixel"];
-/// Nats by which a slope that is nearly one star must be worth more than that star.
+/// Nats by which a slope that is nearly one star, or what is no slope at all, must be worth more than that star.
 const OF_THAT_STAR: f64 = 10.0;
 /// Terms of a description.
 const MOST_TERMS: usize = 3;
@@ -117,6 +117,9 @@ pub(crate) fn stand_ins(
             // what both pay for having been looked for
             let paid: f64 = set.iter().map(|&k| described.paid[k]).sum();
             paid - parts.len() as f64 * looked
+        } else if star && set.len() == 1 {
+            // a catalogue errs more often than a camera by halves of its detector
+            OF_THAT_STAR
         } else if free && own_shape(&parts) {
             -OWN_SHAPE
         } else {

@@ -15,6 +15,9 @@ pub(crate) struct Group {
     /// Choices among discrete forms that the group stands for, each paid for like
     /// a parameter.
     pub(crate) choices: usize,
+    /// How many of its first columns turn the camera about X and Y, where the others turn it about the boresight, which
+    /// stars tell ten times worse: as much about each axis shows across the boresight alone. 0: it is not so divided.
+    pub(crate) across: usize,
     /// Parameters that the columns follow non-linearly, found by scanning.
     pub(crate) shapes: usize,
     /// Columns that are slopes of such parameters.
@@ -76,6 +79,7 @@ mod tests {
             columns: vec![4, 6],
             bounds: vec![[-1.0, 1.0], [0.0, 2.0]],
             choices: 0,
+            across: 0,
             shapes: 0,
             slopes: 0,
             family: family.to_owned(),

@@ -30,8 +30,9 @@
 //! out scatters from block to block as coloured noise does, so that each of two large ones may hide the
 //! other. Tried are those that white noise would let stand; each must stand beside the other. And where nothing
 //! more stands, other forms of what was chosen are tried, alone and with one more: of a step and a ramp the best
-//! single step is neither, and beside it the ramp is nothing. Two are tried in the place of one, too: what lies
-//! between two effects takes most of both, and leaves either too little to stand beside it.
+//! single step is neither, and beside it the ramp is nothing. Others are tried in the place of one, too: two, for what lies
+//! between two effects takes most of both, and leaves either too little to stand beside it; and one, whose poor form
+//! may have been dropped for it.
 //!
 //! Source: Schwarz 1978 for the price of a parameter; Genovese, Roeder & Wasserman 2006
 //! for weights of p-values.
@@ -131,6 +132,15 @@ pub(crate) fn costs(groups: &[Group], may: &[bool]) -> Vec<f64> {
 pub(crate) fn price(group: &Group, scalars: f64) -> f64 {
     let sizes = group.columns.len().saturating_sub(group.slopes);
     (sizes + group.choices) as f64 * each(scalars)
+}
+
+/// The chance of a group's columns: of `all`, or of the so many that act `across` the boresight, whichever is less,
+/// for two that were looked at. Where a group is not so divided, of all.
+pub(crate) fn or_across(all: f64, across: impl FnOnce() -> f64, columns: usize) -> f64 {
+    if columns == 0 {
+        return all;
+    }
+    2.0 * all.min(across())
 }
 
 /// What a parameter costs, nats.
@@ -281,7 +291,7 @@ impl Trials<'_> {
                     .collect::<Vec<_>>()
             })
             .collect();
-        better.extend(self.two_for_one(&all, chosen, now + WORTH_IT));
+        better.extend(self.others_for_one(&all, chosen, now + WORTH_IT));
         better.sort_by(|a, b| b.0.total_cmp(&a.0));
         better.truncate(BETTER);
         let now = self.worth(chosen)? + WORTH_IT;
@@ -297,9 +307,9 @@ impl Trials<'_> {
             .map(|(_, set)| set)
     }
 
-    /// Two of `all` in the place of one of `chosen`, each the form of its family that fits best there, where they
+    /// Another, or two, of `all` in the place of one of `chosen`, each the form of its family that fits best there, where they
     /// fit better than `now`.
-    fn two_for_one(&self, all: &[usize], chosen: &[usize], now: f64) -> Vec<(f64, Vec<usize>)> {
+    fn others_for_one(&self, all: &[usize], chosen: &[usize], now: f64) -> Vec<(f64, Vec<usize>)> {
         let family = |g: usize| self.groups[g].family.as_str();
         let mut out = Vec::new();
         for &g in chosen {
@@ -320,9 +330,12 @@ impl Trials<'_> {
             let mut best: Vec<(f64, usize)> = best.into_values().collect();
             best.sort_by(|a, b| b.0.total_cmp(&a.0));
             best.truncate(IN_ITS_PLACE);
+            // another alone, too: what was dropped for this one may have been a poor form of it
+            let one = best.iter().map(|a| [&others[..], &[a.1]].concat());
             let pairs = best.iter().enumerate();
             let pairs = pairs.flat_map(|(i, a)| best[i + 1..].iter().map(|b| [a.1, b.1]));
-            let sets: Vec<Vec<usize>> = pairs.map(|pair| [&others[..], &pair].concat()).collect();
+            let two = pairs.map(|pair| [&others[..], &pair].concat());
+            let sets: Vec<Vec<usize>> = one.chain(two).collect();
             let fits = sets
                 .into_par_iter()
                 .filter_map(|set| Some((self.fit(&set)?, set)));
@@ -403,13 +416,17 @@ impl Trials<'_> {
         let which: Vec<usize> = own.clone().collect();
         let estimate = self.fits.estimate(&set)?;
         let group = &self.groups[g];
+        let across = &which[..group.across];
+        let least = |p: &dyn Fn(&[usize]) -> f64| {
+            self.cost[g] * or_across(p(&which), || p(across), across.len())
+        };
         let judgement = Judgement {
             delta_loglik: gain,
             credible: group.believes(&group.columns, &estimate, own.start),
-            p_value: (estimate.p_value(&which) * self.cost[g]).min(1.0),
+            p_value: least(&|which| estimate.p_value(which)).min(1.0),
             observable: true,
         };
-        let white = estimate.white_p_value(&which) * self.cost[g];
+        let white = least(&|which| estimate.white_p_value(which));
         Some((judgement, white))
     }
 
@@ -440,6 +457,7 @@ mod tests {
             columns: (0..columns).collect(),
             bounds: vec![[0.0, 1.0]; columns],
             choices: 0,
+            across: 0,
             shapes: 0,
             slopes: 0,
             family: kind.to_owned(),
@@ -447,6 +465,15 @@ mod tests {
             kind,
             stands_for: 1.0,
         }
+    }
+
+    /// What shows across the boresight alone is held against fewer columns, and pays for two looks; what is not so
+    /// divided pays nothing.
+    #[test]
+    fn across_the_boresight_is_a_second_look() {
+        assert_eq!(or_across(1e-3, || 1e-5, 4), 2e-5);
+        assert_eq!(or_across(1e-5, || 1e-3, 4), 2e-5);
+        assert_eq!(or_across(1e-5, || 0.0, 0), 1e-5);
     }
 
     /// What the groups pay, as shares of the chance that any of them is chosen by mistake, adds up to all

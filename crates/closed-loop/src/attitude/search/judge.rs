@@ -18,7 +18,9 @@ use crate::attitude::likeness::likeness;
 use crate::attitude::line_level::line_level;
 use crate::attitude::motion_terms::is_of_motion;
 use crate::search::empirical::EMPIRICAL;
-use crate::search::selection::{FAMILY_ALPHA, Judgement, SLOW_PRICE, WIDENING, columns_of};
+use crate::search::selection::{
+    FAMILY_ALPHA, Judgement, SLOW_PRICE, WIDENING, columns_of, or_across,
+};
 use crate::search::{Fitted, without};
 use crate::unexplained::SEARCH_ALPHA;
 
@@ -105,9 +107,15 @@ impl Trial<'_, '_> {
             return Judgement::UNSEEN;
         };
         let ratio = 2.0 * (with.loglik() - without.loglik());
-        let mut p = self
-            .beside_its_neighbours(g, &with, ratio)
-            .unwrap_or_else(|| self.chance(g, group.columns.len(), ratio));
+        let chance = |columns: usize, ratio: f64| {
+            self.beside_its_neighbours(g, columns, &with, ratio)
+                .unwrap_or_else(|| self.chance(g, columns, ratio))
+        };
+        let across = || {
+            let gain = |axis: usize| with.of_axis[axis] - without.of_axis[axis];
+            chance(group.across, 2.0 * (gain(0) + gain(1)))
+        };
+        let mut p = or_across(chance(group.columns.len(), ratio), across, group.across).min(1.0);
         let alpha = if self.candidates[g].id() == EMPIRICAL {
             SEARCH_ALPHA
         } else {
@@ -149,14 +157,20 @@ impl Trial<'_, '_> {
         self.chance(g, group.columns.len(), square)
     }
 
-    /// Chance that a line gains such a `ratio`, times what the search costs: held against what `with` leaves at the
+    /// Chance that so many `columns` of a line gain such a `ratio`, times what the search costs: held against what `with` leaves at the
     /// frequencies around it. `None` for what is no line, or too slow to have so many.
-    fn beside_its_neighbours(&self, g: usize, with: &Scored, ratio: f64) -> Option<f64> {
+    fn beside_its_neighbours(
+        &self,
+        g: usize,
+        columns: usize,
+        with: &Scored,
+        ratio: f64,
+    ) -> Option<f64> {
         let candidate = self.candidates[g].as_ref();
         let frequency_hz = (candidate.id() == LINE).then(|| candidate.nonlinear()[0].value)?;
         let t_s = &self.data.bins.t_s;
         let around = line_level(t_s, &with.left, &self.data.count, &with.noise, frequency_hz)?;
-        let k = self.fitted.groups[g].columns.len() as f64;
+        let k = columns as f64;
         let law = FisherSnedecor::new(k, around.freedom).ok()?;
         let p = law.sf(ratio.max(0.0) / k / around.level.max(1.0));
         Some((p * self.cost[g]).min(1.0))
