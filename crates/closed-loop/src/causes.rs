@@ -17,6 +17,7 @@
 use std::sync::Arc;
 
 use block_regression::Folds;
+use coloured_noise::Foreknown;
 use effects::{Candidate, Surroundings};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use telemetry::report::ConsideredEffect;
@@ -34,7 +35,7 @@ use crate::search::selection::{columns_of, costs};
 use crate::search::{Found, borrowed, family, fit_beside, joined, without};
 use crate::star::evidence::StarEvidence;
 use crate::star::landing::Elsewhere;
-use crate::star::search::{Attempt, Searched, attempt, declared_noise};
+use crate::star::search::{self, Attempt, Searched, Start, attempt};
 use changing_effect::{Changing, Inner, Way};
 use commonness::Slow;
 use description::{Described, Kept, Part};
@@ -80,6 +81,8 @@ pub(crate) struct Quest<'a> {
     pub(crate) terms: &'a dyn Fn(bool) -> Vec<Empirical>,
     /// What effects may change with.
     pub(crate) ways: &'a [Way],
+    /// What the model declares of the reference's slow error, axis by axis.
+    pub(crate) reference: [Option<Foreknown>; 3],
     /// What sizes are told in.
     pub(crate) surroundings: Surroundings<'a>,
     /// What the model declares of centroids, if the light is to be followed to where it falls before anything is
@@ -143,9 +146,9 @@ pub(crate) fn run<'a>(
 ) -> Result<Outcome<'a>, CloseError> {
     let alone = white.data.free_attitude || white.residuals.len() != 1;
     let mut start = if alone {
-        None
+        Start::White
     } else {
-        declared_noise(white, folds)?
+        search::start(white, folds, &quest.reference)?
     };
     let mut refused = Refused::new();
     let mut kept: Vec<Arc<dyn Candidate>> = Vec::new();
@@ -199,7 +202,7 @@ pub(crate) fn run<'a>(
         }
         let inside = noise_effects::in_sample(level, &searched.found);
         if slow_of_stars(level, &searched, inside.as_deref()).is_some() {
-            start = None;
+            start = Start::White;
             reinstated(&mut refused);
             continue;
         }
@@ -265,7 +268,7 @@ pub(crate) fn run<'a>(
                 let tie = wander.behind.is_some_and(|nats| nats < TIE);
                 // what it beats speaks against no effect
                 if reinstated(&mut refused) || tie && suffice(&beside, folds, quest, &may)? {
-                    start = None;
+                    start = Start::White;
                     found_terms.extend(looked_for(&plain, &instead));
                 } else {
                     keep_whole(&mut kept, &mut found_terms, &plain, instead);
@@ -430,7 +433,7 @@ fn suffice(
     may: &[bool],
 ) -> Result<bool, CloseError> {
     let Attempt::Searched(searched, _) =
-        attempt(level, folds, (quest.candidates)(), may, None, None)?
+        attempt(level, folds, (quest.candidates)(), may, Start::White, None)?
     else {
         return Ok(false);
     };

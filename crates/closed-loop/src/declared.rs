@@ -13,6 +13,7 @@
 use std::sync::Arc;
 
 use centroid::{CentroidError, GAUSS_HERMITE_5, Triangle};
+use coloured_noise::Foreknown;
 use effects::{Effect, EffectError, ParameterValue, Parameters};
 use focal_plane::Pixel;
 use star_tracker::StarView;
@@ -113,6 +114,20 @@ pub(crate) fn effects(situation: &Situation<'_>) -> Result<Vec<Arc<dyn Effect>>,
         built.push(effect.map_err(wrong)?.into());
     }
     Ok(built)
+}
+
+/// What these effects tell of the reference's slow error, axis by axis.
+pub(crate) fn reference(effects: &[Arc<dyn Effect>]) -> [Option<Foreknown>; 3] {
+    let mut known: [Option<Foreknown>; 3] = [None; 3];
+    for wander in effects.iter().filter_map(|e| e.reference_wander()) {
+        for (axis, known) in known.iter_mut().enumerate() {
+            let (slow, tau_s) = (wander.sigma_arcsec[axis], wander.tau_s[axis]);
+            if slow > known.map_or(0.0, |k| k.slow) {
+                *known = Some(Foreknown { slow, tau_s });
+            }
+        }
+    }
+    known
 }
 
 /// An error of a declared effect, in its line where the model came from a file.

@@ -216,15 +216,32 @@ impl Coloured {
     /// As [`refit`](Self::refit), of greatest likelihood times what is known of the slow part before; started from
     /// what is known.
     pub fn refit_near(&self, known: &Foreknown, t_s: &[f64], y: &[f64], count: &[f64]) -> Self {
+        self.refit_near_above(0.0, known, t_s, y, count)
+    }
+
+    /// As [`refit_near`](Self::refit_near), where the white part is known to be no less than `least`.
+    pub fn refit_near_above(
+        &self,
+        least: f64,
+        known: &Foreknown,
+        t_s: &[f64],
+        y: &[f64],
+        count: &[f64],
+    ) -> Self {
         let start = Self {
             white: self.white,
             slow: known.slow,
             tau_s: known.tau_s,
         };
-        let Some(problem) = Likelihood::of(0.0, Some(known), t_s, y, count) else {
+        let Some(problem) = Likelihood::of(least, Some(known), t_s, y, count) else {
             return start;
         };
-        let at = [start.white, start.slow, start.tau_s].map(f64::ln);
+        let own = if least > 0.0 {
+            own_white(start.white, least)
+        } else {
+            start.white
+        };
+        let at = [own, start.slow, start.tau_s].map(f64::ln);
         problem.climb(at, -0.3).map_or(start, |(_, noise)| noise)
     }
 

@@ -23,6 +23,7 @@ use crate::bounds::SlowBounds;
 use crate::coloured::{Coloured, fit_alike};
 use crate::common_noise::CommonNoise;
 use crate::filter::Filter;
+use crate::foreknown::Foreknown;
 use crate::joint::Joint;
 use crate::smoother::slow_part;
 
@@ -102,6 +103,26 @@ impl Rotations {
         let apart = CommonNoise {
             centroid: self.centroid,
             reference: [x, y, z],
+        };
+        self.joint(&apart).0
+    }
+
+    /// The noise of greatest likelihood times what is `known` of slow errors before, axis by axis; where nothing is, the
+    /// reference has white noise alone.
+    pub fn noise_near(&self, known: &[Option<Foreknown>; 3]) -> CommonNoise {
+        let of = |axis: usize| {
+            let law = |y: &[f64], count: &[f64]| {
+                let white = self.white(y, count);
+                known[axis].as_ref().map_or(white, |known| {
+                    white.refit_near_above(self.centroid, known, &self.t_s, y, count)
+                })
+            };
+            let (fitted, worth, _) = self.likeliest(axis, law);
+            self.beside_centroids(fitted, self.of(worth, axis), axis)
+        };
+        let apart = CommonNoise {
+            centroid: self.centroid,
+            reference: [of(0), of(1), of(2)],
         };
         self.joint(&apart).0
     }
@@ -195,16 +216,18 @@ impl Rotations {
 
     /// Log-likelihood of an axis's rotations under white noise, in proportion to the stars' or not.
     fn white_alone(&self, axis: usize) -> f64 {
-        let white = |y: &[f64], count: &[f64]| {
-            let kept = count.iter().filter(|c| **c > 0.0).count().max(1) as f64;
-            let variance = y.iter().zip(count).map(|(y, c)| y * y * c).sum::<f64>() / kept;
-            Coloured {
-                white: variance.sqrt().max(self.centroid),
-                slow: 0.0,
-                tau_s: 1.0,
-            }
-        };
-        self.likeliest(axis, white).2
+        self.likeliest(axis, |y, count| self.white(y, count)).2
+    }
+
+    /// White noise of such a series.
+    fn white(&self, y: &[f64], count: &[f64]) -> Coloured {
+        let kept = count.iter().filter(|c| **c > 0.0).count().max(1) as f64;
+        let variance = y.iter().zip(count).map(|(y, c)| y * y * c).sum::<f64>() / kept;
+        Coloured {
+            white: variance.sqrt().max(self.centroid),
+            slow: 0.0,
+            tau_s: 1.0,
+        }
     }
 
     /// What `law` makes of an axis's rotations and the stars' worth of each bin, where that is likelier with the

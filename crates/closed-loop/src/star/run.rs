@@ -307,6 +307,7 @@ fn explain(
     let own = own.map(|(variants, zero_px)| anew(data, situation, motion, variants, &zero_px));
     let level = own.as_ref().unwrap_or(&measured);
     let ways = description::ways(situation, data);
+    let slow_reference = declared::reference(&declared::effects(situation)?);
     let reference = path.or(situation.reference.as_ref());
     let by_rates = motion.is_some_and(Around::by_rates);
     let accelerates = || by_rates || reference.is_none_or(|r| motion::accelerates(r, arm));
@@ -327,6 +328,7 @@ fn explain(
                 description::terms(situation, data, yields && (!wander || accelerates()))
             },
             ways: &ways,
+            reference: slow_reference,
             surroundings: situation.surroundings(),
             lands: lands.then_some(phase),
             sight: (lands && landings == LANDINGS).then_some(phase),

@@ -32,7 +32,7 @@
 use std::sync::Arc;
 
 use block_regression::Folds;
-use coloured_noise::{CommonNoise, Rotations};
+use coloured_noise::{CommonNoise, Foreknown, Rotations};
 use effects::Candidate;
 use rayon::prelude::*;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -50,6 +50,7 @@ use trial::{Trial, taken_out_in_turn};
 
 mod alone;
 mod first_sight;
+mod foreknown;
 mod in_vain;
 mod trial;
 
@@ -81,6 +82,26 @@ pub(crate) struct Searched<'a> {
     pub(crate) wander: Option<Wander>,
 }
 
+/// What a search knows of the reference's slow error before it begins.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Start {
+    /// There is none.
+    White,
+    /// There may be one like this.
+    Found(CommonNoise),
+    /// The model declares one.
+    Declared([Option<Foreknown>; 3]),
+}
+
+impl Start {
+    fn found(self) -> Option<CommonNoise> {
+        match self {
+            Self::Found(noise) => Some(noise),
+            Self::White | Self::Declared(_) => None,
+        }
+    }
+}
+
 /// What a search ends with.
 pub(crate) enum Attempt<'a> {
     /// And what of it a slow error of the reference explains better.
@@ -96,9 +117,14 @@ pub(crate) fn attempt<'a>(
     folds: &Folds,
     candidates: Vec<Arc<dyn Candidate>>,
     may: &[bool],
-    start: Option<CommonNoise>,
+    start: Start,
     sight: Option<&OnCentroids>,
 ) -> Result<Attempt<'a>, CloseError> {
+    if let Start::Declared(known) = &start {
+        let searched = foreknown::beside(white, folds, candidates, may, known)?;
+        return Ok(Attempt::Searched(Box::new(searched), Vec::new()));
+    }
+    let start = start.found();
     let candidates = match prepared(white, folds, candidates, may, start, sight)? {
         Prepared::Candidates(candidates) => candidates,
         Prepared::Elsewhere(to) => return Ok(Attempt::Elsewhere(to)),
@@ -292,13 +318,17 @@ impl Instead {
     }
 }
 
-/// Noise of the declared model's residual, where it may hold a slow error. How much
+/// What the declared model's residual may hold of a slow error. How much
 /// of one shows only later: what is fitted here (a distortion under drifting stars)
 /// takes some of it along.
-pub(crate) fn declared_noise(
+pub(crate) fn start(
     white: &StarEvidence<'_>,
     folds: &Folds,
-) -> Result<Option<CommonNoise>, CloseError> {
+    known: &[Option<Foreknown>; 3],
+) -> Result<Start, CloseError> {
+    if known.iter().any(Option::is_some) {
+        return Ok(Start::Declared(*known));
+    }
     let moments = white.moments(folds, &[]);
     let trial = Trial {
         moments: &moments,
@@ -311,7 +341,8 @@ pub(crate) fn declared_noise(
         single: true,
     };
     let noise = trial.taken_out(&trial.columns(&[]));
-    Ok(noise.filter(|n| n.reference.iter().any(|r| r.slow > 0.0)))
+    let slow = noise.filter(|n| n.reference.iter().any(|r| r.slow > 0.0));
+    Ok(slow.map_or(Start::White, Start::Found))
 }
 
 /// What the search beside a slow error ends with.

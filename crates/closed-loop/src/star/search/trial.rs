@@ -10,7 +10,7 @@
 //! Source: Wilks 1938 (likelihood ratio); George & Foster 2000 (empirical Bayes selection).
 
 use block_regression::{Estimate, Fits, Folds, Layout};
-use coloured_noise::{CommonNoise, Rotations, SlowGains};
+use coloured_noise::{CommonNoise, Foreknown, Rotations, SlowGains};
 use nalgebra::DMatrix;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
@@ -165,6 +165,37 @@ impl Trial<'_> {
             return Some((noise, rotations, fits.log_marginal(&all)? + grams.log_scale));
         }
         None
+    }
+
+    /// Noise of what the fit of `columns` leaves, near what is `known` of it before.
+    pub(super) fn near(
+        &self,
+        columns: &[usize],
+        known: &[Option<Foreknown>; 3],
+    ) -> Option<CommonNoise> {
+        let layout = self.layout(columns);
+        let all: Vec<usize> = (0..layout.candidates).collect();
+        let mut noise = None;
+        for _ in 0..=ALTERNATIONS {
+            let grams = match &noise {
+                None => self.moments.white_of(columns),
+                Some(noise) => self.moments.under(columns, noise),
+            };
+            let fits = Fits::whole(
+                &grams,
+                &layout,
+                if noise.is_none() { self.variance } else { 1.0 },
+            )?;
+            let solution = fits.solution(&all)?;
+            let rotations = self.moments.rotations(columns, &solution, solution.len())?;
+            let better = rotations.noise_near(known);
+            let settled = noise.is_some_and(|noise| better.is_like(&noise));
+            noise = Some(better);
+            if settled {
+                break;
+            }
+        }
+        noise
     }
 
     /// Log-likelihood less what the freedom of a hypothesis buys where nothing acts:

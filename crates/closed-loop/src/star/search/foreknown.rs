@@ -1,0 +1,80 @@
+//! The search beside a slow error that the model declares of the reference.
+//!
+//! What is declared is no finding, and no hypothesis: in a run as short as its correlation time it is told from a step or
+//! a drift by nothing but the declaration. So everything is held against noise near the declared
+//! ([`coloured_noise::Foreknown`]), fitted again beside what was chosen until that settles.
+//!
+//! Source: Aitken 1935 (generalised least squares).
+
+use std::sync::Arc;
+
+use block_regression::Folds;
+use coloured_noise::{CommonNoise, Foreknown};
+use effects::Candidate;
+
+use super::Searched;
+use super::trial::Trial;
+use crate::error::CloseError;
+use crate::evidence::Evidence;
+use crate::search::{Found, search};
+use crate::star::evidence::StarEvidence;
+
+/// Rounds of search and noise.
+const ROUNDS: usize = 4;
+
+/// One search beside what is `known` of the reference's slow error.
+pub(super) fn beside<'a>(
+    white: &StarEvidence<'a>,
+    folds: &Folds,
+    mut candidates: Vec<Arc<dyn Candidate>>,
+    may: &[bool],
+    known: &[Option<Foreknown>; 3],
+) -> Result<Searched<'a>, CloseError> {
+    let mut noise = noise_of(white, folds, None, known)?;
+    for round in 1.. {
+        let level = white.with_noise(&noise);
+        let found = search(&level, folds, candidates, may, None)?;
+        let better = noise_of(white, folds, Some(&found), known)?;
+        if round == ROUNDS || better.is_like(&noise) {
+            return Ok(Searched {
+                found,
+                evidence: Some(level),
+                wander: None,
+            });
+        }
+        candidates = found.candidates;
+        noise = better;
+    }
+    Err(CloseError::Singular)
+}
+
+/// The noise of what `found` leaves, or the declared model.
+fn noise_of(
+    white: &StarEvidence<'_>,
+    folds: &Folds,
+    found: Option<&Found>,
+    known: &[Option<Foreknown>; 3],
+) -> Result<CommonNoise, CloseError> {
+    let chosen = found.map_or(&[][..], |f| &f.selection.chosen);
+    let only = found.map(|f| f.only(chosen));
+    let groups = found
+        .zip(only.as_ref())
+        .map_or_else(Vec::new, |(f, only)| only.groups(&f.fitted.groups, chosen));
+    let moments = white.moments(
+        folds,
+        only.as_ref().map_or(&[][..], |only| &only.candidates),
+    );
+    let trial = Trial {
+        moments: &moments,
+        folds,
+        precision: white.precision(),
+        variance: white.variance_guess(),
+        groups: &groups,
+        cost: vec![1.0; groups.len()],
+        all: None,
+        single: true,
+    };
+    let all: Vec<usize> = (0..groups.len()).collect();
+    let noise = trial.near(&trial.columns(&all), known);
+    noise.ok_or(CloseError::Singular)
+}
