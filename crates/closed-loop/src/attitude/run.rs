@@ -95,7 +95,7 @@ pub(crate) fn run(
     let changes = SpatialErrors::declared(situation, &data.t_s);
     let declared = Declared {
         changes: changes.as_ref(),
-        noise: declared_noise(situation),
+        noise: declared_noise(situation)?,
     };
     let search = |data: &AttitudeData, motion: &Around, put_forward: &[Arc<dyn Candidate>]| {
         let mut list = catalogue::candidates(&scene);
@@ -265,18 +265,18 @@ fn evidence<'a>(
     }
 }
 
-/// The slow noise that a hybrid model declares of each axis.
-fn declared_noise(situation: &Situation<'_>) -> [Option<Foreknown>; 3] {
+/// The slow noise that a hybrid model declares of each axis, or any model of the reference.
+fn declared_noise(situation: &Situation<'_>) -> Result<[Option<Foreknown>; 3], CloseError> {
     let Some(hem) = &situation.model.hem else {
-        return [None; 3];
+        return Ok(declared::reference(&declared::effects(situation)?));
     };
-    [&hem.x, &hem.y, &hem.z].map(|axis| {
+    Ok([&hem.x, &hem.y, &hem.z].map(|axis| {
         let known = Foreknown {
             slow: axis.sigma_hsf_arcsec,
             tau_s: axis.tau_hsf_s,
         };
         (known.slow > 0.0 && known.tau_s > 0.0).then_some(known)
-    })
+    }))
 }
 
 /// Noise of each axis without what it shares.

@@ -243,6 +243,11 @@ fn prepared(
 }
 
 impl Searched<'_> {
+    /// Whether everything is held against a slow error of the reference.
+    pub(crate) fn has_slow_noise(&self) -> bool {
+        self.wander.is_some() || self.evidence.is_some()
+    }
+
     /// Of white evidence alone.
     fn plain(found: Found) -> Self {
         Self {

@@ -3,6 +3,7 @@
 
 use scenarios::simulate;
 use telemetry::report::Report;
+use telemetry::{EffectEntry, EffectValue};
 
 use crate::kit::{Case, Path, VELOCITY, closed};
 
@@ -82,6 +83,64 @@ fn a_wandering_reference_under_slews_is_no_effect() {
     }
     assert!(others.len() <= 1, "{others:?}");
     assert!(wanders >= 8, "{wanders} of 10");
+}
+
+/// What a model declares of a reference that wanders by 0.5 arcsec over a minute.
+const DECLARED: [(&str, f64); 6] = [
+    ("sigma_x_arcsec", 0.5),
+    ("sigma_y_arcsec", 0.5),
+    ("sigma_z_arcsec", 0.5),
+    ("tau_x_s", 60.0),
+    ("tau_y_s", 60.0),
+    ("tau_z_s", 60.0),
+];
+
+/// A minute of such a reference: told from a step or a drift by what is declared alone. Nothing is named in six runs
+/// (where the declaration told against nothing, five of twenty were given a step or a heater of up to 70 nats), nor where
+/// the reference errs by half or twice of it; and a step of 3 arcsec, ten times what such a reference does in two
+/// seconds, is.
+#[test]
+fn a_slow_error_that_is_declared_is_no_step() {
+    let declared = DECLARED.map(|(name, value)| (name.to_owned(), EffectValue::Number(value)));
+    let declared = EffectEntry::new("reference_error", declared.into());
+    let at = |seed: u64, wander: f64, step: bool| {
+        let mut case = Case::new(Path::Still, 4000 + seed);
+        (case.duration_s, case.stars) = (60.0, 7);
+        if step {
+            case = case.with(
+                "step_misalignment",
+                "at_s = 33.0\nx_arcsec = 3.0\ny_arcsec = -2.0",
+            );
+        }
+        let wander = format!("wander_arcsec = [{wander}, {wander}, {wander}]");
+        let mut case = case.reference(&wander).quiet(3.2);
+        case.run.rate_hz = Some(10.0);
+        case.model.noise.distortion_arcsec = Some(1.7);
+        let mut bundle = simulate(&case).expect("a bundle");
+        let mut model = case.model_without_effects();
+        model.effects.push(declared.clone());
+        let of_stars = closed(&model, &bundle).expect("the loop closes").report;
+        bundle.stars = None;
+        let of_attitudes = closed(&model, &bundle).expect("the loop closes").report;
+        [of_stars, of_attitudes]
+    };
+    for (wander, seeds) in [(0.5, 6), (0.25, 2), (1.0, 2)] {
+        for seed in 0..seeds {
+            for report in at(seed, wander, false) {
+                let effects = &report.effects;
+                assert!(effects.is_empty(), "{wander}, {seed}: {effects:?}");
+            }
+        }
+    }
+    for seed in 0..2 {
+        for report in at(seed, 0.5, true) {
+            let ids: Vec<&str> = report.effects.iter().map(|e| e.id.as_str()).collect();
+            assert_eq!(ids, ["step_misalignment"], "{seed}");
+            let x = &report.effects[0].parameters["x_arcsec"];
+            let z = (x.value - 3.0) / x.sigma.unwrap_or(f64::NAN);
+            assert!(z.abs() < 4.0, "{seed}: {x:?}");
+        }
+    }
 }
 
 /// Quiet stars (0.08 arcsec a frame, all together) on swings of 350 arcsec: second differences of the reference are

@@ -26,11 +26,13 @@ const ROUNDS: usize = 4;
 pub(super) fn beside<'a>(
     white: &StarEvidence<'a>,
     folds: &Folds,
-    mut candidates: Vec<Arc<dyn Candidate>>,
+    candidates: Vec<Arc<dyn Candidate>>,
     may: &[bool],
     known: &[Option<Foreknown>; 3],
 ) -> Result<Searched<'a>, CloseError> {
     let mut noise = noise_of(white, folds, None, known)?;
+    // beside slow noise an instant shows at itself alone, which no grid has: in the forms that suit white noise
+    let mut candidates = search(white, folds, candidates, may, None)?.candidates;
     for round in 1.. {
         let level = white.with_noise(&noise);
         let found = search(&level, folds, candidates, may, None)?;
