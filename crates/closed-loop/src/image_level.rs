@@ -299,15 +299,25 @@ pub(crate) fn compare<'a>(
     } else {
         &map.moments
     };
-    // what does not stand is told with the gain that was judged
-    let mut dark_map = if claim.stands {
+    // What does not stand is told with the gain that was judged; and so is a map in which centroids formed anew as the
+    // tracker's are lose more than it brings.
+    let by_itself = step(&by_map.alone, &better(&bare.moments).alone, whole);
+    let mut dark_map = if claim.stands && by_itself.delta_loglik > 0.0 {
         Step {
             stands: true,
             p_value: claim.p_value,
-            ..step(&by_map.alone, &better(&bare.moments).alone, whole)
+            ..by_itself.clone()
         }
     } else {
         claim.clone()
+    };
+    let not_told = if claim.stands {
+        [
+            by_itself.delta_loglik - dark_map.delta_loglik,
+            by_itself.explained - dark_map.explained,
+        ]
+    } else {
+        [0.0; 2]
     };
     // What switches is the map's, whatever the way; a static map is claimed by itself first.
     let follows = match followed.filter(|_| claim.stands) {
@@ -319,10 +329,13 @@ pub(crate) fn compare<'a>(
         dark_map.explained += further.explained;
     }
     let effective_psf = if corrected.stands {
+        // both together are what the last level gains
+        let rest = step(&last.alone, &moments.alone, whole);
         Step {
             stands: true,
             p_value: corrected.p_value,
-            ..step(&last.alone, &moments.alone, whole)
+            delta_loglik: rest.delta_loglik + not_told[0],
+            explained: rest.explained + not_told[1],
         }
     } else {
         corrected

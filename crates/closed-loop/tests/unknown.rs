@@ -451,3 +451,20 @@ fn the_noise_level_follows_time() {
     assert_eq!(same.verdict, Verdict::Consistent, "{:?}", same.unattributed);
     assert!(same.unattributed.noise_depends_on.is_empty());
 }
+
+/// A channel of the read-out that is noisier by 1.2 arcsec beside 1.4, through which stars pass one after another: ln 1.73 of their
+/// variance, where 1200 rows tell it to 0.03. It is the slot's, and no star's.
+#[test]
+fn the_noise_level_follows_a_slot() {
+    let scan = "kind = \"hold\"\ndrift_arcsec_s = [130.0, 90.0, 20.0]";
+    let noisy = |size: f64| {
+        report_along(scan, move |stars, row, _| {
+            let of_slot = f64::from(u8::from(stars.slot[row] == 3));
+            [0, 1].map(|axis| size * of_slot * noise(2 * row + axis))
+        })
+    };
+    let told = noisy(1.2).unattributed.noise_depends_on;
+    assert_eq!(told[0].variable, "slot", "{told:?}");
+    let same = noisy(0.0).unattributed.noise_depends_on;
+    assert!(same.is_empty(), "{same:?}");
+}

@@ -8,6 +8,8 @@
 //!
 //! Not physics: which variables are tried, and what is told of them.
 
+use std::collections::BTreeMap;
+
 use block_regression::Folds;
 use rayon::prelude::*;
 use telemetry::report::{Dependence, Unattributed};
@@ -15,18 +17,22 @@ use telemetry::report::{Dependence, Unattributed};
 use super::bursts::burst;
 use super::quick::Quick;
 use super::rows::{Row, Source, squared_rates};
-use super::squares::{Columns, Judged, Table, both};
+use super::squares::{Columns, Judged, MIN_ROWS, Table, both};
 use super::{NoiseEffects, declared_variance};
 use crate::error::CloseError;
 use crate::figures::first_of_each;
 use crate::search::empirical::Variable;
 use crate::situation::Situation;
+use crate::star::data::StarData;
 use crate::star::evidence::StarEvidence;
 
 /// Chance that any variable of a bundle is told although the noise follows none.
 const ALPHA: f64 = 0.001;
 /// Chance below which a variable says by what stars differ of which it is certain that they do.
 const SAYS: f64 = 0.05;
+
+/// Fewest stars that a slot is told from.
+const FEWEST_IN_A_SLOT: usize = 3;
 
 /// What the noise follows, most certain first.
 #[derive(Clone, Debug, Default)]
@@ -52,6 +58,28 @@ impl NoiseFollows {
 fn together(within: Judged, among: Judged) -> Option<Judged> {
     let both = (within[0] * among[0]).max(f64::MIN_POSITIVE);
     Some([both * (1.0 - both.ln()), within[1].max(among[1])])
+}
+
+/// What single slots tell where many stars pass through each: those that stay in one are their slot's only ones.
+fn of_slots(data: &StarData, [all, fast]: [&Table; 2]) -> Vec<Judged> {
+    let mut stars: BTreeMap<i32, BTreeMap<usize, usize>> = BTreeMap::new();
+    for row in &all.rows {
+        let slot = data.frames.slot[row.at];
+        *stars.entry(slot).or_default().entry(row.star).or_default() += 1;
+    }
+    let passed = |rows: &BTreeMap<usize, usize>| {
+        rows.values().filter(|n| **n >= MIN_ROWS).count() >= FEWEST_IN_A_SLOT
+    };
+    let slots: Vec<i32> = stars.iter().filter(|s| passed(s.1)).map(|s| *s.0).collect();
+    let each = slots.par_iter().flat_map_iter(|&slot| {
+        let column = |row: &Row| [f64::from(u8::from(data.frames.slot[row.at] == slot)), 0.0];
+        let columns = [all, fast].map(|t| Columns::of(t, column));
+        let within = both(all.within(&columns[0], 1), fast.within(&columns[1], 1));
+        let among = both(all.between(&columns[0], 0), fast.between(&columns[1], 0));
+        let said = within.zip(among).and_then(|(w, a)| together(w, a));
+        [within, among, said].into_iter().flatten()
+    });
+    each.collect()
 }
 
 /// Looks at the squares of `residual`, which the stars leave at `level` beside `claimed`.
@@ -131,6 +159,11 @@ pub(crate) fn noise_follows(
         .zip(judged)
         .flat_map(|(name, judged)| judged.into_iter().map(move |j| (name.clone(), j)))
         .chain(both(all.odd_star(), fast.odd_star()).map(|j| ("star".to_owned(), j)))
+        .chain(
+            of_slots(data, [all, fast])
+                .into_iter()
+                .map(|j| ("slot".to_owned(), j)),
+        )
         .map(|(variable, [p_value, share])| Dependence {
             variable,
             variance_explained: share,
