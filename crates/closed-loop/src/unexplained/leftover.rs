@@ -44,7 +44,7 @@ const LEAST_WHITE: f64 = 0.01;
 /// Lines, and jumps, of one series.
 const MOST: usize = 5;
 /// Chance below which a line or a jump is worth a search with it: that judges it, and more strictly.
-pub(crate) const WORTH_A_SEARCH: f64 = 0.2;
+pub(crate) const WORTH_A_SEARCH: f64 = 0.1;
 
 /// What the image can do besides turning: x and y of a shift per x and y of the place. It grows,
 /// or is sheared either way.

@@ -174,8 +174,7 @@ fn a_line_about_one_axis_is_worth_a_search() {
     assert!(found >= 28, "{found}");
 }
 
-/// The chance that noise is searched again is 0.2 at most: 8 of 40, and 5 sigma would be 20. Fourfold grids count most
-/// frequencies more than once.
+/// The chance that noise is searched again is 0.1 at most: 4 of 40, and 5 sigma.
 #[test]
 fn noise_is_seldom_worth_another_search() {
     for slow in [0.0, 1.0] {
