@@ -140,30 +140,26 @@ pub(crate) fn amplitudes_from(
 /// another channel or star, and its twin.
 fn confusable(found: &Found, g: usize, questions: &Questions) -> Vec<Confusable> {
     let own = found.candidates[g].id();
+    let alike = |id: &str, selectors: &BTreeMap<String, String>, correlation: f64| Confusable {
+        id: id.to_owned(),
+        selectors: told(selectors),
+        correlation,
+        delta_loglik: None,
+        separation_sigma: None,
+        manoeuvre: None,
+    };
     let mut list: Vec<Confusable> = effects::catalogue()
         .iter()
         .map(|kind| kind.id())
         .filter_map(|id| {
             let (other, correlation) = most_alike(found, g, id)?;
             let asked = id != own && questions.include(id);
-            (correlation.abs() >= CONFUSABLE || asked).then(|| Confusable {
-                id: id.to_owned(),
-                selectors: told(&found.candidates[other].selectors()),
-                correlation,
-                delta_loglik: None,
-                separation_sigma: None,
-                manoeuvre: None,
-            })
+            (correlation.abs() >= CONFUSABLE || asked)
+                .then(|| alike(id, &found.candidates[other].selectors(), correlation))
         })
         .collect();
-    list.extend(found.candidates[g].twin().map(|twin| Confusable {
-        id: twin.id.to_owned(),
-        selectors: told(&twin.selectors),
-        correlation: twin.correlation,
-        delta_loglik: None,
-        separation_sigma: None,
-        manoeuvre: None,
-    }));
+    let twin = found.candidates[g].twin();
+    list.extend(twin.map(|twin| alike(twin.id, &twin.selectors, twin.correlation)));
     list.sort_by(|a, b| b.correlation.abs().total_cmp(&a.correlation.abs()));
     list
 }

@@ -236,11 +236,7 @@ impl Coloured {
         let Some(problem) = Likelihood::of(least, Some(known), t_s, y, count) else {
             return start;
         };
-        let own = if least > 0.0 {
-            own_white(start.white, least)
-        } else {
-            start.white
-        };
+        let own = own_white(start.white, least);
         let at = [own, start.slow, start.tau_s].map(f64::ln);
         problem.climb(at, -0.3).map_or(start, |(_, noise)| noise)
     }

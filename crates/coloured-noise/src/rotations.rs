@@ -89,40 +89,36 @@ impl Rotations {
 
     /// The noise of greatest likelihood; started from `near` where there is one.
     pub fn noise(&self, near: Option<&CommonNoise>) -> CommonNoise {
+        // rotations are no whiter than their stars: a slow part of less than a step between frames is
+        // white noise by another name
+        let known = |axis: usize| near.map(|n| n.reference[axis]).filter(|n| n.slow > 0.0);
+        self.noise_by(|axis, y, count| match known(axis) {
+            Some(known) => self.near(known, axis, y, count),
+            None => Coloured::fit_above(self.centroid, &self.t_s, y, count),
+        })
+    }
+
+    /// The noise of greatest likelihood times what is `known` of slow errors before, axis by axis; where nothing is, the
+    /// reference has white noise alone.
+    pub fn noise_near(&self, known: &[Option<Foreknown>; 3]) -> CommonNoise {
+        self.noise_by(|axis, y, count| {
+            let white = self.white(y, count);
+            known[axis].as_ref().map_or(white, |known| {
+                white.refit_near_above(self.centroid, known, &self.t_s, y, count)
+            })
+        })
+    }
+
+    /// The noise that a `law` finds in the rotations about each axis and the stars' worth of each bin.
+    fn noise_by(&self, law: impl Fn(usize, &[f64], &[f64]) -> Coloured + Sync) -> CommonNoise {
         let of = |axis: usize| {
-            // rotations are no whiter than their stars: a slow part of less than a step between frames is
-            // white noise by another name
-            let known = near.map(|n| n.reference[axis]).filter(|n| n.slow > 0.0);
-            let (fitted, worth, _) = self.likeliest(axis, |y, count| match known {
-                Some(known) => self.near(known, axis, y, count),
-                None => Coloured::fit_above(self.centroid, &self.t_s, y, count),
-            });
+            let (fitted, worth, _) = self.likeliest(axis, |y, count| law(axis, y, count));
             self.beside_centroids(fitted, self.of(worth, axis), axis)
         };
         let (x, (y, z)) = rayon::join(|| of(0), || rayon::join(|| of(1), || of(2)));
         let apart = CommonNoise {
             centroid: self.centroid,
             reference: [x, y, z],
-        };
-        self.joint(&apart).0
-    }
-
-    /// The noise of greatest likelihood times what is `known` of slow errors before, axis by axis; where nothing is, the
-    /// reference has white noise alone.
-    pub fn noise_near(&self, known: &[Option<Foreknown>; 3]) -> CommonNoise {
-        let of = |axis: usize| {
-            let law = |y: &[f64], count: &[f64]| {
-                let white = self.white(y, count);
-                known[axis].as_ref().map_or(white, |known| {
-                    white.refit_near_above(self.centroid, known, &self.t_s, y, count)
-                })
-            };
-            let (fitted, worth, _) = self.likeliest(axis, law);
-            self.beside_centroids(fitted, self.of(worth, axis), axis)
-        };
-        let apart = CommonNoise {
-            centroid: self.centroid,
-            reference: [of(0), of(1), of(2)],
         };
         self.joint(&apart).0
     }

@@ -334,11 +334,11 @@ impl Trials<'_> {
             best.sort_by(|a, b| b.0.total_cmp(&a.0));
             best.truncate(IN_ITS_PLACE);
             // another alone, too: what was dropped for this one may have been a poor form of it
-            let one = best.iter().map(|a| [&others[..], &[a.1]].concat());
+            let one = best.iter().filter(|(fit, _)| *fit > now);
+            out.extend(one.map(|&(fit, h)| (fit, [&others[..], &[h]].concat())));
             let pairs = best.iter().enumerate();
             let pairs = pairs.flat_map(|(i, a)| best[i + 1..].iter().map(|b| [a.1, b.1]));
-            let two = pairs.map(|pair| [&others[..], &pair].concat());
-            let sets: Vec<Vec<usize>> = one.chain(two).collect();
+            let sets: Vec<Vec<usize>> = pairs.map(|pair| [&others[..], &pair].concat()).collect();
             let fits = sets
                 .into_par_iter()
                 .filter_map(|set| Some((self.fit(&set)?, set)));

@@ -353,7 +353,7 @@ fn explain(
     // beside a reference that wanders a jump shows at its instant alone, which no grid has
     let jump = inside
         .as_ref()
-        .filter(|_| scene.has_reference && outcome.searched.has_slow_noise())
+        .filter(|_| scene.has_reference && outcome.searched.evidence.is_some())
         .and_then(|(_, series)| series.shared_jump());
     let mut put_forward: Vec<_> = line
         .map(|line| line.candidate(&scene))

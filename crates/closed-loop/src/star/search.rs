@@ -93,15 +93,6 @@ pub(crate) enum Start {
     Declared([Option<Foreknown>; 3]),
 }
 
-impl Start {
-    fn found(self) -> Option<CommonNoise> {
-        match self {
-            Self::Found(noise) => Some(noise),
-            Self::White | Self::Declared(_) => None,
-        }
-    }
-}
-
 /// What a search ends with.
 pub(crate) enum Attempt<'a> {
     /// And what of it a slow error of the reference explains better.
@@ -120,11 +111,14 @@ pub(crate) fn attempt<'a>(
     start: Start,
     sight: Option<&OnCentroids>,
 ) -> Result<Attempt<'a>, CloseError> {
-    if let Start::Declared(known) = &start {
-        let searched = foreknown::beside(white, folds, candidates, may, known)?;
-        return Ok(Attempt::Searched(Box::new(searched), Vec::new()));
-    }
-    let start = start.found();
+    let start = match start {
+        Start::White => None,
+        Start::Found(noise) => Some(noise),
+        Start::Declared(known) => {
+            let searched = foreknown::beside(white, folds, candidates, may, &known)?;
+            return Ok(Attempt::Searched(Box::new(searched), Vec::new()));
+        }
+    };
     let candidates = match prepared(white, folds, candidates, may, start, sight)? {
         Prepared::Candidates(candidates) => candidates,
         Prepared::Elsewhere(to) => return Ok(Attempt::Elsewhere(to)),
@@ -243,11 +237,6 @@ fn prepared(
 }
 
 impl Searched<'_> {
-    /// Whether everything is held against a slow error of the reference.
-    pub(crate) fn has_slow_noise(&self) -> bool {
-        self.wander.is_some() || self.evidence.is_some()
-    }
-
     /// Of white evidence alone.
     fn plain(found: Found) -> Self {
         Self {

@@ -138,7 +138,6 @@ fn a_turn_with_the_time_is_neither_an_error_of_the_reference_nor_an_orbit() {
         let report = closed(&model, &bundle).expect("the loop closes").report;
         let left = &report.unattributed;
         let first = left.depends_on.first().map(|d| d.variable.as_str());
-        println!("{seed}: {:?} {first:?}", report.effects);
         told += u32::from(report.effects.is_empty() && first == Some("time"));
     }
     // a wander that lasts as long as the run is as likely within 9 nats in some draws; without the turns none is told

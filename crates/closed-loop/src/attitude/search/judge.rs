@@ -157,8 +157,8 @@ impl Trial<'_, '_> {
         self.chance(g, group.columns.len(), square)
     }
 
-    /// Chance that so many `columns` of a line gain such a `ratio`, times what the search costs: held against what `with` leaves at the
-    /// frequencies around it. `None` for what is no line, or too slow to have so many.
+    /// Chance that so many `columns` of a line gain such a `ratio`, times what the search costs: held against what `with`
+    /// leaves at the frequencies around it. `None` for what is no line, or too slow to have so many.
     fn beside_its_neighbours(
         &self,
         g: usize,

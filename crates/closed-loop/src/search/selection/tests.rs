@@ -36,14 +36,26 @@ impl Design for Table {
     }
 }
 
-/// Of so many candidate columns, nothing else and one residual.
-fn layout(candidates: usize) -> Layout {
-    Layout {
+/// What `ask` finds of these groups, which may all be chosen, in a table of so many frames.
+fn tried<T>(table: &Table, groups: &[Group], ask: impl FnOnce(&Trials<'_>, &[bool]) -> T) -> T {
+    let frames = table.0.nrows();
+    let folds = Folds::cut(frames);
+    let grams = BlockGrams::accumulate(table, &folds);
+    let layout = Layout {
         nuisance_precision: DMatrix::zeros(0, 0),
         relative: 0..0,
-        candidates,
+        candidates: table.width() - 1,
         residuals: 1,
-    }
+    };
+    let fits = Fits::new(&grams, &folds, &layout, 1.0).unwrap();
+    let may = vec![true; groups.len()];
+    let trials = Trials {
+        fits: &fits,
+        groups,
+        cost: &costs(groups, &may),
+        scalars: frames as f64,
+    };
+    ask(&trials, &may)
 }
 
 /// What shows across the boresight alone is held against fewer columns, and pays for two looks; what is not so
@@ -110,24 +122,17 @@ fn two_that_hide_each_other_are_found() {
     let folds = Folds::cut(1000);
     let rows = folds.blocks.iter().enumerate().filter(|(b, _)| b % 6 == 3);
     let rows: usize = rows.map(|(_, block)| block.len()).sum();
-    let layout = layout(2);
     let mut groups = vec![group("even", 1), group("odd", 1)];
     groups[1].columns = vec![1];
     for group in &mut groups {
         group.bounds = vec![[-9.0, 9.0]];
     }
     let chosen = |size: f64| {
-        let grams = BlockGrams::accumulate(&hiding(size, &folds), &folds);
-        let fits = Fits::new(&grams, &folds, &layout, 1.0).unwrap();
-        let trials = Trials {
-            fits: &fits,
-            groups: &groups,
-            cost: &costs(&groups, &[true, true]),
-            scalars: 1000.0,
-        };
-        let alone = trials.judged(&[]);
-        assert!(alone.iter().all(|j| !j.stands()), "{alone:?}");
-        trials.select(&[true, true]).chosen
+        tried(&hiding(size, &folds), &groups, |trials, may| {
+            let alone = trials.judged(&[]);
+            assert!(alone.iter().all(|j| !j.stands()), "{alone:?}");
+            trials.select(may).chosen
+        })
     };
     assert_eq!(chosen(12.0 / (rows as f64).sqrt()).len(), 2);
     assert_eq!(chosen(0.0), Vec::<usize>::new());
@@ -154,8 +159,6 @@ fn on_a_ramp(seed: u64) -> Table {
 /// with that at 0.8 all are taken, and in nearly all draws of the noise the search ends there.
 #[test]
 fn another_form_beside_another_effect_is_found() {
-    let folds = Folds::cut(1000);
-    let layout = layout(10);
     let mut groups: Vec<Group> = (0..10).map(|_| group("step", 1)).collect();
     groups[9] = group("ramp", 1);
     for (column, group) in groups.iter_mut().enumerate() {
@@ -163,19 +166,13 @@ fn another_form_beside_another_effect_is_found() {
         group.bounds = vec![[-9.0, 9.0]];
     }
     let found = (0..10).filter(|&seed| {
-        let grams = BlockGrams::accumulate(&on_a_ramp(seed), &folds);
-        let fits = Fits::new(&grams, &folds, &layout, 1.0).unwrap();
-        let trials = Trials {
-            fits: &fits,
-            groups: &groups,
-            cost: &costs(&groups, &[true; 10]),
-            scalars: 1000.0,
-        };
-        let first = &trials.tried(&[true; 10], &[])[0];
-        assert!(first.group < 5, "{seed}: step {}", first.group);
-        let mut chosen = trials.select(&[true; 10]).chosen;
-        chosen.sort_unstable();
-        chosen == [7, 9]
+        tried(&on_a_ramp(seed), &groups, |trials, may| {
+            let first = &trials.tried(may, &[])[0];
+            assert!(first.group < 5, "{seed}: step {}", first.group);
+            let mut chosen = trials.select(may).chosen;
+            chosen.sort_unstable();
+            chosen == [7, 9]
+        })
     });
     assert!(found.count() >= 8);
 }
@@ -199,26 +196,18 @@ fn between(size: f64, seed: u64) -> Table {
 /// itself and does not stand, and both in its place 0.04 * 0.49 * 1000 = 20 nats.
 #[test]
 fn two_effects_are_found_in_the_place_of_one() {
-    let folds = Folds::cut(2000);
-    let layout = layout(3);
     let mut groups = vec![group("one", 1), group("other", 1), group("between", 1)];
     for (column, group) in groups.iter_mut().enumerate() {
         group.columns = vec![column];
         group.bounds = vec![[-9.0, 9.0]];
     }
     let found = (0..10).filter(|&seed| {
-        let grams = BlockGrams::accumulate(&between(0.7, seed), &folds);
-        let fits = Fits::new(&grams, &folds, &layout, 1.0).unwrap();
-        let trials = Trials {
-            fits: &fits,
-            groups: &groups,
-            cost: &costs(&groups, &[true; 3]),
-            scalars: 2000.0,
-        };
-        assert_eq!(trials.tried(&[true; 3], &[])[0].group, 2);
-        let mut chosen = trials.select(&[true; 3]).chosen;
-        chosen.sort_unstable();
-        chosen == [0, 1]
+        tried(&between(0.7, seed), &groups, |trials, may| {
+            assert_eq!(trials.tried(may, &[])[0].group, 2);
+            let mut chosen = trials.select(may).chosen;
+            chosen.sort_unstable();
+            chosen == [0, 1]
+        })
     });
     assert!(found.count() >= 9);
 }
@@ -244,23 +233,15 @@ fn three_and_their_sum(seed: u64) -> Table {
 /// three quarters of that, and it pays for two columns less, 7.6 nats: 9 more are left to the three, 4 of which are noise.
 #[test]
 fn another_effect_is_found_in_the_place_of_one() {
-    let folds = Folds::cut(2000);
-    let layout = layout(4);
     let mut groups = vec![group("lens", 3), group("velocity", 1)];
     groups[1].columns = vec![3];
     for group in &mut groups {
         group.bounds = vec![[-9.0, 9.0]; group.columns.len()];
     }
     let found = (0..10).filter(|&seed| {
-        let grams = BlockGrams::accumulate(&three_and_their_sum(seed), &folds);
-        let fits = Fits::new(&grams, &folds, &layout, 1.0).unwrap();
-        let trials = Trials {
-            fits: &fits,
-            groups: &groups,
-            cost: &costs(&groups, &[true; 2]),
-            scalars: 2000.0,
-        };
-        trials.exchanged(&[true; 2], &[1]) == Some(vec![0])
+        tried(&three_and_their_sum(seed), &groups, |trials, may| {
+            trials.exchanged(may, &[1]) == Some(vec![0])
+        })
     });
     assert!(found.count() >= 9);
 }

@@ -9,7 +9,7 @@
 //!
 //! Source: Wilks 1938 (likelihood ratio); George & Foster 2000 (empirical Bayes selection).
 
-use block_regression::{Estimate, Fits, Folds, Layout};
+use block_regression::{BlockGrams, Estimate, Fits, Folds, Layout};
 use coloured_noise::{CommonNoise, Foreknown, Rotations, SlowGains};
 use nalgebra::DMatrix;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -90,12 +90,16 @@ impl Trial<'_> {
         } else {
             self.moments.white_in_all(columns)
         };
+        Some(self.left(columns, &grams, self.variance)?.noise(None))
+    }
+
+    /// Rotations that the fit of `columns` by these sums leaves.
+    fn left(&self, columns: &[usize], grams: &BlockGrams, variance: f64) -> Option<Rotations> {
         let layout = self.layout(columns);
-        let fits = Fits::whole(&grams, &layout, self.variance)?;
+        let fits = Fits::whole(grams, &layout, variance)?;
         let all: Vec<usize> = (0..layout.candidates).collect();
         let solution = fits.solution(&all)?;
-        let rotations = self.moments.rotations(columns, &solution, solution.len())?;
-        Some(rotations.noise(None))
+        self.moments.rotations(columns, &solution, solution.len())
     }
 
     /// `chosen` at the better of two starts: all that fits taken out, or `noise`.
@@ -173,29 +177,18 @@ impl Trial<'_> {
         columns: &[usize],
         known: &[Option<Foreknown>; 3],
     ) -> Option<CommonNoise> {
-        let layout = self.layout(columns);
-        let all: Vec<usize> = (0..layout.candidates).collect();
-        let mut noise = None;
-        for _ in 0..=ALTERNATIONS {
-            let grams = match &noise {
-                None => self.moments.white_of(columns),
-                Some(noise) => self.moments.under(columns, noise),
-            };
-            let fits = Fits::whole(
-                &grams,
-                &layout,
-                if noise.is_none() { self.variance } else { 1.0 },
-            )?;
-            let solution = fits.solution(&all)?;
-            let rotations = self.moments.rotations(columns, &solution, solution.len())?;
-            let better = rotations.noise_near(known);
-            let settled = noise.is_some_and(|noise| better.is_like(&noise));
-            noise = Some(better);
+        let white = self.moments.white_of(columns);
+        let mut noise = self.left(columns, &white, self.variance)?.noise_near(known);
+        for _ in 0..ALTERNATIONS {
+            let grams = self.moments.under(columns, &noise);
+            let better = self.left(columns, &grams, 1.0)?.noise_near(known);
+            let settled = better.is_like(&noise);
+            noise = better;
             if settled {
                 break;
             }
         }
-        noise
+        Some(noise)
     }
 
     /// Log-likelihood less what the freedom of a hypothesis buys where nothing acts:

@@ -79,10 +79,10 @@ pub(crate) struct Spectrum {
     plan: Arc<LombScargle>,
     noise: Coloured,
     white: Vec<f64>,
+    /// Its power.
+    power: Vec<f64>,
     /// Logarithms.
     chance: Vec<f64>,
-    /// Held against more around it, where that is on both sides; if slow noise is [`SLIGHT`], without any.
-    wide: Vec<f64>,
 }
 
 impl Spectrum {
@@ -90,35 +90,35 @@ impl Spectrum {
         let noise = track.noise();
         let white = track.whitened(&noise, &track.value);
         let power = plan.process(&white).ok()?.psd;
-        let usually: Vec<f64> = (0..grid.bins).map(|k| chance(USUAL, &power, k).1).collect();
-        let wide = |power: &[f64], k: usize| match chance(WIDE, power, k) {
-            (n, chance) if n >= 2.0 * WIDE.count as f64 => chance,
-            _ => chance(USUAL, power, k).1,
-        };
-        let without = Coloured {
-            slow: 0.0,
-            white: noise.white.hypot(noise.slow),
-            ..noise
-        };
-        let slight = track.turns && noise.slow > 0.0 && {
-            track.loglik(&noise) - track.loglik(&without) < SLIGHT
-        };
-        let power = if slight {
-            plan.process(&track.whitened(&without, &track.value))
-                .ok()?
-                .psd
-        } else {
-            power
-        };
-        let wide = (0..grid.bins).map(|k| wide(&power, k)).collect();
+        let chance = (0..grid.bins).map(|k| chance(USUAL, &power, k).1).collect();
         Some(Self {
             grid,
             plan,
             noise,
             white,
-            chance: usually,
-            wide,
+            power,
+            chance,
         })
+    }
+
+    /// Logarithms of the chances held against more around each, where that is on both sides; where the slow noise of this
+    /// `track` is [`SLIGHT`], without any.
+    fn wide(&self, track: &Track) -> Option<Vec<f64>> {
+        let noise = self.noise;
+        let without = Coloured {
+            slow: 0.0,
+            white: noise.white.hypot(noise.slow),
+            ..noise
+        };
+        let slight = noise.slow > 0.0 && track.loglik(&noise) - track.loglik(&without) < SLIGHT;
+        let bare = slight.then(|| self.plan.process(&track.whitened(&without, &track.value)));
+        let bare = bare.transpose().ok()?;
+        let power = bare.as_ref().map_or(&self.power, |bare| &bare.psd);
+        let wide = |k: usize| match chance(WIDE, power, k) {
+            (n, chance) if n >= 2.0 * WIDE.count as f64 => chance,
+            _ => chance(USUAL, power, k).1,
+        };
+        Some((0..self.grid.bins).map(wide).collect())
     }
 
     /// The frequency of the most certain line, if it is beyond doubt.
@@ -194,12 +194,13 @@ impl Series {
             .filter(|(_, s)| s.grid.is_like(&grid))
             .collect();
         let bins = turns.iter().map(|(_, s)| s.grid.bins).min()?;
+        let wide = turns.iter().map(|(track, s)| s.wide(track));
+        let wide: Vec<Vec<f64>> = wide.collect::<Option<_>>()?;
         // across the boresight, and about it as well
-        let (chance, best) = (turns.len().min(2)..=turns.len())
+        let (chance, best) = (wide.len().min(2)..=wide.len())
             .filter_map(|axes| {
-                let sums: Vec<f64> = (0..bins)
-                    .map(|k| turns[..axes].iter().map(|(_, s)| s.wide[k]).sum())
-                    .collect();
+                let sum_at = |k: usize| wide[..axes].iter().map(|chance| chance[k]).sum();
+                let sums: Vec<f64> = (0..bins).map(sum_at).collect();
                 let (best, sum) = least(&sums)?;
                 let law = ChiSquared::new(2.0 * axes as f64).ok()?;
                 Some((law.sf(-2.0 * sum), best))
