@@ -10,17 +10,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 use std::ops::Range;
 
 /// One scalar a frame: two nuisance columns, three candidates, one residual.
-struct Table(DMatrix<f64>);
-
-impl Design for Table {
-    fn width(&self) -> usize {
-        self.0.ncols()
-    }
-    fn fill(&self, frames: Range<usize>, out: &mut DMatrix<f64>) -> usize {
-        *out = self.0.rows(frames.start, frames.len()).into_owned();
-        frames.len()
-    }
-}
+type Table = DMatrix<f64>;
 
 /// Smooth regressors; AR(1) noise of correlation `rho`; the first candidate acts with `size`.
 fn table(frames: usize, rho: f64, size: f64, seed: u64) -> Table {
@@ -39,11 +29,11 @@ fn table(frames: usize, rho: f64, size: f64, seed: u64) -> Table {
         }
         out[(k, 5)] = 0.7 - 0.3 * t + size * out[(k, 2)] + noise;
     }
-    Table(out)
+    out
 }
 
 fn fits(table: &Table, precision: Matrix2<f64>) -> (Fits, Folds) {
-    let folds = Folds::cut(table.0.nrows());
+    let folds = Folds::cut(table.nrows());
     let grams = BlockGrams::accumulate(table, &folds);
     let layout = Layout {
         nuisance_precision: DMatrix::from_fn(2, 2, |i, j| precision[(i, j)]),
@@ -63,12 +53,12 @@ struct Dense {
 
 impl Dense {
     fn new(table: &Table, precision: Matrix2<f64>) -> Self {
-        let rows = table.0.nrows();
+        let rows = table.nrows();
         let mut prior = DMatrix::zeros(4, 4);
         prior.fixed_view_mut::<2, 2>(0, 0).copy_from(&precision);
         Self {
-            columns: DMatrix::from_fn(rows, 4, |i, j| table.0[(i, [0, 1, 2, 4][j])]),
-            residual: table.0.column(5).into_owned(),
+            columns: DMatrix::from_fn(rows, 4, |i, j| table[(i, [0, 1, 2, 4][j])]),
+            residual: table.column(5).into_owned(),
             precision: prior,
         }
     }
@@ -182,8 +172,8 @@ fn what_acts_in_one_fold_alone_counts() {
             } else {
                 1e-3_f64.sqrt() / 2.0
             };
-            table.0[(k, 2)] = own * if k % 2 == 0 { 1.0 } else { -1.0 };
-            table.0[(k, 5)] += size / length * table.0[(k, 2)];
+            table[(k, 2)] = own * if k % 2 == 0 { 1.0 } else { -1.0 };
+            table[(k, 5)] += size / length * table[(k, 2)];
         }
         let (fits, _) = fits(&table, Matrix2::zeros());
         let (with, without) = (
@@ -320,8 +310,8 @@ fn columns_say_the_same_together_and_alone() {
 #[test]
 fn a_set_that_cannot_be_told_apart_is_refused() {
     let mut table = table(400, 0.0, 1.0, 1);
-    let copy = table.0.column(2).into_owned();
-    table.0.set_column(3, &(2.0 * copy));
+    let copy = table.column(2).into_owned();
+    table.set_column(3, &(2.0 * copy));
     let (fits, _) = fits(&table, Matrix2::zeros());
     assert!(fits.estimate(&[0]).is_some());
     assert!(fits.estimate(&[0, 1]).is_none());
@@ -356,12 +346,12 @@ fn products_of_few_columns_are_those_of_all() {
         candidates: 3,
         residuals: 1,
     };
-    let (weight, width) = (0.3, table.0.ncols());
+    let (weight, width) = (0.3, table.ncols());
     let split: Vec<(DMatrix<f64>, DMatrix<f64>)> = folds
         .blocks
         .iter()
         .map(|b| {
-            let own = table.0.rows(b.start, b.len());
+            let own = table.rows(b.start, b.len());
             let (rest, rows) = (own.rows(2, b.len() - 2), own.rows(0, 2).into_owned());
             ((rest.transpose() * rest) / weight, rows)
         })
@@ -400,7 +390,7 @@ fn products_of_few_columns_are_those_of_all() {
         let mut sum = DMatrix::zeros(last + 1, last + 1);
         let mut shares = Vec::new();
         for b in &folds.blocks {
-            let own = table.0.rows(b.start, b.len());
+            let own = table.rows(b.start, b.len());
             let gram = transformed(&(own.transpose() * own), 2, &pick, &one.all.nuisance);
             let score = DVector::from_fn(p, |i, _| {
                 let fitted = (0..p).map(|j| gram[(set[i], set[j])] * a.value[j]);
@@ -454,7 +444,7 @@ fn windowed(rho: f64, size: f64, seed: u64) -> (Fits, Folds) {
         }
         out[(k, candidates + 1)] = size * out[(k, 1)] + noise;
     }
-    let table = Table(out);
+    let table = out;
     let folds = Folds::cut(frames);
     let grams = BlockGrams::accumulate(&table, &folds);
     let layout = Layout {
@@ -504,18 +494,18 @@ fn columns_that_act_in_a_part_of_the_time_lose_little() {
 #[test]
 fn what_lives_in_a_fold_alone_is_fitted_there() {
     let mut table = table(1000, 0.0, 0.5, 4);
-    let frames = table.0.nrows();
+    let frames = table.nrows();
     let folds = Folds::cut(frames);
     let last = folds.fold_ranges().last().cloned().unwrap();
     for k in 0..frames {
         let alone = last.contains(&k);
-        table.0[(k, 1)] = if alone {
+        table[(k, 1)] = if alone {
             1.0 + 0.3 * (k as f64).sin()
         } else {
             0.0
         };
         // as large as it is, nobody else can know of it
-        table.0[(k, 5)] += 30.0 * table.0[(k, 1)];
+        table[(k, 5)] += 30.0 * table[(k, 1)];
     }
     let (fits, folds) = fits(&table, Matrix2::new(0.0, 0.0, 0.0, 1e-4));
     let fold = folds.count - 1;
@@ -523,11 +513,11 @@ fn what_lives_in_a_fold_alone_is_fitted_there() {
     let nuisance = fits.nuisance(Some(fold), &[0], &beta);
     let left: Vec<f64> = last
         .clone()
-        .map(|k| table.0[(k, 5)] - nuisance[0] - beta[0] * table.0[(k, 2)])
+        .map(|k| table[(k, 5)] - nuisance[0] - beta[0] * table[(k, 2)])
         .collect();
     let of = |f: &dyn Fn(f64, f64) -> f64| -> f64 {
         let each = last.clone().zip(&left);
-        each.map(|(k, r)| f(table.0[(k, 1)], *r)).sum()
+        each.map(|(k, r)| f(table[(k, 1)], *r)).sum()
     };
     let expected = of(&|c, r| c * r) / (of(&|c, _| c * c) + 1e-4);
     assert!((nuisance[1] - expected).abs() < 1e-9 * expected.abs());
@@ -541,8 +531,8 @@ fn what_lives_in_a_fold_alone_is_fitted_there() {
 #[test]
 fn units_of_the_nuisance_do_not_matter() {
     let plain = table(2000, 0.3, 0.2, 5);
-    let mut scaled = Table(plain.0.clone());
-    scaled.0.column_mut(1).scale_mut(1e8);
+    let mut scaled = plain.clone();
+    scaled.column_mut(1).scale_mut(1e8);
     let all = [0, 1, 2];
     let [(a, like_a), (b, like_b)] = [plain, scaled].map(|table| {
         let (fits, _) = fits(&table, Matrix2::zeros());
@@ -560,9 +550,9 @@ fn units_of_the_nuisance_do_not_matter() {
 #[test]
 fn a_large_unknown_costs_no_likelihood() {
     let plain = table(2000, 0.0, 0.0, 6);
-    let mut large = Table(plain.0.clone());
+    let mut large = plain.clone();
     let offset = 1e6 / 2000_f64.sqrt();
-    large.0.column_mut(5).add_scalar_mut(offset);
+    large.column_mut(5).add_scalar_mut(offset);
     let [a, b] = [plain, large].map(|table| {
         let (fits, _) = fits(&table, Matrix2::zeros());
         fits.log_marginal(&[]).unwrap()

@@ -1,6 +1,4 @@
-use std::ops::Range;
-
-use block_regression::{BlockGrams, Design, Folds, Layout};
+use block_regression::{BlockGrams, Folds, Layout};
 use nalgebra::DMatrix;
 use rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
@@ -24,27 +22,17 @@ fn group(kind: &'static str, columns: usize) -> Group {
 }
 
 /// Columns and what is measured, frame by frame.
-struct Table(DMatrix<f64>);
-
-impl Design for Table {
-    fn width(&self) -> usize {
-        self.0.ncols()
-    }
-    fn fill(&self, frames: Range<usize>, out: &mut DMatrix<f64>) -> usize {
-        *out = self.0.rows(frames.start, frames.len()).into_owned();
-        frames.len()
-    }
-}
+type Table = DMatrix<f64>;
 
 /// What `ask` finds of these groups, which may all be chosen, in a table of so many frames.
 fn tried<T>(table: &Table, groups: &[Group], ask: impl FnOnce(&Trials<'_>, &[bool]) -> T) -> T {
-    let frames = table.0.nrows();
+    let frames = table.nrows();
     let folds = Folds::cut(frames);
     let grams = BlockGrams::accumulate(table, &folds);
     let layout = Layout {
         nuisance_precision: DMatrix::zeros(0, 0),
         relative: 0..0,
-        candidates: table.width() - 1,
+        candidates: table.ncols() - 1,
         residuals: 1,
     };
     let fits = Fits::new(&grams, &folds, &layout, 1.0).unwrap();
@@ -112,7 +100,7 @@ fn hiding(size: f64, folds: &Folds) -> Table {
             out[(k, 2)] = size * (out[(k, 0)] + out[(k, 1)]) + noise;
         }
     }
-    Table(out)
+    out
 }
 
 /// Alone, either scatters as the other acts, and does not stand: eight blocks whose scores are as often
@@ -152,7 +140,7 @@ fn on_a_ramp(seed: u64) -> Table {
         let noise: f64 = StandardNormal.sample(&mut rng);
         out[(k, 10)] = out[(k, 7)] - 1.5 * out[(k, 9)] + 0.7 * noise;
     }
-    Table(out)
+    out
 }
 
 /// The best single step is that at 0.3, which takes 92 of 219 in chi-squared, and beside it the ramp takes 1;
@@ -189,7 +177,7 @@ fn between(size: f64, seed: u64) -> Table {
         out[(k, 2)] = 0.7 * (a + b) + 0.14 * normal();
         out[(k, 3)] = size * (a + b) + normal();
     }
-    Table(out)
+    out
 }
 
 /// Of two effects of 31 sigma each (0.7 sqrt 2000) the third takes 98 %. Beside it either adds 0.0196^2 / 0.51 of
@@ -226,7 +214,7 @@ fn three_and_their_sum(seed: u64) -> Table {
         out[(k, 3)] = sum + normal();
         out[(k, 4)] = 0.15 * sum + normal();
     }
-    Table(out)
+    out
 }
 
 /// What was dropped for a poor form comes back in a better one. The three are worth 3 * 0.15^2 * 1000 = 68 nats, the sum
