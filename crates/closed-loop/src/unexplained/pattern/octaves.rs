@@ -92,7 +92,7 @@ impl Own {
     }
 
     /// Squared cycles of a wave over the extent, in units of the longest that is looked for.
-    fn scale(&self, k: [f64; 2]) -> f64 {
+    pub(super) fn scale(&self, k: [f64; 2]) -> f64 {
         let cycles = |a: usize| k[a] * self.extent[a];
         (cycles(0).powi(2) + cycles(1).powi(2)) / self.cycles.powi(2)
     }
@@ -110,8 +110,29 @@ impl Own {
 
     /// Wave vectors that one of this octave pays for: see the module.
     pub(super) fn trials(&self, k: [f64; 2]) -> f64 {
+        self.trials_in(self.octave(k))
+    }
+
+    /// Of each octave the [scale](Self::scale) that its waves do not reach, and the wave vectors that one pays for.
+    pub(super) fn prices(&self) -> impl Iterator<Item = (f64, f64)> {
+        let octaves = self.octaves();
+        (1..)
+            .map(f64::from)
+            .take_while(move |next| *next <= octaves)
+            .map(move |next| {
+                let last = next >= octaves;
+                let up_to = if last {
+                    f64::INFINITY
+                } else {
+                    (2.0 * next).exp2()
+                };
+                (up_to, self.trials_in(next - 1.0))
+            })
+    }
+
+    fn trials_in(&self, octave: f64) -> f64 {
         let all = 2.0 * self.extent[0] * self.extent[1];
-        let longest = self.cycles * self.octave(k).exp2();
+        let longest = self.cycles * octave.exp2();
         // between two half circles, but for what lies beyond a cycle per pixel
         let vectors = (1.5 * PI * longest * longest).min(all);
         (CHANCES * self.octaves() * vectors).max(1.0)

@@ -152,24 +152,31 @@ impl Field {
             (if i < 0.5 * n { i } else { i - n } + shift[axis]) * CELLS / n
         };
         let opposite = |axis: usize, i: usize| {
-            (2 * cells[axis] - i - usize::from(shift[axis] > 0.0)) % cells[axis]
+            let first = usize::from(shift[axis] > 0.0);
+            // there are a power of two
+            (2 * cells[axis] - i - first) & (cells[axis] - 1)
         };
         // the square of a wave's residuals is that of noise, a row each, times the power
         let rows = self.weighed_rows();
-        let price = |k: [f64; 2]| narrow(2.0 * rows * own.trials(k).ln());
-        let least = price([0.0, 0.0]);
+        let octaves: Vec<(f64, f32)> = own
+            .prices()
+            .map(|(up_to, trials)| (up_to, narrow(2.0 * rows * trials.ln())))
+            .collect();
+        let upwards: Vec<usize> = (0..=ny / 2).collect();
         let strongest = |i: usize, line: &[Complex<f32>], other: &[Complex<f32>]| {
-            let kx = frequency(0, i);
+            let wave = |j: usize| [frequency(0, i), frequency(1, j)];
             let mut best: Option<(f32, [f64; 2])> = None;
-            for (j, of) in line.iter().enumerate().take(ny / 2 + 1) {
-                let p = of.norm_sqr() + other[opposite(1, j)].norm_sqr();
-                // few are higher than all before them: others need not be asked whose they are
-                if best.is_none_or(|(most, _)| p - least >= most) {
-                    let k = [kx, frequency(1, j)];
-                    let worth = p - price(k);
-                    let higher = best.is_none_or(|(most, _)| worth >= most);
-                    if higher && !own.excludes([kx, k[1].abs()]) {
-                        best = Some((worth, k));
+            let mut rest = upwards.as_slice();
+            for (up_to, price) in &octaves {
+                let within = rest.partition_point(|&j| own.scale(wave(j)) < *up_to);
+                let (octave, longer) = rest.split_at(within);
+                rest = longer;
+                for &j in octave {
+                    let power = line[j].norm_sqr() + other[opposite(1, j)].norm_sqr();
+                    let worth = power - price;
+                    // few are higher than all before them: others need not be asked whose they are
+                    if best.is_none_or(|(most, _)| worth >= most) && !own.excludes(wave(j)) {
+                        best = Some((worth, wave(j)));
                     }
                 }
             }
