@@ -149,18 +149,20 @@ pub fn rotation_vector(
     // q and -q are one rotation: take the one with the smaller angle
     let sign = if q.w < 0.0 { -1.0 } else { 1.0 };
     let (v, w) = (q.imag() * sign, q.w * sign);
-    let n = v.norm();
-    // below 1e-8, atan2(n, w)/n is 1/w to 1e-16, and n may have underflowed
-    let scale = if n < 1e-8 {
-        2.0 / w
+    let n2 = v.norm_squared();
+    let scale = if n2 < SERIES_BELOW {
+        let t = n2 / (w * w);
+        let bent = 1.0 / 5.0 - t * (1.0 / 7.0 - t * (1.0 / 9.0 - t / 11.0));
+        2.0 / w * (1.0 - t * (1.0 / 3.0 - t * bent))
     } else {
+        let n = n2.sqrt();
         2.0 * n.atan2(w) / n
     };
     v * scale
 }
 
-/// Square of the half angle below which the series of sine and cosine are used: the steps between
-/// samples. Their first left-out terms, `h2^4/9!` and `h2^5/10!`, are below 1e-16.
+/// Square of the half angle below which the series of sine, cosine and arc tangent are used: the steps between
+/// samples. Their first left-out terms, `h2^4/9!`, `h2^5/10!` and `h2^6/13`, are below 1e-16.
 const SERIES_BELOW: f64 = 0.002;
 
 /// The rotation `exp(theta)`, theta in rad: `v' = v + theta x v + ...`. Inverse of

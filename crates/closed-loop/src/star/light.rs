@@ -192,41 +192,49 @@ fn around(data: &StarData, turns: &Turns, reference: [f64; 3]) -> Vec<Known> {
         .into_par_iter()
         .map(|k| predict(data, &own, &attitude, k, step_s))
         .collect();
-    // how much worse than its own sigma each was predicted, arcsec^2
-    let worse: Vec<[Option<(f64, f64)>; 3]> = own
+    // how much worse than its own sigma each was predicted, arcsec^2, what that said, and whether it says anything
+    let judges: Vec<[[f64; 3]; 3]> = own
         .iter()
         .zip(&predicted)
         .map(|(own, predicted)| {
-            std::array::from_fn(|a| {
+            let mut judge = [[0.0; 3]; 3];
+            for a in 0..3 {
                 let ((y, v), (p, q)) = (own[a], predicted[a]);
                 let said = v + q;
-                said.is_finite().then(|| ((y - p).powi(2) - said, said))
-            })
+                if said.is_finite() {
+                    judge[0][a] = (y - p).powi(2) - said;
+                    judge[1][a] = said;
+                    judge[2][a] = 1.0;
+                }
+            }
+            judge
         })
         .collect();
     (0..frames)
         .into_par_iter()
         .map(|k| {
-            let near = k.saturating_sub(JUDGES)..(k + JUDGES + 1).min(frames);
+            let before = &judges[k.saturating_sub(JUDGES)..k];
+            let after = &judges[k + 1..(k + JUDGES + 1).min(frames)];
+            let [beyond, said, count] = before.iter().chain(after).fold([[0.0; 3]; 3], added);
             std::array::from_fn(|a| {
-                let judges = near.clone().filter(|&j| j != k);
-                let (mut beyond, mut said, mut count) = (0.0, 0.0, 0.0);
-                for (b, s) in judges.filter_map(|j| worse[j][a]) {
-                    beyond += b;
-                    said += s;
-                    count += 1.0;
-                }
                 let (p, q) = predicted[k][a];
-                if count < FEWEST as f64 {
+                if count[a] < FEWEST as f64 {
                     return (0.0, f64::INFINITY);
                 }
                 // a mean square of so many has this scatter
-                let chance = 2.0 * (2.0 / count).sqrt() * said / count;
-                let beyond = beyond / count;
+                let chance = 2.0 * (2.0 / count[a]).sqrt() * said[a] / count[a];
+                let beyond = beyond[a] / count[a];
                 (p, if beyond > chance { q + beyond } else { q })
             })
         })
         .collect()
+}
+
+fn added(mut all: [[f64; 3]; 3], one: &[[f64; 3]; 3]) -> [[f64; 3]; 3] {
+    for (all, one) in all.as_flattened_mut().iter_mut().zip(one.as_flattened()) {
+        *all += one;
+    }
+    all
 }
 
 /// Frame `k` by the frames around it alone.
@@ -314,9 +322,14 @@ impl Fit {
         if self.count < 4 {
             return None;
         }
-        let inverse = Matrix3::from_fn(|i, j| self.powers[i + j]).try_inverse()?;
-        let value = inverse.column(0).dot(&Vector3::from(self.moments));
-        (inverse[(0, 0)] > 0.0).then_some((value, inverse[(0, 0)]))
+        // the first column of the inverse of the matrix of powers i + j
+        let [p0, p1, p2, p3, p4] = self.powers;
+        let minors = [p2 * p4 - p3 * p3, p2 * p3 - p1 * p4, p1 * p3 - p2 * p2];
+        let determinant = p0 * minors[0] + p1 * minors[1] + p2 * minors[2];
+        let [m0, m1, m2] = self.moments;
+        let value = (minors[0] * m0 + minors[1] * m1 + minors[2] * m2) / determinant;
+        let variance = minors[0] / determinant;
+        (determinant != 0.0 && variance > 0.0).then_some((value, variance))
     }
 }
 

@@ -59,6 +59,8 @@ use waves::{RAW, RawSums, wave};
 
 /// Peaks of the transform that are refined.
 const REFINED: usize = 6;
+/// A wave a quarter of a cycle off along both axes has (sin(pi/4)/(pi/4))^4 of its power: all of it is more by as much.
+const REFINES: f64 = 1.52;
 /// How often the middle of three points moves before they come closer, at most.
 const MOST_MOVES: usize = 4;
 /// Waves fewer than this times the distortion's order across the detector are its own.
@@ -377,12 +379,8 @@ impl Field {
         // what is left of the power once its octave is paid
         let worth = |peak: &(f64, [f64; 2])| peak.0 - 2.0 * own.trials(peak.1).ln();
         let better = |a: &(f64, [f64; 2]), b: &(f64, [f64; 2])| worth(a).total_cmp(&worth(b));
+        peaks.retain(|&(power, k)| could_show(REFINES * power, own.trials(k)));
         peaks.sort_by(|a, b| better(b, a));
-        // chi-square of so little falls short by far, refined or not
-        let &(most, k) = peaks.first()?;
-        if most < own.trials(k).ln() {
-            return None;
-        }
         let step = extent.map(|l| 0.25 / l);
         let best = peaks
             .into_iter()
@@ -577,6 +575,12 @@ impl Field {
         let total: f64 = self.residual.iter().flatten().map(|r| r * r).sum();
         Some(gain / total)
     }
+}
+
+/// Whether so much power, a chi-squared of 4 of which no covariance makes more, could be beyond chance.
+fn could_show(power: f64, trials: f64) -> bool {
+    let x = 0.5 * power;
+    (1.0 + x) * (-x).exp() * trials < SEARCH_ALPHA
 }
 
 /// The top of `power` near a wave vector: axis by axis that of a parabola through three points, a `step` apart, which

@@ -24,8 +24,7 @@ use block_regression::Folds;
 use fourier::Complex;
 
 use super::octaves::{CHANCES, Others};
-use super::{Field, LEAST_EXTENT_PX, LEAST_MOTION, Pattern, REFINED, climb};
-use crate::unexplained::SEARCH_ALPHA;
+use super::{Field, LEAST_EXTENT_PX, LEAST_MOTION, Pattern, REFINED, climb, could_show};
 
 /// Bins of the radius in a pixel: waves of up to a quarter of a cycle per pixel.
 const BINS: f64 = 0.5;
@@ -96,9 +95,7 @@ impl Field {
         let peaks = self.ring_peaks(variance, range).into_iter();
         let peaks: Vec<_> = peaks.map(|k| (power([k, 0.0]), [k, 0.0])).collect();
         let &(most, k) = peaks.iter().max_by(|a, b| better(a, b))?;
-        // chi-squared of 4, of which no covariance makes more
-        let x = 0.5 * REFINES * most;
-        if (1.0 + x) * (-x).exp() * range.trials(k[0]) >= SEARCH_ALPHA {
+        if !could_show(REFINES * most, range.trials(k[0])) {
             return None;
         }
         let best = peaks
