@@ -53,6 +53,8 @@ const STEEPEST: f64 = 1.2;
 const LEAST_LEFT: f64 = 0.1;
 /// A star is never taken for quieter than this share of the common noise.
 const QUIETEST: f64 = 0.1;
+/// Rows that are sorted by star at once.
+const PIECE: usize = 1 << 17;
 /// Median of |x| for unit variance.
 const MEDIAN_OF_NORMAL: f64 = 0.6745;
 
@@ -64,16 +66,7 @@ pub(crate) fn of(data: &StarData, changes: &[Vec<f64>; 2]) -> Vec<f64> {
     if data.frames_are_unrelated() {
         return vec![1.0; rows];
     }
-    let left = left_by_attitudes(data);
-    let mut sizes = vec![Vec::new(); data.stars.len()];
-    for (row, &star) in data.star.iter().enumerate() {
-        let left = left.get(row).unwrap_or(&[1.0; 2]);
-        let each = changes
-            .iter()
-            .zip(left)
-            .map(|(c, l)| c[row].abs() / l.sqrt());
-        sizes[star].extend(each.filter(|c| c.is_finite()));
-    }
+    let sizes = sizes(data, changes);
     let scale = |values: &mut Vec<f64>| {
         let median = robust::median(values)?;
         Some(median / (MEDIAN_OF_NORMAL * std::f64::consts::SQRT_2))
@@ -104,9 +97,38 @@ pub(crate) fn of(data: &StarData, changes: &[Vec<f64>; 2]) -> Vec<f64> {
         })
         .collect();
     let counted = || (0..rows).filter(|&r| !data.outlier[r]);
-    let log: f64 = counted().map(|r| sigma[data.star[r]].ln()).sum();
+    let log_sigma: Vec<f64> = sigma.iter().map(|s| s.ln()).collect();
+    let log: f64 = counted().map(|r| log_sigma[data.star[r]]).sum();
     let geometric = (log / counted().count().max(1) as f64).exp();
-    (0..rows).map(|r| geometric / sigma[data.star[r]]).collect()
+    let weight: Vec<f64> = sigma.iter().map(|s| geometric / s).collect();
+    data.star.iter().map(|&star| weight[star]).collect()
+}
+
+/// Sizes of the changes of each star, as if attitudes left all of its noise.
+fn sizes(data: &StarData, changes: &[Vec<f64>; 2]) -> Vec<Vec<f64>> {
+    let left = left_by_attitudes(data);
+    let stars = data.stars.len();
+    let of_rows = |(piece, of_row): (usize, &[usize])| {
+        let mut sizes = vec![Vec::new(); stars];
+        for (i, &star) in of_row.iter().enumerate() {
+            let row = PIECE * piece + i;
+            let left = left.get(row).unwrap_or(&[1.0; 2]);
+            let each = changes
+                .iter()
+                .zip(left)
+                .map(|(c, l)| c[row].abs() / l.sqrt());
+            sizes[star].extend(each.filter(|c| c.is_finite()));
+        }
+        sizes
+    };
+    let pieces: Vec<Vec<Vec<f64>>> = data
+        .star
+        .par_chunks(PIECE)
+        .enumerate()
+        .map(of_rows)
+        .collect();
+    let of_star = |star: usize| pieces.iter().flat_map(|p| &p[star]).copied().collect();
+    (0..stars).into_par_iter().map(of_star).collect()
 }
 
 /// Share of each row's variance, per axis, that the attitude of its frame leaves; NaN where that is next to nothing.
