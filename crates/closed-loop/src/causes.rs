@@ -41,7 +41,8 @@ use commonness::Slow;
 use description::{Described, Kept, Part};
 use invariance::{Change, changing};
 use one_star::is_one_star;
-use stand_ins::{Known, describe, stand_ins};
+use rest::{keep_whole, looked_for};
+use stand_ins::{Known, stand_ins};
 use star_constants::Constants;
 
 mod by_channel;
@@ -52,6 +53,7 @@ pub(crate) mod invariance;
 mod one_star;
 mod places;
 mod recurrence;
+mod rest;
 mod stand_ins;
 pub(crate) mod star_constants;
 mod wanders;
@@ -266,8 +268,11 @@ pub(crate) fn run<'a>(
             let axes = wander.axes().iter().filter(|a| **a).count();
             if let Some(instead) = wanders::in_place(&described, &plain, axes) {
                 let tie = wander.behind.is_some_and(|nats| nats < TIE);
+                let heaters = plain.is_of_channels(&instead);
                 // what it beats speaks against no effect
-                if reinstated(&mut refused) || tie && suffice(&beside, folds, quest, &may)? {
+                if reinstated(&mut refused)
+                    || (tie || heaters) && suffice(&beside, folds, quest, &may)?
+                {
                     start = Start::White;
                     found_terms.extend(looked_for(&plain, &instead));
                 } else {
@@ -572,66 +577,6 @@ fn worse(
         }
     }
     Ok(families)
-}
-
-/// Terms for every fit from now on, and what bends as well.
-fn whole(described: &Described, parts: Vec<Part>) -> Vec<Arc<dyn Candidate>> {
-    let mut kept: Vec<Arc<dyn Candidate>> = Vec::new();
-    for (term, part) in parts {
-        let term = &described.terms[term].term;
-        let columns = term.bending(&part);
-        kept.push(Arc::new(Kept::new(Arc::new(term.clone()), columns)));
-    }
-    kept
-}
-
-/// Keeps these parts as terms for every fit from now on; those that were looked for are not `found` beside themselves.
-fn keep_whole(
-    kept: &mut Vec<Arc<dyn Candidate>>,
-    found: &mut Vec<Empirical>,
-    described: &Described,
-    parts: Vec<Part>,
-) {
-    found.extend(looked_for(described, &parts));
-    kept.extend(whole(described, parts));
-}
-
-impl Described {
-    /// What describes best what is left beside the chosen effects, and its likelihood after all prices, if anything
-    /// does.
-    fn rest(&self) -> Option<&(f64, Vec<Part>)> {
-        let set = || columns_of(&self.fitted.groups, &self.chosen);
-        self.rest.get_or_init(|| describe(self, &set())).as_ref()
-    }
-
-    /// What else than the time does of that, first.
-    fn left(&self) -> Option<Vec<Part>> {
-        self.rest().map(|(_, parts)| self.before_time(parts))
-    }
-
-    /// All of it as terms; none where nothing does.
-    pub(crate) fn terms_left(&self) -> Vec<Arc<dyn Candidate>> {
-        let terms = self.rest().map(|(_, parts)| whole(self, parts.clone()));
-        terms.unwrap_or_default()
-    }
-
-    /// Whether these are of the time alone.
-    pub(super) fn is_of_time(&self, parts: &[Part]) -> bool {
-        parts.iter().all(|(k, _)| self.terms[*k].term.is_of_time())
-    }
-
-    /// `parts` but for the time, where that is not alone: a step looks like it, and is looked for beside the others.
-    pub(super) fn before_time(&self, parts: &[Part]) -> Vec<Part> {
-        let alone = self.is_of_time(parts);
-        let first = |(k, _): &&Part| alone || !self.terms[*k].term.is_of_time();
-        parts.iter().filter(first).cloned().collect()
-    }
-}
-
-/// The terms of a description that were looked for.
-fn looked_for(described: &Described, parts: &[Part]) -> Vec<Empirical> {
-    let terms = parts.iter().map(|(k, _)| &described.terms[*k].term);
-    terms.filter(|t| t.is_looked_for()).cloned().collect()
 }
 
 /// Slow noise that is left of the stars themselves.

@@ -146,6 +146,15 @@ impl<'a> StarEvidence<'a> {
         StarMoments::accumulate(&self.columns(&all), folds, Keep::Bins(&bins))
     }
 
+    /// All of these products under its noise.
+    pub(crate) fn under(&self, moments: &StarMoments) -> BlockGrams {
+        let all: Vec<usize> = (0..moments.width()).collect();
+        match &self.noise {
+            Some(noise) => moments.under(&all, noise),
+            None => moments.white_of(&all),
+        }
+    }
+
     fn columns<'b>(&'b self, candidates: &'b [&'b dyn Candidate]) -> StarColumns<'b> {
         StarColumns {
             data: self.data,
@@ -258,10 +267,8 @@ impl Evidence for StarEvidence<'_> {
     }
 
     fn grams(&self, folds: &Folds, candidates: &[&dyn Candidate]) -> BlockGrams {
-        if let Some(noise) = &self.noise {
-            let moments = self.moments(folds, candidates);
-            let all: Vec<usize> = (0..moments.width()).collect();
-            return moments.under(&all, noise);
+        if self.noise.is_some() {
+            return self.under(&self.moments(folds, candidates));
         }
         let keep = match self.drawn {
             _ if self.data.free_attitude => Keep::Free,

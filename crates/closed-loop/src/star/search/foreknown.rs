@@ -34,20 +34,10 @@ pub(super) fn beside<'a>(
 ) -> Result<Searched<'a>, CloseError> {
     let mut noise = noise_of(white, folds, None, known)?;
     // beside slow noise an instant shows at itself alone, which no grid has: in the forms that suit white noise
-    let (mut candidates, mut products) = in_white(white, folds, candidates, may)?;
+    let mut forms = Forms::in_white(white, folds, candidates, may)?;
     for round in 1.. {
         let level = white.with_noise(&noise);
-        let moments = match products.take() {
-            Some(products) => products,
-            None => white.moments(folds, &borrowed(&candidates)),
-        };
-        let all: Vec<usize> = (0..moments.width()).collect();
-        let grams = moments.under(&all, &noise);
-        products = there_is_room(white, folds).then_some(moments);
-        let fitted = fit_grams(&level, &grams, folds, &borrowed(&candidates))?;
-        drop(grams);
-        let found = search(&level, folds, candidates.clone(), may, Some(fitted))?;
-        products.take_if(|_| !are_the_same(&found.candidates, &candidates));
+        let found = forms.searched(white, &level, folds, may)?;
         let better = noise_of(white, folds, Some(&found), known)?;
         if round == ROUNDS || better.is_like(&noise) {
             return Ok(Searched {
@@ -56,43 +46,79 @@ pub(super) fn beside<'a>(
                 wander: None,
             });
         }
-        candidates = found.candidates;
+        forms.are_now(found.candidates);
         noise = better;
     }
     Err(CloseError::Singular)
 }
 
-/// The forms in which a search on white evidence leaves the candidates, and their products if it has them.
-fn in_white(
-    white: &StarEvidence<'_>,
-    folds: &Folds,
+/// Candidates in the forms that a search leaves them in, and their products if they are there.
+struct Forms {
     candidates: Vec<Arc<dyn Candidate>>,
-    may: &[bool],
-) -> Result<(Vec<Arc<dyn Candidate>>, Option<StarMoments>), CloseError> {
-    if white.drawn.is_some() {
-        // white evidence is another one then
-        let found = search(white, folds, candidates, may, None)?;
-        return Ok((found.candidates, None));
+    moments: Option<StarMoments>,
+}
+
+impl Forms {
+    /// Those that suit white noise.
+    fn in_white(
+        white: &StarEvidence<'_>,
+        folds: &Folds,
+        candidates: Vec<Arc<dyn Candidate>>,
+        may: &[bool],
+    ) -> Result<Self, CloseError> {
+        if white.drawn.is_some() {
+            // white evidence is another one then
+            let found = search(white, folds, candidates, may, None)?;
+            return Ok(Self {
+                candidates: found.candidates,
+                moments: None,
+            });
+        }
+        let Begun {
+            candidates,
+            moments,
+            plain,
+        } = Begun::on(white, folds, candidates)?;
+        let mut forms = Self {
+            moments: there_is_room(white, folds).then_some(moments),
+            candidates: candidates.clone(),
+        };
+        let found = search(white, folds, candidates, may, Some(plain))?;
+        forms.are_now(found.candidates);
+        Ok(forms)
     }
-    let Begun {
-        candidates,
-        moments,
-        plain,
-    } = Begun::on(white, folds, candidates)?;
-    let mut products = there_is_room(white, folds).then_some(moments);
-    let found = search(white, folds, candidates.clone(), may, Some(plain))?;
-    products.take_if(|_| !are_the_same(&found.candidates, &candidates));
-    Ok((found.candidates, products))
+
+    /// One search from these under the noise of `level`, of `white` evidence otherwise.
+    fn searched(
+        &mut self,
+        white: &StarEvidence<'_>,
+        level: &StarEvidence<'_>,
+        folds: &Folds,
+        may: &[bool],
+    ) -> Result<Found, CloseError> {
+        let all = borrowed(&self.candidates);
+        let kept = self.moments.take();
+        let moments = kept.unwrap_or_else(|| white.moments(folds, &all));
+        let grams = level.under(&moments);
+        self.moments = there_is_room(white, folds).then_some(moments);
+        let fitted = fit_grams(level, &grams, folds, &all)?;
+        drop(grams);
+        search(level, folds, self.candidates.clone(), may, Some(fitted))
+    }
+
+    /// Products of other forms are none of these.
+    fn are_now(&mut self, forms: Vec<Arc<dyn Candidate>>) {
+        let same = |(a, b)| Arc::ptr_eq(a, b);
+        if !forms.iter().zip(&self.candidates).all(same) {
+            self.moments = None;
+        }
+        self.candidates = forms;
+    }
 }
 
 /// Whether there is room for the products of some forms beside those of others.
 fn there_is_room(white: &StarEvidence<'_>, folds: &Folds) -> bool {
     white.coarser(folds).is_none()
-}
-
-/// Whether no form is another one.
-fn are_the_same(some: &[Arc<dyn Candidate>], others: &[Arc<dyn Candidate>]) -> bool {
-    some.iter().zip(others).all(|(a, b)| Arc::ptr_eq(a, b))
 }
 
 /// The noise of what `found` leaves, or the declared model.

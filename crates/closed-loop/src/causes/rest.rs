@@ -1,0 +1,78 @@
+//! What is left beside the effects that were chosen: its best description, and that as terms for every fit.
+//!
+//! Not physics: which terms.
+
+use std::sync::Arc;
+
+use effects::Candidate;
+
+use crate::causes::description::{Described, Kept, Part};
+use crate::causes::stand_ins::describe;
+use crate::search::empirical::Empirical;
+use crate::search::selection::columns_of;
+
+/// Terms for every fit from now on, and what bends as well.
+fn whole(described: &Described, parts: Vec<Part>) -> Vec<Arc<dyn Candidate>> {
+    let mut kept: Vec<Arc<dyn Candidate>> = Vec::new();
+    for (term, part) in parts {
+        let term = &described.terms[term].term;
+        let columns = term.bending(&part);
+        kept.push(Arc::new(Kept::new(Arc::new(term.clone()), columns)));
+    }
+    kept
+}
+
+/// Keeps these parts as terms for every fit from now on; those that were looked for are not `found` beside themselves.
+pub(super) fn keep_whole(
+    kept: &mut Vec<Arc<dyn Candidate>>,
+    found: &mut Vec<Empirical>,
+    described: &Described,
+    parts: Vec<Part>,
+) {
+    found.extend(looked_for(described, &parts));
+    kept.extend(whole(described, parts));
+}
+
+impl Described {
+    /// What describes best what is left beside the chosen effects, and its likelihood after all prices, if anything
+    /// does.
+    pub(super) fn rest(&self) -> Option<&(f64, Vec<Part>)> {
+        let set = || columns_of(&self.fitted.groups, &self.chosen);
+        self.rest.get_or_init(|| describe(self, &set())).as_ref()
+    }
+
+    /// What else than the time does of that, first.
+    pub(super) fn left(&self) -> Option<Vec<Part>> {
+        self.rest().map(|(_, parts)| self.before_time(parts))
+    }
+
+    /// All of it as terms; none where nothing does.
+    pub(crate) fn terms_left(&self) -> Vec<Arc<dyn Candidate>> {
+        let terms = self.rest().map(|(_, parts)| whole(self, parts.clone()));
+        terms.unwrap_or_default()
+    }
+
+    /// Whether these are of the time alone.
+    pub(super) fn is_of_time(&self, parts: &[Part]) -> bool {
+        parts.iter().all(|(k, _)| self.terms[*k].term.is_of_time())
+    }
+
+    /// Whether these are of housekeeping channels alone, with which a heater bends the camera.
+    pub(super) fn is_of_channels(&self, parts: &[Part]) -> bool {
+        let channel = |(k, _): &Part| self.terms[*k].term.is_of_channel();
+        parts.iter().all(channel)
+    }
+
+    /// `parts` but for the time, where that is not alone: a step looks like it, and is looked for beside the others.
+    pub(super) fn before_time(&self, parts: &[Part]) -> Vec<Part> {
+        let alone = self.is_of_time(parts);
+        let first = |(k, _): &&Part| alone || !self.terms[*k].term.is_of_time();
+        parts.iter().filter(first).cloned().collect()
+    }
+}
+
+/// The terms of a description that were looked for.
+pub(super) fn looked_for(described: &Described, parts: &[Part]) -> Vec<Empirical> {
+    let terms = parts.iter().map(|(k, _)| &described.terms[*k].term);
+    terms.filter(|t| t.is_looked_for()).cloned().collect()
+}
