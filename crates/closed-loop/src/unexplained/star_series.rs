@@ -15,6 +15,7 @@
 //! is known but for its noise, and a reference that wanders leaves a step or a line in all stars alike, so
 //! that one has to be beyond chance at its instant or frequency without all that the stars of a frame share, too.
 //! A strong line passes for a step and a step for a line: of both the lesser one is looked for beside the other.
+//! Where what they do goes with where they are ([`by_place`]), that is told in the place of the star.
 //!
 //! Source: Scargle 1982 (periodogram); Wilks 1938.
 
@@ -31,6 +32,9 @@ use crate::star::data::StarData;
 use crate::unexplained::around::Around;
 use crate::unexplained::grid::{Grid, top};
 use crate::unexplained::star_freedom::Freedom;
+use by_place::by_place;
+
+mod by_place;
 
 /// Chance that either is told although there is none.
 const ALPHA: f64 = 0.001;
@@ -73,6 +77,8 @@ pub(crate) struct OwnSeries {
     apart_s: f64,
     p_value: f64,
     explained: f64,
+    /// The coordinates that it goes with, and their shares of it.
+    places: Vec<(&'static str, f64)>,
 }
 
 impl OwnSeries {
@@ -101,7 +107,13 @@ impl OwnSeries {
         unattributed.variance_fraction = Some(share.max(self.explained * left));
         let list = &mut unattributed.depends_on;
         let known = figures::largest(list);
-        if self.explained >= MOSTLY * known {
+        if self.explained < MOSTLY * known {
+            return;
+        }
+        for (variable, share) in self.places.iter().rev() {
+            stars_first(list, variable, share * self.explained, self.p_value);
+        }
+        if self.places.is_empty() {
             stars_first(list, IN_TIME, self.explained, self.p_value);
         }
     }
@@ -177,6 +189,19 @@ pub(crate) fn search(
         out.p_value = out.p_value.min(found.p_value);
         out.explained = out.explained.max(found.squares / (2.0 * rows));
     }
+    let least = f64::NEG_INFINITY;
+    let squares = |found: &Option<Event>| found.as_ref().map_or(least, |e| e.squares);
+    let lesser = squares(&line) < squares(&jump);
+    out.places = match (&line, &jump) {
+        (_, Some(t)) if lesser => by_place(data, own, weight, |s| [f64::from(u8::from(s > t.at))]),
+        (Some(line), _) => {
+            let omega = std::f64::consts::TAU * line.at;
+            by_place(data, own, weight, |t| {
+                [(omega * t).cos(), (omega * t).sin()]
+            })
+        }
+        _ => Vec::new(),
+    };
     out.line_hz = line.map(|l| l.at);
     out.jump_s = jump.map(|j| j.at);
     out
