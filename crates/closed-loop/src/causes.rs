@@ -325,6 +325,11 @@ pub(crate) fn run<'a>(
             if (named || kept.is_empty())
                 && let Some(left) = left()
             {
+                // no slow error goes with a channel
+                if described.is_of_heaters(&left, &refused) && reinstated(&mut refused) {
+                    start = Start::White;
+                    continue;
+                }
                 keep_whole(&mut kept, &mut found_terms, &described, left);
                 continue;
             }

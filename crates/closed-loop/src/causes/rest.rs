@@ -9,7 +9,11 @@ use effects::Candidate;
 use crate::causes::description::{Described, Kept, Part};
 use crate::causes::stand_ins::describe;
 use crate::search::empirical::Empirical;
+use crate::search::refusal::{Refusal, Refused};
 use crate::search::selection::columns_of;
+
+/// The effect that bends the camera with a channel.
+const HEATER: &str = "thermal_misalignment";
 
 /// Terms for every fit from now on, and what bends as well.
 fn whole(described: &Described, parts: Vec<Part>) -> Vec<Arc<dyn Candidate>> {
@@ -61,6 +65,18 @@ impl Described {
     pub(super) fn is_of_channels(&self, parts: &[Part]) -> bool {
         let channel = |(k, _): &Part| self.terms[*k].term.is_of_channel();
         parts.iter().all(channel)
+    }
+
+    /// Whether one of these channels, which are all there is, is that of a heater that was refused for a slow error of the
+    /// reference.
+    pub(super) fn is_of_heaters(&self, parts: &[Part], refused: &Refused) -> bool {
+        let heater = |(k, _): &Part| {
+            let name = self.terms[*k].term.name();
+            let channel = name.strip_prefix("housekeeping:");
+            let family = channel.map(|channel| format!("{HEATER}/{channel}"));
+            family.is_some_and(|family| refused.get(&family) == Some(&Refusal::Wander))
+        };
+        self.is_of_channels(parts) && parts.iter().any(heater)
     }
 
     /// `parts` but for the time, where that is not alone: a step looks like it, and is looked for beside the others.
