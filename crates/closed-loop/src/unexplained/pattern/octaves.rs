@@ -151,3 +151,23 @@ impl Own {
             || within(0.0, 1.0, PHASE_GUARD)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A ladder of octaves says of every wave what it pays by itself.
+    #[test]
+    fn the_prices_are_those_of_the_waves() {
+        let own = Own {
+            extent: [1024.0, 700.0],
+            cycles: 3.5,
+        };
+        for j in 1..2000 {
+            let k = [0.013, 0.37].map(|step| (f64::from(j) * step).fract() - 0.5);
+            let price = own.prices().find(|(up_to, _)| own.scale(k) < *up_to);
+            let (_, trials) = price.expect("the last octave has no end");
+            assert!((trials / own.trials(k) - 1.0).abs() < 1e-12, "{k:?}");
+        }
+    }
+}
