@@ -325,8 +325,10 @@ pub(crate) fn run<'a>(
             if (named || kept.is_empty())
                 && let Some(left) = left()
             {
-                // no slow error goes with a channel
-                if described.is_of_heaters(&left, &refused) && reinstated(&mut refused) {
+                // no slow error that is not even claimed goes with a channel
+                let unclaimed = searched.wander.is_none();
+                if unclaimed && described.is_of_heaters(&left, &refused) && reinstated(&mut refused)
+                {
                     start = Start::White;
                     continue;
                 }
