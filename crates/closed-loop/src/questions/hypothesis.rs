@@ -29,6 +29,8 @@ use crate::search::{Found, first_column, without};
 const SEEN: f64 = 5.0;
 /// Sizes within this many sigmas of what nature makes are plausible.
 const PLAUSIBLE: f64 = 3.0;
+/// Below it a chance is told by this bound alone.
+const NEXT_TO_NEVER: f64 = 1e-300;
 
 /// Effects to be tested by name.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -426,6 +428,15 @@ fn of_size(size: &RefusedSize) -> String {
     )
 }
 
+/// A chance in words; of a large effect's next to none is left.
+fn p_is(p: f64) -> String {
+    if p < NEXT_TO_NEVER {
+        format!("p < {NEXT_TO_NEVER:e}")
+    } else {
+        format!("p = {p:.1e}")
+    }
+}
+
 /// The answer in a sentence or three. `against`: what speaks against it; `others`: something was added.
 fn finding(h: &Hypothesis, against: Option<&str>, others: bool) -> String {
     if let Some(reason) = &h.reason {
@@ -433,7 +444,7 @@ fn finding(h: &Hypothesis, against: Option<&str>, others: bool) -> String {
     }
     let mut said = Vec::new();
     said.push(match (h.added, h.significant, h.p_value) {
-        (true, _, Some(p)) => format!("added: it predicts the residual out of fold (p = {p:.1e})"),
+        (true, _, Some(p)) => format!("added: it predicts the residual out of fold ({})", p_is(p)),
         (true, _, None) => "added".to_owned(),
         (false, true, Some(p)) => {
             let why = match (against, others) {
@@ -441,13 +452,13 @@ fn finding(h: &Hypothesis, against: Option<&str>, others: bool) -> String {
                 (None, true) => "not worth its parameters beside what was added",
                 (None, false) => "the search did not end with it",
             };
-            format!("significant (p = {p:.1e}), but {why}")
+            format!("significant ({}), but {why}", p_is(p))
         }
         (false, false, Some(p)) => match (&h.refused, against) {
-            (Some(size), _) => format!("refused (p = {p:.1e}): {}", of_size(size)),
+            (Some(size), _) => format!("refused ({}): {}", p_is(p), of_size(size)),
             (None, Some(why)) => format!("found, but {why}; beside that p = {p:.2}"),
             (None, None) if p < FAMILY_ALPHA => {
-                format!("p = {p:.1e}, but it predicts nothing out of fold")
+                format!("{}, but it predicts nothing out of fold", p_is(p))
             }
             (None, None) => format!("not significant (p = {p:.2})"),
         },
@@ -548,5 +559,19 @@ mod tests {
             assert!(said.contains("the stars wander"), "{said}");
             assert!(!said.contains(beside), "{said}");
         }
+    }
+
+    /// No chance is told as 0.
+    #[test]
+    fn the_chance_of_a_large_effect_is_told_by_a_bound() {
+        let of = |p: f64| Hypothesis {
+            added: true,
+            significant: true,
+            observable: true,
+            p_value: Some(p),
+            ..Hypothesis::default()
+        };
+        assert!(finding(&of(0.0), None, false).contains("(p < 1e-300)"));
+        assert!(finding(&of(2.4e-9), None, false).contains("(p = 2.4e-9)"));
     }
 }
