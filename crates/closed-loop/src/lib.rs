@@ -50,7 +50,7 @@ mod unexplained;
 pub use close::{close, close_asking};
 pub use error::CloseError;
 pub use outcome::{Closed, Rival};
-pub use questions::hypothesis::Questions;
+pub use questions::hypothesis::{NEXT_TO_NEVER, Questions, p_is};
 
 /// Seeds of a trial of alarms and the most of them that may raise one: `seeds` and
 /// `most`, or as many as `BORESIGHT_SEEDS` says and 5 sigma above one in `rarity`.

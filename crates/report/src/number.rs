@@ -1,5 +1,7 @@
 //! Numbers as people read them.
 
+use closed_loop::NEXT_TO_NEVER;
+
 /// Four significant digits, plain where that is readable.
 pub(crate) fn number(value: f64) -> String {
     let size = value.abs();
@@ -81,9 +83,6 @@ pub(crate) fn change(value: f64) -> String {
     }
 }
 
-/// Below it a probability is told by this bound alone.
-const NEXT_TO_NEVER: f64 = 1e-300;
-
 /// A probability.
 pub(crate) fn probability(p: f64) -> String {
     if p.is_nan() {
@@ -102,15 +101,6 @@ pub(crate) fn p_is(p: f64) -> String {
     let told = probability(p);
     let sign = if told.starts_with('<') { "" } else { "= " };
     format!("p {sign}{told}")
-}
-
-/// The same in plain text.
-pub(crate) fn p_is_plain(p: f64) -> String {
-    if p < NEXT_TO_NEVER {
-        format!("p < {NEXT_TO_NEVER:e}")
-    } else {
-        format!("p = {p:.1e}")
-    }
 }
 
 /// A frequency with its unit.
@@ -194,7 +184,7 @@ mod tests {
         assert_eq!(probability(0.0), "< 10⁻³⁰⁰");
         assert_eq!(probability(0.26), "0.260");
         assert_eq!([p_is(0.0), p_is(0.26)], ["p < 10⁻³⁰⁰", "p = 0.260"]);
-        let plain = [0.0, 1.4e-5].map(p_is_plain);
+        let plain = [0.0, 1.4e-5].map(closed_loop::p_is);
         assert_eq!(plain, ["p < 1e-300", "p = 1.4e-5"]);
         assert_eq!(percent(0.243), "24.3");
         assert_eq!(percent(8.02e-5), "0.01");

@@ -3,10 +3,10 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-use closed_loop::Closed;
+use closed_loop::{Closed, p_is};
 use telemetry::report::{Dependence, Errors, RefusedSize, Report, Selector, listed};
 
-use crate::number::{number, p_is_plain};
+use crate::number::number;
 use crate::order::by_number;
 use crate::set_aside;
 use crate::verdict::sentence;
@@ -146,7 +146,7 @@ fn effects(out: &mut String, report: &Report) {
             out,
             "            gain {:.1} nats out of fold, {}{share}",
             effect.delta_loglik,
-            p_is_plain(effect.p_value)
+            p_is(effect.p_value)
         );
         let alike: Vec<String> = effect
             .confusable_with
@@ -335,7 +335,7 @@ fn follows(out: &mut String, list: &[Dependence]) {
             "  {:<34} {:>6.1} %   {}",
             d.variable,
             100.0 * d.variance_explained,
-            p_is_plain(d.p_value)
+            p_is(d.p_value)
         );
     }
 }

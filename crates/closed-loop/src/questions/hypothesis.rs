@@ -30,7 +30,7 @@ const SEEN: f64 = 5.0;
 /// Sizes within this many sigmas of what nature makes are plausible.
 const PLAUSIBLE: f64 = 3.0;
 /// Below it a chance is told by this bound alone.
-const NEXT_TO_NEVER: f64 = 1e-300;
+pub const NEXT_TO_NEVER: f64 = 1e-300;
 
 /// Effects to be tested by name.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -428,8 +428,9 @@ fn of_size(size: &RefusedSize) -> String {
     )
 }
 
-/// A chance in words; of a large effect's next to none is left.
-fn p_is(p: f64) -> String {
+/// A chance in plain text; of a large effect's next to none is left.
+#[must_use]
+pub fn p_is(p: f64) -> String {
     if p < NEXT_TO_NEVER {
         format!("p < {NEXT_TO_NEVER:e}")
     } else {

@@ -97,9 +97,14 @@ impl<'a> StarEvidence<'a> {
         }
     }
 
+    /// Whether the products of its columns take much room.
+    pub(crate) fn is_long(&self) -> bool {
+        self.data.t_s.len() > LONG_ROWS
+    }
+
     /// The folds in fewer blocks, where the run is long.
     pub(crate) fn coarser(&self, folds: &Folds) -> Option<Folds> {
-        (self.data.t_s.len() > LONG_ROWS).then(|| folds.coarser(JOINED))
+        self.is_long().then(|| folds.coarser(JOINED))
     }
 
     /// Whether the centroids were learned outside each fold.
@@ -146,7 +151,7 @@ impl<'a> StarEvidence<'a> {
         StarMoments::accumulate(&self.columns(&all), folds, Keep::Bins(&bins))
     }
 
-    /// All of these products under its noise.
+    /// All of these products under its noise, or white.
     pub(crate) fn under(&self, moments: &StarMoments) -> BlockGrams {
         let all: Vec<usize> = (0..moments.width()).collect();
         match &self.noise {

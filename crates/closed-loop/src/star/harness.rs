@@ -3,6 +3,7 @@
 //! Not physics: helpers of tests.
 
 use focal_plane::{AttitudeSeries, Camera, Pixel, StarFrames};
+use nalgebra::UnitQuaternion;
 
 use crate::declared::OnCentroids;
 use crate::star::data::{Inputs, Star, StarData};
@@ -16,6 +17,21 @@ pub(crate) const STARS: [[f64; 2]; 6] = [
     [10.0, 60.0],
     [-390.0, -40.0],
 ];
+
+/// What an untilted camera of 20 degrees at rest saw of [`STARS`] at these times.
+pub(crate) fn at_rest(t_s: Vec<f64>) -> StarData {
+    let camera = Camera::from_fov_deg([1024, 1024], [20.0, 20.0]).unwrap();
+    let mut frames = StarFrames::new();
+    for &t in &t_s {
+        frames.begin(t);
+        for (id, [x, y]) in (0..).zip(STARS) {
+            frames.push(id, i64::from(id), x, y);
+        }
+    }
+    let q = vec![UnitQuaternion::identity(); t_s.len()];
+    let reference = AttitudeSeries::new(t_s, q, None).unwrap();
+    seen(&camera, &frames, Some(&reference), &STARS)
+}
 
 /// What `frames` saw of stars that an untilted `camera` has at `places`, px; the id of a star is its place
 /// among them.

@@ -193,48 +193,38 @@ fn around(data: &StarData, turns: &Turns, reference: [f64; 3]) -> Vec<Known> {
         .map(|k| predict(data, &own, &attitude, k, step_s))
         .collect();
     // how much worse than its own sigma each was predicted, arcsec^2, what that said, and whether it says anything
-    let judges: Vec<[[f64; 3]; 3]> = own
-        .iter()
-        .zip(&predicted)
-        .map(|(own, predicted)| {
-            let mut judge = [[0.0; 3]; 3];
-            for a in 0..3 {
-                let ((y, v), (p, q)) = (own[a], predicted[a]);
-                let said = v + q;
-                if said.is_finite() {
-                    judge[0][a] = (y - p).powi(2) - said;
-                    judge[1][a] = said;
-                    judge[2][a] = 1.0;
-                }
+    let judge = |own: &Known, predicted: &Known| {
+        let about = |a: usize| {
+            let ((y, v), (p, q)) = (own[a], predicted[a]);
+            let said = v + q;
+            match said.is_finite() {
+                true => Vector3::new((y - p).powi(2) - said, said, 1.0),
+                false => Vector3::zeros(),
             }
-            judge
-        })
-        .collect();
+        };
+        Matrix3::from_columns(&[0, 1, 2].map(about))
+    };
+    let each = own.iter().zip(&predicted);
+    let judges: Vec<Matrix3<f64>> = each.map(|(own, said)| judge(own, said)).collect();
     (0..frames)
         .into_par_iter()
         .map(|k| {
             let before = &judges[k.saturating_sub(JUDGES)..k];
             let after = &judges[k + 1..(k + JUDGES + 1).min(frames)];
-            let [beyond, said, count] = before.iter().chain(after).fold([[0.0; 3]; 3], added);
+            let sums: Matrix3<f64> = before.iter().chain(after).sum();
             std::array::from_fn(|a| {
                 let (p, q) = predicted[k][a];
-                if count[a] < FEWEST as f64 {
+                let [beyond, said, count] = sums.column(a).into_owned().into();
+                if count < FEWEST as f64 {
                     return (0.0, f64::INFINITY);
                 }
                 // a mean square of so many has this scatter
-                let chance = 2.0 * (2.0 / count[a]).sqrt() * said[a] / count[a];
-                let beyond = beyond[a] / count[a];
+                let chance = 2.0 * (2.0 / count).sqrt() * said / count;
+                let beyond = beyond / count;
                 (p, if beyond > chance { q + beyond } else { q })
             })
         })
         .collect()
-}
-
-fn added(mut all: [[f64; 3]; 3], one: &[[f64; 3]; 3]) -> [[f64; 3]; 3] {
-    for (all, one) in all.as_flattened_mut().iter_mut().zip(one.as_flattened()) {
-        *all += one;
-    }
-    all
 }
 
 /// Frame `k` by the frames around it alone.

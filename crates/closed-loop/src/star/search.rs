@@ -395,14 +395,10 @@ fn coloured<'a>(
     // fits of the same columns, those under the noise of the last choice
     let (mut plain_fit, mut filtered_fit) = (Some(plain), None);
     loop {
-        let all: Vec<usize> = (0..moments.width()).collect();
         let under = |noise: &CommonNoise| {
-            fit_grams(
-                &white.with_noise(noise),
-                &moments.under(&all, noise),
-                folds,
-                &borrowed(&candidates),
-            )
+            let level = white.with_noise(noise);
+            let grams = level.under(&moments);
+            fit_grams(&level, &grams, folds, &borrowed(&candidates))
         };
         let beside = |fitted: Fitted| fitted.beside(folds, &borrowed(&candidates), &chosen);
         let plain = match plain_fit.take() {

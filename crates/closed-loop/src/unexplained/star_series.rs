@@ -178,8 +178,7 @@ pub(crate) fn search(
     let (mut line, mut jump) = (line_in(&series), step_in(&series));
     if let (Some(both), Some(t)) = (&line, &jump) {
         if both.squares > t.squares {
-            let omega = std::f64::consts::TAU * both.at;
-            jump = step_in(&less(&|t| [(omega * t).cos(), (omega * t).sin()]));
+            jump = step_in(&less(&swing(both.at)));
         } else {
             let side = |after: bool| f64::from(u8::from(after));
             line = line_in(&less(&|s| [side(s <= t.at), side(s > t.at)]));
@@ -189,22 +188,22 @@ pub(crate) fn search(
         out.p_value = out.p_value.min(found.p_value);
         out.explained = out.explained.max(found.squares / (2.0 * rows));
     }
-    let least = f64::NEG_INFINITY;
-    let squares = |found: &Option<Event>| found.as_ref().map_or(least, |e| e.squares);
-    let lesser = squares(&line) < squares(&jump);
     out.places = match (&line, &jump) {
-        (_, Some(t)) if lesser => by_place(data, own, weight, |s| [f64::from(u8::from(s > t.at))]),
-        (Some(line), _) => {
-            let omega = std::f64::consts::TAU * line.at;
-            by_place(data, own, weight, |t| {
-                [(omega * t).cos(), (omega * t).sin()]
-            })
+        (Some(line), jump) if jump.is_none_or(|t| t.squares <= line.squares) => {
+            by_place(data, own, weight, swing(line.at))
         }
+        (_, Some(t)) => by_place(data, own, weight, |s| [f64::from(u8::from(s > t.at))]),
         _ => Vec::new(),
     };
     out.line_hz = line.map(|l| l.at);
     out.jump_s = jump.map(|j| j.at);
     out
+}
+
+/// A cosine and a sine of this frequency.
+fn swing(f: f64) -> impl Fn(f64) -> [f64; 2] {
+    let omega = std::f64::consts::TAU * f;
+    move |t| [(omega * t).cos(), (omega * t).sin()]
 }
 
 /// Whether what was `found` is the stars', by the chance and the squares of the same `alone`, without what they share.
@@ -525,9 +524,7 @@ impl Own {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::star::harness::{STARS, seen};
-    use focal_plane::{AttitudeSeries, Camera, StarFrames};
-    use nalgebra::UnitQuaternion;
+    use crate::star::harness::at_rest;
     use rand_core::SeedableRng;
     use rand_distr::{Distribution, StandardNormal};
     use rand_xoshiro::Xoshiro256PlusPlus;
@@ -535,18 +532,7 @@ mod tests {
     /// What is found of six stars for 750 s that do this by themselves, of time and star, in units of their noise;
     /// `alike`: all the same, so that they turn the frame.
     fn found(alike: bool, does: impl Fn(f64, f64) -> f64) -> OwnSeries {
-        let camera = Camera::from_fov_deg([1024, 1024], [20.0, 20.0]).unwrap();
-        let mut frames = StarFrames::new();
-        let t_s: Vec<f64> = (0..1500).map(|k| 0.5 * f64::from(k)).collect();
-        for &t in &t_s {
-            frames.begin(t);
-            for (id, [x, y]) in (0..).zip(STARS) {
-                frames.push(id, i64::from(id), x, y);
-            }
-        }
-        let q = vec![UnitQuaternion::identity(); t_s.len()];
-        let reference = AttitudeSeries::new(t_s, q, None).unwrap();
-        let data = seen(&camera, &frames, Some(&reference), &STARS);
+        let data = at_rest((0..1500).map(|k| 0.5 * f64::from(k)).collect());
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(8);
         let rows = data.t_s.len();
         let noise = [(); 2]

@@ -78,9 +78,7 @@ pub(super) fn plainly(
     candidates: &[Arc<dyn Candidate>],
     moments: &StarMoments,
 ) -> Result<Fitted, CloseError> {
-    let all: Vec<usize> = (0..moments.width()).collect();
-    let grams = moments.white_of(&all);
-    fit_grams(white, &grams, folds, &borrowed(candidates))
+    fit_grams(white, &white.under(moments), folds, &borrowed(candidates))
 }
 
 /// Rounds of selection and polish on white evidence, while that looks as if it were all: see the module.

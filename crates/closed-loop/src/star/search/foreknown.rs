@@ -80,7 +80,7 @@ impl Forms {
             plain,
         } = Begun::on(white, folds, candidates)?;
         let mut forms = Self {
-            moments: there_is_room(white, folds).then_some(moments),
+            moments: (!white.is_long()).then_some(moments),
             candidates: candidates.clone(),
         };
         let found = search(white, folds, candidates, may, Some(plain))?;
@@ -100,7 +100,8 @@ impl Forms {
         let kept = self.moments.take();
         let moments = kept.unwrap_or_else(|| white.moments(folds, &all));
         let grams = level.under(&moments);
-        self.moments = there_is_room(white, folds).then_some(moments);
+        // of a long run there is no room for these beside those of other forms
+        self.moments = (!white.is_long()).then_some(moments);
         let fitted = fit_grams(level, &grams, folds, &all)?;
         drop(grams);
         search(level, folds, self.candidates.clone(), may, Some(fitted))
@@ -114,11 +115,6 @@ impl Forms {
         }
         self.candidates = forms;
     }
-}
-
-/// Whether there is room for the products of some forms beside those of others.
-fn there_is_room(white: &StarEvidence<'_>, folds: &Folds) -> bool {
-    white.coarser(folds).is_none()
 }
 
 /// The noise of what `found` leaves, or the declared model.

@@ -110,9 +110,7 @@ fn taken(sums: &DMatrix<f64>, columns: &[usize], first: usize) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::star::harness::{STARS, seen};
-    use focal_plane::{AttitudeSeries, Camera, StarFrames};
-    use nalgebra::UnitQuaternion;
+    use crate::star::harness::{STARS, at_rest};
     use rand_core::SeedableRng;
     use rand_distr::{Distribution, StandardNormal};
     use rand_xoshiro::Xoshiro256PlusPlus;
@@ -121,20 +119,9 @@ mod tests {
         [(0.1 * t).cos(), (0.1 * t).sin()]
     }
 
-    /// Rows of six stars at rest for 400 s.
-    fn at_rest() -> StarData {
-        let camera = Camera::from_fov_deg([1024, 1024], [20.0, 20.0]).unwrap();
-        let mut frames = StarFrames::new();
-        let t_s: Vec<f64> = (0..400).map(f64::from).collect();
-        for &t in &t_s {
-            frames.begin(t);
-            for (id, [x, y]) in (0..).zip(STARS) {
-                frames.push(id, i64::from(id), x, y);
-            }
-        }
-        let q = vec![UnitQuaternion::identity(); t_s.len()];
-        let reference = AttitudeSeries::new(t_s, q, None).unwrap();
-        seen(&camera, &frames, Some(&reference), &STARS)
+    /// Rows of six stars for 400 s.
+    fn rows() -> StarData {
+        at_rest((0..400).map(f64::from).collect())
     }
 
     /// White noise and what each row does beside it.
@@ -157,7 +144,7 @@ mod tests {
     /// A scale swings by half the noise at the edge, a column's own scale by as much.
     #[test]
     fn what_goes_with_the_place_is_told_by_it() {
-        let data = at_rest();
+        let data = rows();
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(3);
         let place = |r: usize| [0, 1].map(|axis| data.modelled[axis][r] / 512.0);
         let of = |does: &dyn Fn(usize) -> [f64; 2], rng: &mut _| -> Vec<&'static str> {
@@ -177,7 +164,7 @@ mod tests {
     /// of runs: of 400 in none but one in three, and in two once in fifteen.
     #[test]
     fn what_is_each_stars_own_is_not() {
-        let data = at_rest();
+        let data = rows();
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(4);
         let told = (0..400)
             .filter(|_| {
