@@ -17,7 +17,7 @@ pub(crate) struct Arguments {
     /// Print the machine-readable result on stdout, and nothing else there
     #[arg(long, global = true)]
     pub(crate) json: bool,
-    /// No progress and no summary; errors are still told
+    /// No progress and no summary; errors and warnings are still told
     #[arg(long, global = true)]
     pub(crate) quiet: bool,
     /// Threads to compute with; the numbers do not depend on it [default: all cores]

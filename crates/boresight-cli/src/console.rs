@@ -63,6 +63,12 @@ impl Console {
         }
     }
 
+    /// What a user should know and may not have meant.
+    #[expect(clippy::print_stderr, reason = "warnings go to stderr, here alone")]
+    pub(crate) fn warn(&self, what: &str) {
+        self.bar.suspend(|| eprintln!("warning: {what}"));
+    }
+
     /// What went wrong, with its causes.
     #[expect(clippy::print_stderr, reason = "errors go to stderr, here alone")]
     pub(crate) fn error(&self, error: &anyhow::Error) {

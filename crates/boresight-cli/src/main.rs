@@ -9,6 +9,7 @@ mod arguments;
 mod commands;
 mod console;
 mod example;
+mod inputs;
 mod targets;
 
 use std::process::ExitCode;

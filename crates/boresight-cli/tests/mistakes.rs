@@ -181,6 +181,79 @@ fn an_option_that_does_nothing_is_refused() -> Done {
     Ok(())
 }
 
+/// The example's bundle, but its catalogue, in a folder where other files lie.
+fn bundle_beside(dir: &Path, others: &[&str]) -> Result<PathBuf, std::io::Error> {
+    let bundle = dir.join("bundle");
+    fs::create_dir(&bundle)?;
+    for entry in fs::read_dir(example())? {
+        let entry = entry?;
+        if entry.file_name() != "catalog.csv.gz" {
+            fs::copy(entry.path(), bundle.join(entry.file_name()))?;
+        }
+    }
+    for name in others {
+        fs::write(bundle.join(name), "")?;
+    }
+    Ok(bundle)
+}
+
+/// What a command that succeeds says on stdout and on stderr.
+fn both(command: &mut Command) -> Result<[String; 2], Box<dyn std::error::Error>> {
+    let done = command.output()?;
+    let said = [done.stdout, done.stderr].map(String::from_utf8);
+    let [out, warned] = said;
+    let (out, warned) = (out?, warned?);
+    assert!(done.status.success(), "{warned}");
+    Ok([out, warned])
+}
+
+#[test]
+fn tables_of_other_names_are_told() -> Done {
+    let dir = tempfile::tempdir()?;
+    let (model, _) = file(dir.path(), "model.toml", MODEL)?;
+    let others = ["Rates.csv", "catalogue.csv", "README", "truth.json"];
+    let bundle = bundle_beside(dir.path(), &others)?;
+    let read = "Tables    attitude.csv.gz, stars.csv.gz, reference.csv.gz, housekeeping.csv.gz\n";
+    for (name, models) in [
+        ("assess", None),
+        ("fit", None),
+        ("compare", Some(&model)),
+        ("close", Some(&model)),
+    ] {
+        let mut command = boresight();
+        command.arg(name).args(models).arg(&bundle);
+        let [out, warned] = both(&mut command)?;
+        has(&out, &[read]);
+        let shown = bundle.display();
+        let start = format!("warning: {shown}: not read, ");
+        has(&warned, &[&start, "tables: Rates.csv, catalogue.csv; "]);
+        assert_eq!(warned.trim_end().lines().count(), 1, "{warned}");
+    }
+    // machines have their result alone on stdout
+    let mut fit = boresight();
+    let [out, warned] = both(fit.arg("fit").arg(&bundle).arg("--json"))?;
+    assert!(out.starts_with('{') && !out.contains("Rates"), "{out}");
+    has(&warned, &["Rates.csv"]);
+    Ok(())
+}
+
+#[test]
+fn magnitude_noise_without_magnitudes_is_told() -> Done {
+    let dir = tempfile::tempdir()?;
+    let noise = "[[effect]]\nid = \"magnitude_noise\"\nslope = 1.0\n";
+    let (model, _) = file(dir.path(), "model.toml", &format!("{MODEL}{noise}"))?;
+    let bundle = bundle_beside(dir.path(), &[])?;
+    for (bundle, warnings) in [(&bundle, 1), (&example(), 0)] {
+        for name in ["close", "compare"] {
+            let mut command = boresight();
+            let [_, warned] = both(command.arg(name).arg(&model).arg(bundle))?;
+            let not_applied = "warning: the declared magnitude_noise is not applied: ";
+            assert_eq!(warned.matches(not_applied).count(), warnings, "{warned}");
+        }
+    }
+    Ok(())
+}
+
 #[test]
 fn usage_is_told_in_words() -> Done {
     let help = boresight().arg("--help").output()?.stdout;

@@ -3,6 +3,7 @@
 //! Source: telemetry bundle format (docs/formats/bundle.md).
 
 mod convert;
+mod names;
 mod owner;
 mod read;
 mod stream;
@@ -17,6 +18,7 @@ use crate::{
     ReferenceTable, TelemetryError, WindowTable,
 };
 
+pub use names::TableFiles;
 pub use owner::{bundle_files, foreign_file, made_here};
 pub use stream::BundleWriter;
 

@@ -22,7 +22,9 @@ mod table;
 mod tables;
 mod time;
 
-pub use bundle::{Bundle, BundleWriter, TableFormat, bundle_files, foreign_file, made_here};
+pub use bundle::{
+    Bundle, BundleWriter, TableFiles, TableFormat, bundle_files, foreign_file, made_here,
+};
 pub use error::{CellError, Place, TelemetryError, TomlError};
 pub use extra::{ExtraCells, ExtraColumn, ExtraColumns, TextCells};
 pub use files::{Files, Folder, MemoryFiles, Source};

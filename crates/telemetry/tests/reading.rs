@@ -7,11 +7,58 @@ use focal_plane::{AttitudeSource, Camera, Pixel};
 use nalgebra::Vector3;
 use proptest::collection::vec;
 use proptest::prelude::*;
-use telemetry::{Bundle, ExtraCells, Housekeeping, MemoryFiles, TableFormat, TimeScale};
+use telemetry::{
+    Bundle, ExtraCells, Housekeeping, MemoryFiles, TableFiles, TableFormat, TimeScale,
+};
 
 /// Bundles may hold NaN (missing values), which equal nothing: compare their text.
 fn shown(bundle: &Bundle) -> String {
     format!("{bundle:?}")
+}
+
+/// What a name says: a table, what may have been meant as one, or neither.
+#[test]
+fn files_that_only_look_like_tables_are_told() {
+    let mut files = fixture("complete");
+    let good = TableFiles::of(&files).unwrap();
+    assert_eq!((good.read.len(), good.warning()), (7, None));
+    files.remove("reference.csv");
+    let meant = [
+        "Stars.csv",
+        "housekeeping.csv.zip",
+        "night.PARQUET",
+        "rates.txt",
+        "reference.CSV",
+        "references.csv.gz",
+    ];
+    let others = [
+        "README.md",
+        "model.toml",
+        "truth.json",
+        "report.json",
+        "residuals_stars.parquet",
+        "dark_map.csv",
+        "._stars.csv",
+    ];
+    for name in meant.into_iter().chain(others) {
+        files.insert(name, Vec::new());
+    }
+    let tables = TableFiles::of(&files).unwrap();
+    assert_eq!(tables.unread, meant);
+    let read = [
+        "attitude.csv",
+        "stars.csv",
+        "images.csv",
+        "rates.csv",
+        "catalog.csv",
+        "housekeeping.csv",
+    ];
+    assert_eq!(tables.read, read);
+    let warning = tables.warning().unwrap();
+    for part in ["reference.CSV, references.csv.gz", "catalog, housekeeping"] {
+        assert!(warning.contains(part), "{warning}");
+    }
+    assert!(Bundle::read_from(&files).unwrap().reference.is_none());
 }
 
 #[test]

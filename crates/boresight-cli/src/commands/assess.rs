@@ -5,11 +5,12 @@ use std::io::Write as _;
 use anyhow::Context as _;
 use boresight::assess::{AssessError, Assessment, Options, assess};
 use boresight::report::{assess_figures, assess_summary};
+use boresight::telemetry::Output;
 use boresight::telemetry::report::AssessMethod;
-use boresight::telemetry::{Bundle, Output};
 
 use crate::arguments::{Assess, Method};
 use crate::console::Console;
+use crate::inputs;
 use crate::targets;
 
 /// All files that the command may write.
@@ -26,7 +27,7 @@ pub(crate) fn run(options: &Assess, console: &Console) -> anyhow::Result<()> {
         targets::refuse_inputs(dir, &RESULTS, &targets::of_bundle(&options.bundle))?;
     }
     console.progress("reading");
-    let bundle = Bundle::read(&options.bundle)?;
+    let (bundle, tables) = inputs::bundle(&options.bundle, console)?;
     let settings = Options {
         method: options.method.map(|method| match method {
             Method::RigidRotator => AssessMethod::RigidRotator,
@@ -52,7 +53,7 @@ pub(crate) fn run(options: &Assess, console: &Console) -> anyhow::Result<()> {
         write(&found, &text, &json, &output)?;
         output.commit()?;
     }
-    console.say(&format!("Input     {name}\n{text}"));
+    console.say(&format!("Input     {name}\n{tables}{text}"));
     console.machine(&json);
     Ok(())
 }

@@ -14,6 +14,7 @@ use boresight::telemetry::{Bundle, Model, Output};
 use crate::arguments::Close;
 use crate::console::Console;
 use crate::example;
+use crate::inputs;
 use crate::targets;
 
 /// All files that the command may write.
@@ -37,17 +38,19 @@ pub(crate) fn run(options: &Close, console: &Console) -> anyhow::Result<()> {
         targets::refuse_inputs(dir, &RESULTS, &inputs)?;
     }
     console.progress("reading");
-    let (model, bundle, title) = match (&options.model, &options.bundle) {
+    let (model, (bundle, tables), title) = match (&options.model, &options.bundle) {
         (Some(model), Some(bundle)) => {
             let title = format!("{} against {}", bundle.display(), model.display());
-            (Model::read(model)?, Bundle::read(bundle)?, title)
+            (Model::read(model)?, inputs::bundle(bundle, console)?, title)
         }
         _ => {
             let title =
                 "the example inside the binary: simulated, with an effect that its model lacks";
-            (example::model()?, example::bundle()?, title.to_owned())
+            let bundle = (example::bundle()?, String::new());
+            (example::model()?, bundle, title.to_owned())
         }
     };
+    inputs::warn_of_magnitudes(&[&model], &bundle, console);
     let progress = |what: &str| console.progress(what);
     let mut closed = close_asking(&model, &bundle, &questions, &progress)?;
     let compared = (options.out.is_some() || console.json())
@@ -87,7 +90,7 @@ pub(crate) fn run(options: &Close, console: &Console) -> anyhow::Result<()> {
             output.commit()?;
         }
     }
-    console.say(&format!("Input     {title}\n{text}"));
+    console.say(&format!("Input     {title}\n{tables}{text}"));
     if console.json() {
         console
             .machine(&serde_json::to_string_pretty(&closed.report).context("the report as JSON")?);

@@ -5,11 +5,12 @@ use std::io::Write as _;
 use anyhow::Context as _;
 use boresight::comparison::{CompareSettings, compare};
 use boresight::report::{compare_figures, compare_summary, compare_tables};
-use boresight::telemetry::{Bundle, Model, Output};
+use boresight::telemetry::{Model, Output};
 
 use crate::arguments::Compare;
 use crate::commands::close::interrupted;
 use crate::console::Console;
+use crate::inputs;
 use crate::targets;
 
 /// All files that the command may write.
@@ -40,7 +41,9 @@ pub(crate) fn run(options: &Compare, console: &Console) -> anyhow::Result<()> {
     for path in &options.others {
         others.push(Model::read(path)?);
     }
-    let bundle = Bundle::read(&options.bundle)?;
+    let (bundle, tables) = inputs::bundle(&options.bundle, console)?;
+    let models: Vec<&Model> = others.iter().chain([&model]).collect();
+    inputs::warn_of_magnitudes(&models, &bundle, console);
     let settings = CompareSettings {
         draws: options.draws,
         seed: options.seed,
@@ -74,7 +77,7 @@ pub(crate) fn run(options: &Compare, console: &Console) -> anyhow::Result<()> {
         output.commit()?;
     }
     console.say(&format!(
-        "Input     {} against {}\n{text}",
+        "Input     {} against {}\n{tables}{text}",
         options.bundle.display(),
         options.model.display()
     ));

@@ -5,10 +5,11 @@ use std::io::Write as _;
 use anyhow::Context as _;
 use boresight::comparison::{ComparisonError, FitSettings, fit};
 use boresight::report::fit_summary;
-use boresight::telemetry::{Bundle, write_file};
+use boresight::telemetry::write_file;
 
 use crate::arguments::Fit;
 use crate::console::Console;
+use crate::inputs;
 use crate::targets;
 
 pub(crate) fn run(options: &Fit, console: &Console) -> anyhow::Result<()> {
@@ -16,7 +17,7 @@ pub(crate) fn run(options: &Fit, console: &Console) -> anyhow::Result<()> {
         targets::refuse_input(out, &targets::of_bundle(&options.bundle))?;
     }
     console.progress("reading");
-    let bundle = Bundle::read(&options.bundle)?;
+    let (bundle, tables) = inputs::bundle(&options.bundle, console)?;
     console.progress("fitting");
     let name = options.bundle.display().to_string();
     let settings = FitSettings {
@@ -38,7 +39,7 @@ pub(crate) fn run(options: &Fit, console: &Console) -> anyhow::Result<()> {
         write_file(out, |to| to.write_all(text.as_bytes()))?;
     }
     console.say(&format!(
-        "Input     {name}\n{}",
+        "Input     {name}\n{tables}{}",
         fit_summary(&fitted.report)
     ));
     if console.json() {

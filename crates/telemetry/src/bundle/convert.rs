@@ -306,7 +306,11 @@ fn on_detector(
     let outside = |&&x: &&f64| x.abs() > most;
     if let Some(row) = cells.iter().position(|x| outside(&x)) {
         let half = camera.map_or(f64::INFINITY, |camera| camera.half_size_px()[axis]);
-        let expected = format!("a place on the detector, within {half} px of its centre");
+        let most = (100.0 * most).round() / 100.0;
+        let expected = format!(
+            "a place on the detector or near it, within {most} px of its centre ({half} px to the edge, and {} % of the side beyond)",
+            100.0 * MARGIN
+        );
         return Err(raw.error(row, &[name], expected, cells[row].to_string()));
     }
     Ok(cells)

@@ -178,7 +178,7 @@ impl<'a> Reader<'a> {
         Err(self.config.error_at(
             "sample_rate_hz",
             format!(
-                "`sample_rate_hz`: expected {:.9} within 1 %, from the median step of {step_s:.9} s in table {table}, column t_s; found {rate_hz}",
+                "`sample_rate_hz`: expected {:.9} within 1 %, from the median step of {step_s:.9} s in table {table}, column t_s; found {rate_hz}; the key may be left out, as where lost frames move that step",
                 1.0 / step_s
             ),
         ))

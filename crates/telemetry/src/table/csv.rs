@@ -15,6 +15,9 @@ use crate::{Place, Source, TelemetryError};
 /// What messages call the compressed file.
 const GZIP: &str = "gzip stream";
 
+/// Its first bytes.
+const GZIP_MAGIC: &[u8] = b"\x1f\x8b";
+
 /// One read of the file system.
 const BUFFER: usize = 1 << 18;
 
@@ -30,7 +33,9 @@ pub(crate) fn read(
         Source::Memory(bytes) => Box::new(Cursor::new(bytes)),
     };
     let plain: Box<dyn Read> = if gzip {
-        Box::new(MultiGzDecoder::new(BufReader::with_capacity(BUFFER, raw)))
+        let mut packed = BufReader::with_capacity(BUFFER, raw);
+        refuse_plain(file, &mut packed)?;
+        Box::new(MultiGzDecoder::new(packed))
     } else {
         raw
     };
@@ -45,6 +50,20 @@ pub(crate) fn read(
     rows(&mut lines, setting).map_err(|error| match error {
         TelemetryError::Broken { what: GZIP, .. } => error,
         _ => lines.damage().unwrap_or(error),
+    })
+}
+
+/// A file that does not begin as gzip does is none, rather than a damaged one.
+fn refuse_plain(file: &str, packed: &mut impl BufRead) -> Result<(), TelemetryError> {
+    let head = packed.fill_buf();
+    let head = head.map_err(|error| TelemetryError::io(file, "read", &error))?;
+    // one that ends before is told as such
+    if head.iter().zip(GZIP_MAGIC).all(|(a, b)| a == b) {
+        return Ok(());
+    }
+    Err(TelemetryError::InFile {
+        file: file.into(),
+        reason: "expected a gzip file, as its name ends in .gz, found none: it does not begin as gzip does (plain text belongs under a name that ends in .csv)".into(),
     })
 }
 
@@ -160,7 +179,7 @@ impl Lines<'_> {
             .strip_prefix(b"\xef\xbb\xbf")
             .unwrap_or(&self.text);
         if let Err(error) = std::str::from_utf8(text) {
-            let reason = if text.starts_with(b"\x1f\x8b") {
+            let reason = if text.starts_with(GZIP_MAGIC) {
                 "gzip, which belongs under a name that ends in .csv.gz".into()
             } else {
                 error.to_string()

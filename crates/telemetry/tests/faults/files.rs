@@ -56,7 +56,9 @@ fn gzip_damaged_or_misnamed() {
     check(&files, &["b/stars.csv,", "gzip", ".csv.gz"]);
     files.remove("stars.csv");
     files.insert("stars.csv.gz", stars.into_bytes());
-    check(&files, &["b/stars.csv.gz", "gzip"]);
+    let none = "expected a gzip file, as its name ends in .gz, found none";
+    check(&files, &["b/stars.csv.gz: ", none]);
+    assert!(!refusal(&files).contains("line"), "no line of it was read");
 }
 
 /// Bytes that changed on the way make a row that cannot be read, long before the checksum that tells it.

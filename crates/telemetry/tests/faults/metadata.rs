@@ -206,6 +206,23 @@ fn values_out_of_range() {
     }
 }
 
+/// 512 px to the edge, and a twentieth of 1024 px more.
+#[test]
+fn stars_beyond_the_edge() {
+    for near in ["563.1", "-563.1"] {
+        Bundle::read_from(&cell_changed("stars.csv", 3, "x_px", near)).unwrap();
+    }
+    for beyond in ["563.3", "-900"] {
+        let files = cell_changed("stars.csv", 3, "x_px", beyond);
+        let allowed =
+            "within 563.2 px of its centre (512 px to the edge, and 5 % of the side beyond)";
+        check(
+            &files,
+            &["b/stars.csv, line 3, column x_px", allowed, beyond],
+        );
+    }
+}
+
 #[test]
 fn negative_magnitude_is_fine() {
     let files = cell_changed("catalog.csv", 3, "mag", "-1.46");

@@ -380,6 +380,7 @@ fn sample_rate_off() {
             "0.5",
             "2.03",
             "1 %",
+            "the key may be left out",
         ],
     );
     for near in ["1.985", "2.015"] {
