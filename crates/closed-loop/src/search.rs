@@ -562,7 +562,7 @@ pub(crate) fn polish(
         first += columns.len();
         let before = Arc::clone(&candidates[g]);
         let whole = columns.len() == before.coefficients().len();
-        let better = before.refined(&values).filter(|_| whole);
+        let better = whole.then(|| before.refined(&values)).flatten();
         let scanned = before.nonlinear().len();
         if better.is_none() && scanned == 0 {
             continue;
