@@ -13,7 +13,9 @@
 //!
 //! against the step `q_{k+1} - q_k`: for white noise of variance s^2 they have
 //! variances (1 + 34/36) s^2 and 2 s^2, so nearly alike; for a resolved motion the
-//! error is of fourth order in the step. Samples on both sides of a hole predict nothing.
+//! error is of fourth order in the step (where steps differ: the cubic through the four as they lie). Samples on both
+//! sides of a hole predict nothing. What is a hole, the motion says: a step that is longer than those over which
+//! the series, thinned, predicts itself as well.
 //! Many samples resolve together what single ones do not: a motion whose steps are half the noise is one all the
 //! same, and the path is a polynomial nearest to many of them ([`stencil`]). So means of 2, 4 and 8
 //! samples are tried where single ones fail. Of white noise they are as unpredictable as the samples, of a wander
@@ -38,53 +40,101 @@ use focal_plane::{
 use nalgebra::{UnitQuaternion, Vector3};
 
 use crate::gaps::longest_step;
+use spectra::robust::median_step;
 use stencil::Stencil;
 
 /// Largest ratio of prediction error to step at which the motion is resolved.
 const RESOLVED: f64 = 0.3;
 /// Samples whose means are tried where single ones resolve nothing.
 const AVERAGED: [usize; 3] = [2, 4, 8];
+/// Share of a step that is one: jitter is no shorter.
+const NEARLY: f64 = 0.9;
+/// Steps to which a series is thinned, the widest first: what they predict is no hole.
+const THINNED: [f64; 4] = [16.0, 8.0, 4.0, 2.0];
 
 /// Whether a series of attitudes tells how the tracker moved between them.
 fn resolved(t_s: &[f64], q: &[UnitQuaternion<f64>], arm: f64) -> bool {
-    predicts(t_s, q, arm, |_, next| *next)
+    predicts(t_s, q, arm, |_, [_, next]| *next)
 }
 
 /// Whether it tells how that motion changed: the same against second differences, of which a walk of variance
 /// s^2 a step has 2 s^2 and the error 20/36 s^2. What such a walk seems to accelerate by goes with itself, where
 /// the path is one through attitudes ([`Around::by_rates`]).
 pub(crate) fn accelerates(series: &AttitudeSeries, arm: f64) -> bool {
-    let change = |last: &Vector3<f64>, next: &Vector3<f64>| last + next;
+    let change = |[before, after]: [f64; 2], [last, next]: [&Vector3<f64>; 2]| {
+        2.0 * (last * after - next * before) / (after - before)
+    };
     predicts(series.t_s(), series.quaternions(), arm, change)
 }
 
-/// Whether samples are predicted by their neighbours within a share of `size`, of the turns to those before and
-/// after.
+/// Whether samples are predicted by their neighbours within a share of `size`, of the times to those before and
+/// after, and the turns.
 fn predicts(
     t_s: &[f64],
     q: &[UnitQuaternion<f64>],
     arm: f64,
-    size: impl Fn(&Vector3<f64>, &Vector3<f64>) -> Vector3<f64>,
+    size: impl Fn([f64; 2], [&Vector3<f64>; 2]) -> Vector3<f64>,
 ) -> bool {
+    const AROUND: [usize; 4] = [0, 1, 3, 4];
     let longest = longest_step(t_s);
     let (mut error, mut step, mut count) = (0.0, 0.0, 0_u32);
     for (t, w) in t_s.windows(5).zip(q.windows(5)) {
         if t.windows(2).any(|pair| pair[1] - pair[0] > longest) {
             continue;
         }
-        let [a, b, d, e]: [Vector3<f64>; 4] = [0, 1, 3, 4].map(|k| rotation_vector(&w[k], &w[2]));
-        let predicted = (4.0 * (b + d) - a - e) / 6.0;
+        let at = AROUND.map(|k| t[k] - t[2]);
+        let turns = AROUND.map(|k| rotation_vector(&w[k], &w[2]));
+        let weighed = cubic_at_zero(at).into_iter().zip(&turns);
+        let predicted: Vector3<f64> = weighed.map(|(weight, turn)| turn * weight).sum();
         let moves = Vector3::new(1.0, 1.0, arm);
         error += predicted.component_mul(&moves).norm_squared();
-        step += size(&b, &d).component_mul(&moves).norm_squared();
+        let size = size([at[1], at[2]], [&turns[1], &turns[2]]);
+        step += size.component_mul(&moves).norm_squared();
         count += 1;
     }
     count > 0 && error <= RESOLVED * RESOLVED * step
 }
 
+/// What values at four places weigh in the cubic through them, at 0: Lagrange's polynomials.
+fn cubic_at_zero(at: [f64; 4]) -> [f64; 4] {
+    std::array::from_fn(|i| {
+        let others = (0..4).filter(|&j| j != i);
+        others.map(|j| at[j] / (at[j] - at[i])).product()
+    })
+}
+
+/// The longest step of a series over which its samples predict each other, s: a longer one is a hole.
+fn reach_s(series: &AttitudeSeries, arm: f64) -> f64 {
+    let t_s = series.t_s();
+    let longest = longest_step(t_s);
+    let Some(step) = median_step(t_s).filter(|_| t_s.windows(2).any(|t| t[1] - t[0] > longest))
+    else {
+        return longest;
+    };
+    let bridged = THINNED.into_iter().find(|steps| {
+        let (t_s, q) = thinned(series, steps * step);
+        resolved(&t_s, &q, arm)
+    });
+    longest + bridged.map_or(0.0, |steps| (steps - 1.0) * step)
+}
+
+/// Samples of a series that lie at least about as far apart as this, s.
+fn thinned(series: &AttitudeSeries, apart_s: f64) -> (Vec<f64>, Vec<UnitQuaternion<f64>>) {
+    let mut last = f64::NEG_INFINITY;
+    let samples = series.t_s().iter().zip(series.quaternions());
+    let far = samples.filter(|(t, _)| {
+        let far = **t - last >= NEARLY * apart_s;
+        if far {
+            last = **t;
+        }
+        far
+    });
+    far.map(|(t, q)| (*t, *q)).unzip()
+}
+
 /// A series as a motion around each frame, as far as its samples resolve one.
 pub(crate) fn around(series: &AttitudeSeries, t_s: &[f64], arm: f64) -> Around {
-    let stencil = is_motion(series, arm).then(|| Stencil::of(series));
+    let stencil = is_motion(series, arm).then(|| Stencil::of(series, reach_s(series, arm)));
     Around::new(series, t_s, stencil.as_ref())
 }
 
@@ -114,7 +164,7 @@ pub(crate) fn turned_by(
 
 /// Whether it is not known how the tracker moved around each of the times, where it is around others.
 pub(crate) fn lost(series: &AttitudeSeries, t_s: &[f64], arm: f64) -> Vec<bool> {
-    let stencil = is_motion(series, arm).then_some(Stencil::PLAIN);
+    let stencil = is_motion(series, arm).then(|| Stencil::plain(reach_s(series, arm)));
     let around = Around::new(series, t_s, stencil.as_ref());
     (0..t_s.len()).map(|k| around.lost(k)).collect()
 }
@@ -205,6 +255,47 @@ mod tests {
         assert!(!resolved(path.t_s(), path.quaternions(), 1.0));
         assert!(is_motion(&path, 1.0));
         assert!(!is_motion(&noisy(0.0), 1.0));
+    }
+
+    /// 2 - 3 s + 0.4 s^3 at 0, from four places that are not evenly spaced; and the even ones' -1/6, 4/6.
+    #[test]
+    fn a_cubic_is_told_by_four_places() {
+        let cubic = |s: f64| 2.0 - 3.0 * s + 0.4 * s.powi(3);
+        let at = [-3.1, -0.9, 1.0, 4.5];
+        let told: f64 = cubic_at_zero(at)
+            .iter()
+            .zip(at)
+            .map(|(w, s)| w * cubic(s))
+            .sum();
+        assert!((told - 2.0).abs() < 1e-12);
+        let even = cubic_at_zero([-2.0, -1.0, 1.0, 2.0]);
+        for (weight, want) in even.iter().zip([-1.0, 4.0, 4.0, -1.0]) {
+            assert!((6.0 * weight - want).abs() < 1e-12);
+        }
+    }
+
+    /// A swing of a hundred steps, of which three in ten samples are missing: what is missing is told by the others,
+    /// and no frame is lost. Of a swing of five steps the samples beside a missing one tell nothing.
+    #[test]
+    fn what_the_motion_bridges_is_no_hole() {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(7);
+        let mut share_lost = |period: f64| {
+            let kept = |_: &f64| {
+                rand_distr::Uniform::new(0.0, 1.0).is_ok_and(|u| u.sample(&mut rng) > 0.3)
+            };
+            let t_s: Vec<f64> = (0..900).map(f64::from).filter(kept).collect();
+            let swing = |t: &f64| Vector3::x() * 1e-3 * (std::f64::consts::TAU * t / period).sin();
+            let q = t_s
+                .iter()
+                .map(|t| rotation_from_vector(&swing(t)))
+                .collect();
+            let series = AttitudeSeries::new(t_s.clone(), q, None).unwrap();
+            let lost = lost(&series, &t_s, 1.0);
+            lost.iter().filter(|lost| **lost).count() as f64 / t_s.len() as f64
+        };
+        assert!(share_lost(100.0) < 1e-12);
+        let fast = share_lost(6.5);
+        assert!((0.2..0.6).contains(&fast), "{fast}");
     }
 
     /// Roll with the noise of twenty steps, in a field of a few degrees: a twentieth of a step is what it

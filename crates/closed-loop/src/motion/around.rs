@@ -20,6 +20,9 @@
 //! is off by (2 pi f h)^2: 12 % there, 1 % at 60 samples a period. Zero would be off by all
 //! of it, and a frame where an effect seems not to act tells it from a constant.
 //!
+//! Samples much nearer to each other than the frames tell the path between these, where no frame's polynomial reaches;
+//! what they are off by there is not what the frame's own is.
+//!
 //! Where the samples do not resolve a motion, or a frame has too few neighbours, the
 //! attitude of the frame is all that is known: at its own time, and nowhere else.
 //!
@@ -43,6 +46,8 @@ const MOST: usize = 4 * SIDE_WITH_RATES;
 const FEWEST: usize = 3;
 /// Samples nearer than this many steps hold the frame's own error.
 const NEAR: f64 = 0.9;
+/// Frames lie so many samples apart, or more, where what is between them is out of their reach.
+const FAR: f64 = 2.0;
 /// No frame.
 const NOWHERE: usize = usize::MAX;
 
@@ -59,6 +64,10 @@ pub(crate) struct Around {
     by_rates: bool,
     /// Whether they come from samples, with the error of these.
     of_samples: bool,
+    /// The samples themselves, where there are many from frame to frame.
+    between: Option<AttitudeSeries>,
+    /// How the camera that sees all this is turned against theirs.
+    turn: UnitQuaternion<f64>,
 }
 
 #[derive(Clone, Debug)]
@@ -92,17 +101,25 @@ impl Around {
             resolved,
             by_rates: stencil.is_some_and(|s| s.by_rates.is_some()),
             of_samples: stencil.is_some_and(|s| s.by_rates.is_none()),
+            between: None,
+            turn: UnitQuaternion::identity(),
         };
         let paths = around.pieces.iter().flatten().filter(|p| p.count > 0);
         if resolved && 2 * paths.count() < t_s.len() {
             around.resolved = false;
             around.pieces.iter_mut().flatten().for_each(Piece::forget);
         }
+        let far = median_step(t_s).is_some_and(|frame| frame > FAR * step);
+        if around.resolved && far {
+            let longest = series.max_gap_s().min(GAP_STEPS * step);
+            around.between = Some(series.clone().with_max_gap_s(longest));
+        }
         around
     }
 
     /// The same as a camera sees it that is turned against it.
     pub(crate) fn turned(mut self, turn: &UnitQuaternion<f64>) -> Self {
+        self.turn = turn * self.turn;
         for piece in self.pieces.iter_mut().flatten() {
             piece.q = turn * piece.q;
             piece.back = turn * piece.back * turn.inverse();
@@ -191,7 +208,13 @@ impl Piece {
     fn beside(mut self, series: &AttitudeSeries, step: f64, t_s: f64, stencil: &Stencil) -> Self {
         let times = series.t_s();
         let samples = series.quaternions();
-        let reach = series.max_gap_s().min(GAP_STEPS * step);
+        let reach = series.max_gap_s().min(stencil.reach_s);
+        // between samples a path is known as well as they are near
+        let next = times.partition_point(|&t| t < t_s);
+        let between = next > 0 && times.get(next).is_some_and(|&t| t > t_s);
+        if between && times[next] - times[next - 1] > GAP_STEPS * step {
+            return self;
+        }
         let before = times.partition_point(|&t| t <= t_s - NEAR * step);
         let after = times.partition_point(|&t| t < t_s + NEAR * step);
         let rates = series.given_rates_rad_s();
@@ -301,7 +324,9 @@ impl AttitudeSource for Around {
     }
 
     fn attitude_near(&self, t_s: f64, hint: &mut usize) -> Option<UnitQuaternion<f64>> {
-        let (piece, s) = self.piece(t_s, hint)?;
+        let Some((piece, s)) = self.piece(t_s, hint) else {
+            return Some(self.turn * self.between.as_ref()?.attitude(t_s)?);
+        };
         Some(rotation_from_vector(&piece.value(s)) * piece.q)
     }
 
@@ -344,6 +369,7 @@ impl AttitudeSource for Around {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::gaps::longest_step;
     use rand_core::SeedableRng;
     use rand_distr::{Distribution, StandardNormal};
     use rand_xoshiro::Xoshiro256PlusPlus;
@@ -351,7 +377,11 @@ mod tests {
     const STEP: f64 = 0.5;
 
     fn of(motion: &AttitudeSeries, t_s: &[f64]) -> Around {
-        Around::new(motion, t_s, Some(&Stencil::of(motion)))
+        Around::new(
+            motion,
+            t_s,
+            Some(&Stencil::of(motion, longest_step(motion.t_s()))),
+        )
     }
 
     fn series(path: impl Fn(f64) -> Vector3<f64>, n: usize) -> AttitudeSeries {
@@ -388,6 +418,28 @@ mod tests {
                 "{rate} {given}"
             );
         }
+    }
+
+    /// Frames forty samples apart: between them the samples tell the path, for a camera that is turned against theirs,
+    /// too; not across a hole of theirs. 2 pi f h = 0.03: what cubics miss is far below 1e-9.
+    #[test]
+    fn samples_tell_the_path_between_frames() {
+        let path = |t: f64| Vector3::x() * 1e-3 * (std::f64::consts::TAU * 0.01 * t).sin();
+        let whole = series(path, 800);
+        let kept = |t: &f64| !(100.0..130.0).contains(t);
+        let t_s: Vec<f64> = whole.t_s().iter().copied().filter(kept).collect();
+        let q = t_s.iter().map(|&t| rotation_from_vector(&path(t)));
+        let motion = AttitudeSeries::new(t_s.clone(), q.collect(), None).unwrap();
+        let frames: Vec<f64> = (1..20).map(|k| 20.0 * f64::from(k)).collect();
+        let turn = rotation_from_vector(&Vector3::new(0.1, -0.2, 0.3));
+        let around = of(&motion, &frames).turned(&turn);
+        for d in [0.3, 1.7, -8.0] {
+            let got = around.turn(300.0, d, &mut 0).unwrap();
+            let [later, now] = [300.0 + d, 300.0].map(|t| turn * rotation_from_vector(&path(t)));
+            assert!(got.angle_to(&(later * now.inverse())) < 1e-9, "{d}");
+        }
+        assert!(around.turn(80.0, 19.0, &mut 0).is_some());
+        assert!(around.turn(80.0, 25.0, &mut 0).is_none());
     }
 
     /// With rates, which rotate on the way (0.1 rad/s): as good, from fewer neighbours.

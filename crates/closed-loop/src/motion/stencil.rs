@@ -38,17 +38,23 @@ pub(crate) struct Stencil {
     pub(crate) most: usize,
     /// Where the path comes from measured rates alone, their bias, rad/s.
     pub(crate) by_rates: Option<Vector3<f64>>,
+    /// The longest step that is crossed, s.
+    pub(crate) reach_s: f64,
 }
 
 impl Stencil {
     /// The nearest alone.
-    pub(crate) const PLAIN: Self = Self {
-        variance: Vector3::new(0.0, 0.0, 0.0),
-        most: SIDE,
-        by_rates: None,
-    };
+    pub(crate) fn plain(reach_s: f64) -> Self {
+        Self {
+            variance: Vector3::zeros(),
+            most: SIDE,
+            by_rates: None,
+            reach_s,
+        }
+    }
 
-    pub(crate) fn of(series: &AttitudeSeries) -> Self {
+    /// Of a series whose steps are crossed up to `reach_s`.
+    pub(crate) fn of(series: &AttitudeSeries, reach_s: f64) -> Self {
         let mut most = SIDE;
         let first = of_samples(series, SIDE);
         let mut last = first;
@@ -67,6 +73,7 @@ impl Stencil {
             variance: first / predicted(SIDE),
             most,
             by_rates: rates::that_tell_more(series, &first),
+            reach_s,
         }
     }
 
@@ -119,6 +126,7 @@ mod tests {
             variance: Vector3::repeat(variance),
             most: MOST,
             by_rates: None,
+            reach_s: f64::INFINITY,
         }
     }
 
@@ -141,7 +149,7 @@ mod tests {
                 .iter()
                 .map(|w| rotation_from_vector(&(w + normal(&mut rng) * white)))
                 .collect();
-            Stencil::of(&AttitudeSeries::new(t_s.clone(), q, None).unwrap()).most
+            Stencil::of(&AttitudeSeries::new(t_s.clone(), q, None).unwrap(), 0.2).most
         };
         assert_eq!(most(0.0), SIDE);
         assert!(most(1e-5) >= 12);
@@ -162,7 +170,7 @@ mod tests {
             .map(|&t| rotation_from_vector(&(path(t) + normal(&mut rng).component_mul(&sigma))))
             .collect();
         let series = AttitudeSeries::new(t_s, q, None).unwrap();
-        let ratio = Stencil::of(&series)
+        let ratio = Stencil::of(&series, 0.95)
             .variance
             .component_div(&sigma.component_mul(&sigma));
         assert!(ratio.iter().all(|r| (r - 1.0).abs() < 0.2), "{ratio}");

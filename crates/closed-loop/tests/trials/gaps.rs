@@ -1,6 +1,8 @@
-//! References with holes, or with noise larger than the motion: what they still tell is used.
+//! References and frames with holes, samples that are far apart or near, noise larger than the motion: what there is
+//! is used.
 
 use closed_loop::Closed;
+use focal_plane::StarFrames;
 use telemetry::Bundle;
 
 use crate::kit::{Case, Path, closed};
@@ -80,4 +82,62 @@ fn what_needs_the_attitude_alone_does_without_the_motion() {
         .iter()
         .find(|c| c.id == "time_tag_offset");
     assert!(tag.is_some_and(|t| !t.observable), "{tag:?}");
+}
+
+/// Those of the frames for whose number this holds.
+fn some_frames(all: &StarFrames, kept: impl Fn(usize) -> bool) -> StarFrames {
+    let mut frames = StarFrames::new();
+    for k in (0..all.frames()).filter(|&k| kept(k)) {
+        frames.begin(all.t_s[k]);
+        for row in all.rows_of(k) {
+            let (slot, star) = (all.slot[row], all.star_id[row]);
+            frames.push(slot, star, all.x_px[row], all.y_px[row]);
+        }
+    }
+    frames
+}
+
+/// Three frames in ten are missing, or from the middle on nine in ten, and there is no reference: swings of 59 and 81 s
+/// go on across what is missing, no row is set aside for it, and a rolling shutter is
+/// found as with all.
+#[test]
+fn missing_frames_take_no_others_along() {
+    // of three in ten, without a pattern
+    let random = |k: usize| (k * 7919 + k * k * 31) % 10 >= 3;
+    let slower = |k: usize| k < 420 || k.is_multiple_of(10);
+    let kept: [&dyn Fn(usize) -> bool; 2] = [&random, &slower];
+    for kept in kept {
+        let mut case = Case::new(Path::Nods, 5).reference("none");
+        case = case.with("rolling_shutter", "line_time_s = 3e-4");
+        let (model, mut bundle) = case.make();
+        let frames = some_frames(bundle.stars.as_ref().expect("stars"), kept);
+        let rows = frames.star_id.len();
+        bundle.stars = Some(frames);
+        let closed = closed(&model, &bundle).expect("the loop closes");
+        let told = &closed.report.rows;
+        // the last frames have neighbours on one side alone
+        assert!(told.outside_reference <= rows / 100, "{told:?} of {rows}");
+        assert_eq!(names(&closed), ["rolling_shutter"]);
+        let line = &closed.report.effects[0].parameters["line_time_s"];
+        let z = (line.value - 3e-4) / line.sigma.unwrap_or(f64::NAN);
+        assert!(z.abs() < 4.0, "{line:?}");
+    }
+}
+
+/// Frames every four seconds beside a reference at 10 Hz: forty samples from one to the next.
+#[test]
+fn frames_far_apart_know_their_motion() {
+    let case = Case::new(Path::Nods, 6)
+        .reference("rate_hz = 10.0\nrates = false")
+        .with("time_tag_offset", "offset_s = 0.05");
+    let (model, mut bundle) = case.make();
+    let frames = some_frames(bundle.stars.as_ref().expect("stars"), |k| {
+        k.is_multiple_of(8)
+    });
+    bundle.stars = Some(frames);
+    let closed = closed(&model, &bundle).expect("the loop closes");
+    assert_eq!(names(&closed), ["time_tag_offset"]);
+    let offset = &closed.report.effects[0].parameters["offset_s"];
+    let z = (offset.value - 0.05) / offset.sigma.unwrap_or(f64::NAN);
+    assert!(z.abs() < 4.0, "{offset:?}");
 }
