@@ -192,11 +192,10 @@ pub(crate) fn finish(
     }
     let mut model = f.situation.model.clone();
     let declared = model.effects.iter().any(|e| e.id == REFERENCE_ERROR);
-    let wander = f
-        .wander
-        .filter(|_| !declared)
-        .and_then(reference_wander::effect);
-    if let Some((effect, entry)) = wander {
+    let wander = f.wander.filter(|_| !declared);
+    let reference = f.situation.reference.as_ref();
+    let step_s = reference.and_then(|r| median_step(r.t_s())).unwrap_or(0.0);
+    if let Some((effect, entry)) = wander.and_then(|w| reference_wander::effect(w, step_s)) {
         effects.push(effect);
         entries.push(entry);
     }
@@ -296,11 +295,12 @@ pub(crate) fn finish(
     let squares = excess(f, last);
     noise.need(f.situation, f.data, squares)?;
     noise.tell(&mut considered);
-    if let Some(wander) = reference_wander::consider(f.data, &plain.axes, squares) {
+    if let Some(mut entry) = reference_wander::consider(f.data, &plain.axes, squares) {
+        entry.against = wander.and_then(|w| reference_wander::against(w, step_s));
         considered
             .iter_mut()
-            .filter(|c| c.id == wander.id)
-            .for_each(|c| c.clone_from(&wander));
+            .filter(|c| c.id == entry.id)
+            .for_each(|c| c.clone_from(&entry));
     }
     if let Some(level) = f.image {
         for (id, step) in [

@@ -7,6 +7,16 @@
 //!
 //! It lowers no residual: it says what part of the residual is not the tracker's.
 //!
+//! White noise of the samples of a slow reference is carried between them, and so lasts for about a step h: of values
+//! interpolated by straight lines
+//!
+//! ```text
+//! rho(h/2) = 23/32    rho(h) = 1/4    as of exp(-t/tau) with tau = 1.5 h and 0.7 h
+//! ```
+//!
+//! A slow error whose time may be as short as a step (the lower end of its interval) is noise like any other white
+//! noise, and is not named.
+//!
 //! Source: Akaike 1974; effects.md of the design notes (`reference_error`).
 
 use std::collections::BTreeMap;
@@ -72,9 +82,33 @@ pub(crate) fn consider(
     })
 }
 
-/// The effect, where at least one axis is beyond doubt.
-pub(crate) fn effect(wander: &Wander) -> Option<(FoundEffect, EffectEntry)> {
-    let axes: Vec<usize> = (0..3).filter(|&a| wander.axes()[a]).collect();
+/// Axes about which the error is beyond doubt.
+fn certain(wander: &Wander) -> Vec<usize> {
+    let axes = wander.axes();
+    (0..3).filter(|&axis| axes[axis]).collect()
+}
+
+/// Whether white noise of samples `step_s` apart makes what there is about an axis.
+fn is_carried(wander: &Wander, axis: usize, step_s: f64) -> bool {
+    let tau_s = wander.noise.reference[axis].tau_s;
+    let bounds = wander.rotations.slow_bounds(&wander.noise, axis);
+    bounds.map_or(tau_s, |b| b.tau_s.interval[0].min(tau_s)) <= step_s
+}
+
+/// What speaks against an error that is beyond doubt, if it is that of the samples of a reference `step_s` apart.
+pub(crate) fn against(wander: &Wander, step_s: f64) -> Option<String> {
+    let axes = certain(wander);
+    let carried = |&axis: &usize| is_carried(wander, axis, step_s);
+    (!axes.is_empty() && axes.iter().all(carried)).then(|| {
+        "white noise of the reference's samples lasts as long as it does, from each to the next"
+            .to_owned()
+    })
+}
+
+/// The effect, where at least one axis is beyond doubt, and its error is not that of samples `step_s` apart.
+pub(crate) fn effect(wander: &Wander, step_s: f64) -> Option<(FoundEffect, EffectEntry)> {
+    let mut axes = certain(wander);
+    axes.retain(|&axis| !is_carried(wander, axis, step_s));
     if axes.is_empty() {
         return None;
     }

@@ -85,6 +85,36 @@ fn a_wandering_reference_under_slews_is_no_effect() {
     assert!(wanders >= 8, "{wanders} of 10");
 }
 
+/// White noise of 2 arcsec of a reference every five seconds, carried between its samples to ten frames each: a slow
+/// error of 250 nats and 4.5 s to whoever does not know its step. It is noise of samples, nothing is named, and the
+/// report says why. A wander of 60 s through the same samples is one.
+#[test]
+fn white_noise_of_a_slow_reference_is_no_slow_error() {
+    let told = |lines: &str, seed: u64| {
+        let lines = format!("rate_hz = 0.2\nrates = false\n{lines}");
+        let case = Case::new(Path::Still, 7000 + seed).reference(&lines);
+        case.close().report
+    };
+    for seed in 0..3 {
+        let report = told("white_arcsec = [2.0, 2.0, 2.0]", seed);
+        let (effects, left) = (&report.effects, &report.unattributed);
+        assert!(effects.is_empty(), "{seed}: {effects:?}");
+        assert!(!left.present, "{seed}: {left:?}");
+        let mut considered = report.considered.iter();
+        let entry = considered.find(|c| c.id == "reference_error");
+        let against = entry.and_then(|c| c.against.as_deref()).unwrap_or("");
+        assert!(against.contains("white noise"), "{seed}: {against}");
+    }
+    let wanders = (0..3).filter(|&seed| {
+        let report = told(
+            "wander_arcsec = [2.0, 2.0, 2.0]\nwander_tau_s = [60.0, 60.0, 60.0]",
+            seed,
+        );
+        report.effects.iter().any(|e| e.id == "reference_error")
+    });
+    assert!(wanders.count() >= 2);
+}
+
 /// What a model declares of a reference that wanders by 0.5 arcsec over a minute.
 const DECLARED: [(&str, f64); 6] = [
     ("sigma_x_arcsec", 0.5),
