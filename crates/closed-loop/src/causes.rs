@@ -29,7 +29,7 @@ use crate::noise_effects;
 use crate::search::empirical::Empirical;
 use crate::search::group::open_beside;
 use crate::search::misplaced::{MISPLACED, piled};
-use crate::search::orbits::is_too_fast;
+use crate::search::orbits::{has_no_speed, is_too_fast};
 use crate::search::refusal::{Refusal, Refused};
 use crate::search::selection::{columns_of, costs};
 use crate::search::{Found, borrowed, family, fit_beside, joined, without};
@@ -235,6 +235,18 @@ pub(crate) fn run<'a>(
         };
         let all = with_sought(usual);
         let described = Described::new(level, folds, &searched.found, all, quest.ways)?;
+        let set = columns_of(
+            &searched.found.fitted.groups,
+            &searched.found.selection.chosen,
+        );
+        let estimate = searched.found.fitted.fits.estimate(&set);
+        let is_no_orbit = |k: usize| {
+            let chosen = &searched.found.selection.chosen;
+            let first = columns_of(&searched.found.fitted.groups, &chosen[..k]).len();
+            let orbit = searched.found.candidates[chosen[k]].as_ref();
+            let told = estimate.as_ref();
+            too_fast(k) || told.is_some_and(|told| has_no_speed(orbit, told, first))
+        };
         let one_star = |k: usize, (term, columns): &Part| {
             let chosen = searched.found.selection.chosen[k];
             let selectors = searched.found.candidates[chosen].selectors();
@@ -243,7 +255,7 @@ pub(crate) fn run<'a>(
             id.is_some_and(|id| is_one_star(white.data, slope, columns, id))
         };
         let known = Known {
-            too_fast: &too_fast,
+            is_no_orbit: &is_no_orbit,
             one_star: &one_star,
         };
         let agreed = |set: &[usize], instead: &[Part]| {
@@ -451,7 +463,7 @@ fn suffice(
     };
     let described = Described::new(level, folds, &searched.found, (quest.terms)(false), &[])?;
     let nothing = Known {
-        too_fast: &|_| false,
+        is_no_orbit: &|_| false,
         one_star: &|_, _| false,
     };
     Ok(!described.chosen.is_empty() && stand_ins(&described, &|_, _| false, &nothing).is_none())

@@ -63,7 +63,7 @@ const APART: f64 = 1.0 - REMAINDER;
 /// What is known of chosen effects beside their columns.
 pub(crate) struct Known<'a> {
     /// Whether it is an orbit that nature does not have.
-    pub(crate) too_fast: &'a dyn Fn(usize) -> bool,
+    pub(crate) is_no_orbit: &'a dyn Fn(usize) -> bool,
     /// Whether this slope is nothing but the star that it is of.
     pub(crate) one_star: &'a dyn Fn(usize, &Part) -> bool,
 }
@@ -103,8 +103,10 @@ pub(crate) fn stand_ins(
         let channel = |(k, _): &Part| described.terms[*k].term.is_of_channel();
         let time = |(k, _): &Part| described.terms[*k].term.is_of_time();
         let own_shape = |parts: &[Part]| {
-            let fast = set.iter().all(|&k| (known.too_fast)(k));
-            parts.iter().all(|part| channel(part) || fast && time(part))
+            let no_orbit = set.iter().all(|&k| (known.is_no_orbit)(k));
+            parts
+                .iter()
+                .all(|part| channel(part) || no_orbit && time(part))
         };
         let star = set.iter().all(|&k| OF_ONE.contains(&described.names[k]));
         let slope = |(k, _): &Part| described.terms[*k].term.is_of_a_star();

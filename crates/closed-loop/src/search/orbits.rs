@@ -17,7 +17,7 @@
 use core::f64::consts::TAU;
 use std::sync::Arc;
 
-use block_regression::Folds;
+use block_regression::{Estimate, Folds};
 use effects::{Candidate, Surroundings, free_orbit, nearest_circles, orbit_could_show};
 use focal_plane::{ARCSEC_PER_RAD, AttitudeSource, SPEED_OF_LIGHT_M_S};
 use nalgebra::{Matrix6, SMatrix, SVector, Vector3, Vector6};
@@ -48,6 +48,9 @@ const WORTH_A_SEARCH: f64 = 12.0;
 /// Nats by which an orbit, which takes the shape in time that suits it, must be worth more than channels that
 /// have theirs: its plane, phase and period are free.
 pub(crate) const OWN_SHAPE: f64 = 15.0;
+/// The coefficient of an orbit that is its speed, and in how many of its sigmas it is known.
+const SPEED: &str = "speed_m_s";
+const KNOWN: f64 = 2.0;
 /// Share of what others explain of the same in white noise, below which it is no orbit.
 const RIVAL: f64 = 0.5;
 
@@ -350,6 +353,14 @@ impl Beside<'_> {
         }
         Ok(Some(Likely { orbit, nats }))
     }
+}
+
+/// Whether the speed of what stands as an orbit is not known, by its estimate from column `first` on: such an orbit
+/// lends its shape to any drift.
+pub(crate) fn has_no_speed(orbit: &dyn Candidate, estimate: &Estimate, first: usize) -> bool {
+    let told = orbit.coefficients().first();
+    told.is_some_and(|c| c.name == SPEED)
+        && estimate.value[first].abs() < KNOWN * estimate.sigma(first)
 }
 
 /// Whether it is an orbit that turns faster than nature has any.
