@@ -32,6 +32,8 @@ fn files_that_only_look_like_tables_are_told() {
         "references.csv.gz",
     ];
     let others = [
+        "attitude.png",
+        "reference.md",
         "README.md",
         "model.toml",
         "truth.json",

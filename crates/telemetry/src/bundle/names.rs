@@ -14,6 +14,9 @@ const RESULTS: [&str; 5] = [
     "draws.csv",
 ];
 
+/// Ends of what is no table, whatever it is called.
+const NO_TABLES: [&str; 7] = [".html", ".jpg", ".md", ".pdf", ".png", ".svg", ".toml"];
+
 /// Names of files, of a bundle and beside it.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct TableFiles {
@@ -75,7 +78,9 @@ fn looks_like_a_table(name: &str) -> bool {
     let ends = |form: TableFormat| name.ends_with(form.extension());
     let hidden = name.starts_with('.');
     let named = layout::TABLES.iter().any(|table| name.starts_with(table));
+    let other = NO_TABLES.iter().any(|end| name.ends_with(end));
     (named || TableFormat::ALL.into_iter().any(ends))
         && !hidden
+        && !other
         && !RESULTS.contains(&name.as_str())
 }
