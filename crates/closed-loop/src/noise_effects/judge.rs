@@ -9,12 +9,11 @@
 //!     L_without: at no rate, no spikes, and for the slope next to none: nearer is as declared
 //!     var: over blocks of time; for the slope also over stars, which may differ for no reason at all
 //! for the rate, that each star's noise follows it where every star has its own level (`within_stars.rs`)
-//! gain = sum over the folds of ln L - ln L_without on the fold, both fitted on the others;
-//!        of slope and rate  Z(all) - Z(others) - the same without,   Z = max ln L - ln(I + I_all/N) / 2
+//! gain = sum over the folds of Z(all) - Z(others) - the same without,   Z = max ln L - ln(I + I_all/N) / 2
 //! ```
 //!
 //! (I: information on the parameter beside the others, N: scalars). A rate that is seen in one fold alone is
-//! predicted by no other, but neither spoiled.
+//! predicted by no other, but neither spoiled; nor are spikes by one that is larger than all others.
 //!
 //! A rate is no effect where noise that changes with the time explains as much.
 //!
@@ -265,22 +264,19 @@ fn observable(rows: &[Row], moving: bool) -> Free {
 /// The best of several starts: spikes are a second maximum.
 fn climb(model: &Model, rows: &[Row], free: Free) -> Option<Fit> {
     let plain = model.plain(rows);
-    let all = |_: &Row| true;
-    let starts: &[[f64; 2]] = if free[SHARE] {
-        &[[1e-3, 100.0], [1e-2, 25.0]]
-    } else {
-        &[[0.0, 0.0]]
-    };
+    let mut starts = vec![plain];
+    if free[SHARE] {
+        let near = [[1e-3, 100.0], [1e-2, 25.0]].map(|[share, size]: [f64; 2]| {
+            let mut at = plain;
+            at[SHARE] = logit(share);
+            at[SIZE] += (size / 100.0).ln();
+            at
+        });
+        starts = near.into_iter().chain(model.standing_out(rows)).collect();
+    }
     starts
         .iter()
-        .map(|&[share, size]| {
-            let mut at = plain;
-            if free[SHARE] {
-                at[SHARE] = logit(share);
-                at[SIZE] += (size / 100.0).ln();
-            }
-            model.fit(rows, &at, free, &all)
-        })
+        .map(|at| model.fit(rows, at, free, &|_| true))
         .filter(|fit| fit.loglik.is_finite())
         .max_by(|a, b| a.loglik.total_cmp(&b.loglik))
 }
@@ -400,7 +396,9 @@ impl Bench<'_> {
         }
         let p_value = (TRIED * p).min(1.0);
         let gain = if wanted == Gain::Told || p_value < FAMILY_ALPHA {
-            self.gain_of(k, shown, &without)
+            let folds = shown.folds.get_or_init(|| self.folds_of(&self.rows, full));
+            let others = self.folds_of(&self.rows, &without);
+            self.gain(&[k], (full, folds), (&without, &others))
         } else {
             0.0
         };
@@ -463,7 +461,8 @@ impl Bench<'_> {
         let without = self.model.fit(&rows, &start, free, &|_| true);
         let widened = self.model.widening(&with.at, &rows);
         let ratio = 2.0 * (with.loglik - without.loglik) / widened;
-        let gain = self.gain(&rows, &with, &without);
+        let [held, others] = [&with, &without].map(|fit| self.folds_of(&rows, fit));
+        let gain = self.gain(&[SHARE, SIZE], (&with, &held), (&without, &others));
         let share = sigmoid(with.at[SHARE]);
         let size = (0.5 * with.at[SIZE]).exp();
         let known = self.model.covariance(
@@ -479,6 +478,7 @@ impl Bench<'_> {
             });
             all.map(|m| m[(k, k)]).fold(0.0, f64::max).sqrt()
         };
+        let [part, larger] = self.model.untold(&with.at);
         let tails = self.model.loglik_of_tails(&with.at, &rows) + BEYOND_TAILS;
         let against = if share * (rows.len() as f64) < MIN_SPIKES {
             Some("so few rows are no share")
@@ -500,8 +500,8 @@ impl Bench<'_> {
             against,
             fewest: Some(MIN_SPIKES / rows.len().max(1) as f64),
             values: [
-                [share, sigma(SHARE) * share * (1.0 - share)],
-                [size, 0.5 * sigma(SIZE) * size],
+                [share, share * part.hypot(sigma(SHARE) * (1.0 - share))],
+                [size, 0.5 * size * larger.hypot(sigma(SIZE))],
             ],
             least: 0.0,
         }
@@ -525,38 +525,29 @@ impl Bench<'_> {
         beside / f64::max(spikes, 1.0)
     }
 
-    /// Gain of `with` over `without` on folds that took no part in the fit.
-    fn gain(&self, rows: &[Row], with: &Fit, without: &Fit) -> f64 {
-        let fold = |r: &Row| self.folds.fold_of_block[r.block];
-        let [with, without] = [with, without].map(|fit| {
-            let each = self.model.without_each(rows, fit, self.folds);
-            let held = each
-                .enumerate()
-                .map(|(f, held)| self.model.loglik(&held.others.at, rows, |r| fold(r) == f));
-            held.sum::<f64>()
-        });
-        with - without
+    /// What each fold tells, and what the others make of `fit` without it.
+    fn folds_of(&self, rows: &[Row], fit: &Fit) -> Vec<Without> {
+        self.model.without_each(rows, fit, self.folds).collect()
     }
 
-    /// The same where what the others know of parameter `k` counts as it is known, which `without` holds at nothing.
-    fn gain_of(&self, k: usize, with: &Shown, without: &Fit) -> f64 {
-        let folds_of = |fit: &Fit| -> Vec<Without> {
-            let each = self.model.without_each(&self.rows, fit, self.folds);
-            each.collect()
+    /// Gain of `with` over `without`, which holds the parameters `ks` at nothing, on folds that took no part in the fit;
+    /// what the others know of these counts as it is known.
+    fn gain(&self, ks: &[usize], with: (&Fit, &[Without]), without: (&Fit, &[Without])) -> f64 {
+        let adds = |(fit, folds): (&Fit, &[Without])| -> f64 {
+            let each = folds.iter().map(|fold| fit.loglik - fold.others.loglik);
+            each.sum()
         };
-        let own = with.folds.get_or_init(|| folds_of(&with.fit));
-        let others = folds_of(without);
-        let told = information(own, &with.fit, k);
-        let all: f64 = told.iter().sum();
-        let one = all / (2 * self.rows.len()).max(1) as f64;
-        let folds = own.iter().zip(&others).zip(&told);
-        folds
-            .map(|((own, other), told)| {
-                let adds = |fit: &Fit, fold: &Without| fit.loglik - fold.others.loglik;
-                let known = (all + one) / ((all - told).max(0.0) + one).max(f64::MIN_POSITIVE);
-                adds(&with.fit, own) - adds(without, other) - 0.5 * known.ln()
-            })
-            .sum()
+        let known = ks.iter().map(|&k| {
+            let told = information(with.1, with.0, k);
+            let all: f64 = told.iter().sum();
+            let one = all / (2 * self.rows.len()).max(1) as f64;
+            let left = |told: &f64| (all - told).max(0.0) + one;
+            let known = told.iter().filter(|_| all > 0.0);
+            known
+                .map(|told| 0.5 * ((all + one) / left(told)).ln())
+                .sum::<f64>()
+        });
+        adds(with) - adds(without) - known.sum::<f64>()
     }
 }
 

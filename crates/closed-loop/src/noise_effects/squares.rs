@@ -19,7 +19,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
 use super::rows::{Row, Source};
 
 /// A square beyond this many times the usual is a spike's.
-const SPIKE: f64 = 24.0;
+pub(super) const SPIKE: f64 = 24.0;
 /// Least rms of a column over the rows of a star, of 1: less is no change.
 const LEAST_CHANGE: f64 = 0.05;
 /// Fewest rows of a star with a level, and blocks of time.

@@ -27,6 +27,7 @@ use rayon::prelude::*;
 
 use super::density::{Lanes, Levels, There};
 use super::rows::Row;
+use super::squares::SPIKE;
 
 /// Parameters: level a, magnitude b, rate w, share rho (logit), size S^2 (log).
 pub(super) const PARAMETERS: usize = 5;
@@ -222,6 +223,26 @@ impl Model {
         at
     }
 
+    /// No effect but spikes, which are the rows that stand out: their share, and their mean square. `None`: none does.
+    ///
+    /// From far below, the size is not reached: each spike pulls at ln S^2 by q/2S^2, the sum of whose squares passes for
+    /// the curvature. A round adds 2 S^4/q to S^2, and all [`ROUNDS`] multiply it by 61 at most, the size by eight. From
+    /// above each pulls by one at most.
+    pub(super) fn standing_out(&self, rows: &[Row]) -> Option<Vector> {
+        let mut at = self.plain(rows);
+        let level = at[LEVEL].exp();
+        let out = rows
+            .iter()
+            .filter(|r| r.square > SPIKE * level * r.declared);
+        let (count, halves) = out.fold((0.0, 0.0), |(n, sum), r| (n + 1.0, sum + 0.5 * r.square));
+        if count == 0.0 {
+            return None;
+        }
+        at[SHARE] = logit(count / rows.len() as f64);
+        at[SIZE] = (halves / count).ln();
+        Some(self.bounded(&at))
+    }
+
     /// The model at a point.
     fn there(&self, at: &Vector) -> There {
         let share = sigmoid(at[SHARE]);
@@ -235,6 +256,20 @@ impl Model {
         }
     }
 
+    /// What rests on spikes that are too small to be told, as far as sizes are Gaussian: which part of the share they
+    /// are, and by how much the logarithm of S^2 were larger without them, as where all spikes are of one size.
+    ///
+    /// ```text
+    /// s = S^2/v,  told from q/2v = h on:  rho e^(-h/(1 + s)) / (1 + s) = (1 - rho) e^-h
+    /// part 1 - e^(-h/(1 + s))        those above h have the mean square s + h
+    /// ```
+    pub(super) fn untold(&self, at: &Vector) -> [f64; 2] {
+        let size = at[SIZE].exp() / self.variance;
+        let wide = 1.0 + size;
+        let from = ((wide.ln() - at[SHARE]) * wide / size).max(0.0);
+        [1.0 - (-from / wide).exp(), (from / size).ln_1p()]
+    }
+
     /// Variance of a row, and the probability that it holds no spike.
     pub(super) fn belief(&self, at: &Vector) -> impl Fn(&Row) -> [f64; 2] + use<> {
         let there = self.there(at);
@@ -243,19 +278,6 @@ impl Model {
             let sound = there.densities(&Lanes::of(row, own)).posterior[0][0];
             [own + there.rate * row.rate, sound]
         }
-    }
-
-    /// Log-likelihood of the rows that `of` keeps.
-    pub(super) fn loglik(&self, at: &Vector, rows: &[Row], of: impl Fn(&Row) -> bool) -> f64 {
-        let there = self.there(at);
-        let mut levels = Levels::default();
-        let (mut sum, mut product) = (0.0, LogProduct::default());
-        for row in rows.iter().filter(|r| of(r)) {
-            let density = there.densities(&Lanes::of(row, levels.own(&there, row)));
-            sum += density.exponent[0];
-            product.times(density.factor[0]);
-        }
-        sum + product.ln()
     }
 
     /// Log-likelihood of noise with tails instead of spikes: Student's t in two dimensions,
