@@ -50,7 +50,7 @@ const WORTH_A_SEARCH: f64 = 12.0;
 pub(crate) const OWN_SHAPE: f64 = 15.0;
 /// The coefficient of an orbit that is its speed, and in how many of its sigmas it is known.
 const SPEED: &str = "speed_m_s";
-const KNOWN: f64 = 2.0;
+const KNOWN: f64 = 3.0;
 /// Share of what others explain of the same in white noise, below which it is no orbit.
 const RIVAL: f64 = 0.5;
 

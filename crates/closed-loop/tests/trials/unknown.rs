@@ -166,3 +166,31 @@ fn a_star_that_follows_a_temperature_is_told() {
         assert_eq!(first, wanted, "{seed}: {left:?}");
     }
 }
+
+/// The camera turns evenly, or to and fro, by 0.6 to 1 arcsec in a quarter of an hour, beside a perfect reference and stars
+/// of 3 arcsec: 20 sigma and more. A part of an orbit whose speed nobody knows (4150 +- 1810 m/s) looks like it.
+#[test]
+fn a_turn_with_the_time_is_no_orbit_of_unknown_speed() {
+    let shapes: [fn(f64) -> f64; 2] = [|t| t - 0.5, |t| 6.0 * (t - 0.5).powi(2)];
+    for (seed, path) in [(1, Path::Nods), (2, Path::Still), (4, Path::Still)] {
+        for of in shapes {
+            let case = Case {
+                duration_s: 900.0,
+                ..Case::new(path, 800 + seed)
+            };
+            let scenario = case.quiet(3.0);
+            let mut bundle = simulate(&scenario).expect("a bundle");
+            let stars = bundle.stars.as_mut().expect("stars");
+            let turns: Vec<f64> = stars.t_of_rows_s().iter().map(|t| of(t / 900.0)).collect();
+            for (row, turn) in turns.into_iter().enumerate() {
+                stars.x_px[row] += 0.0151 * turn;
+                stars.y_px[row] -= 0.0101 * turn;
+            }
+            let model = scenario.model_without_effects();
+            let report = closed(&model, &bundle).expect("the loop closes").report;
+            assert!(report.effects.is_empty(), "{seed}: {:?}", report.effects);
+            let first = report.unattributed.depends_on.first();
+            assert_eq!(first.map(|d| d.variable.as_str()), Some("time"), "{seed}");
+        }
+    }
+}
