@@ -28,6 +28,7 @@
 mod around;
 pub(crate) mod gyro;
 pub(crate) mod neighbours;
+mod piece;
 mod rates;
 mod stencil;
 
