@@ -14,6 +14,7 @@
 //!
 //! Not physics: the order of the steps.
 
+use std::cell::LazyCell;
 use std::sync::Arc;
 
 use block_regression::Folds;
@@ -235,11 +236,7 @@ pub(crate) fn run<'a>(
         };
         let all = with_sought(usual);
         let described = Described::new(level, folds, &searched.found, all, quest.ways)?;
-        let set = columns_of(
-            &searched.found.fitted.groups,
-            &searched.found.selection.chosen,
-        );
-        let estimate = searched.found.fitted.fits.estimate(&set);
+        let estimate = LazyCell::new(|| searched.found.estimate());
         let is_no_orbit = |k: usize| {
             let chosen = &searched.found.selection.chosen;
             let first = columns_of(&searched.found.fitted.groups, &chosen[..k]).len();

@@ -39,9 +39,9 @@ use focal_plane::{
     rotation_vector,
 };
 use nalgebra::{UnitQuaternion, Vector3};
+use spectra::robust::median_step;
 
 use crate::gaps::longest_step;
-use spectra::robust::median_step;
 use stencil::Stencil;
 
 /// Largest ratio of prediction error to step at which the motion is resolved.

@@ -11,7 +11,7 @@
 
 use std::sync::Arc;
 
-use block_regression::{BlockGrams, Design, Fits, FoldSums, Folds, Layout};
+use block_regression::{BlockGrams, Design, Estimate, Fits, FoldSums, Folds, Layout};
 use effects::{Candidate, Coefficient};
 use nalgebra::DVector;
 
@@ -321,6 +321,12 @@ impl Found {
             fitted,
             selection,
         })
+    }
+
+    /// The chosen amplitudes together, in the order of [`columns_of`].
+    pub(crate) fn estimate(&self) -> Option<Estimate> {
+        let set = columns_of(&self.fitted.groups, &self.selection.chosen);
+        self.fitted.fits.estimate(&set)
     }
 
     /// The columns of candidate `g` that the data show, counted from its own first.

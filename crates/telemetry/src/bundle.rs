@@ -15,7 +15,7 @@ use focal_plane::{Camera, Catalogue, StarFrames};
 
 use crate::{
     AttitudeTable, ExtraColumns, Files, Folder, Housekeeping, Metadata, Output, RateTable,
-    ReferenceTable, TelemetryError, WindowTable,
+    ReferenceTable, TelemetryError, WindowTable, layout,
 };
 
 pub use names::TableFiles;
@@ -53,6 +53,12 @@ impl TableFormat {
     pub fn file_name(self, table: &str) -> String {
         format!("{table}{}", self.extension())
     }
+}
+
+/// Names that the files of tables may have, in the order of the tables.
+fn table_files() -> impl Iterator<Item = String> {
+    let forms = |table| TableFormat::ALL.map(|form| form.file_name(table));
+    layout::TABLES.into_iter().flat_map(forms)
 }
 
 /// A telemetry bundle, read and checked.

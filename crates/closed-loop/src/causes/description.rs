@@ -94,10 +94,7 @@ impl Described {
         ways: &[Way],
     ) -> Result<Self, CloseError> {
         let chosen = &found.selection.chosen;
-        let estimate = found
-            .fitted
-            .fits
-            .estimate(&columns_of(&found.fitted.groups, chosen));
+        let estimate = found.estimate();
         let only = found.only(chosen);
         let mut changing = Vec::new();
         if let Some(estimate) = estimate {

@@ -264,16 +264,17 @@ fn observable(rows: &[Row], moving: bool) -> Free {
 /// The best of several starts: spikes are a second maximum.
 fn climb(model: &Model, rows: &[Row], free: Free) -> Option<Fit> {
     let plain = model.plain(rows);
-    let mut starts = vec![plain];
-    if free[SHARE] {
+    let starts = if free[SHARE] {
         let near = [[1e-3, 100.0], [1e-2, 25.0]].map(|[share, size]: [f64; 2]| {
             let mut at = plain;
             at[SHARE] = logit(share);
             at[SIZE] += (size / 100.0).ln();
             at
         });
-        starts = near.into_iter().chain(model.standing_out(rows)).collect();
-    }
+        near.into_iter().chain(model.standing_out(rows)).collect()
+    } else {
+        vec![plain]
+    };
     starts
         .iter()
         .map(|at| model.fit(rows, at, free, &|_| true))

@@ -216,7 +216,7 @@ fn wider(found: &Found, g: usize) -> f64 {
         .map(|&c| groups[c].columns.len())
         .sum();
     let which: Vec<usize> = (first..first + groups[g].columns.len()).collect();
-    let estimate = found.fitted.fits.estimate(&columns_of(groups, chosen));
+    let estimate = found.estimate();
     let mean = estimate.and_then(|e| Some(e.wider(&which)?.mean()));
     mean.unwrap_or(1.0).max(1.0)
 }

@@ -31,7 +31,7 @@ use crate::situation::Situation;
 use crate::star::data::StarData;
 use crate::star::evidence::StarEvidence;
 use crate::star::own_attitude;
-use crate::star::reference_wander::{self, REFERENCE_ERROR};
+use crate::star::reference_wander::{self, Finding, REFERENCE_ERROR};
 use crate::star::search::Wander;
 use crate::star::settling::Settled;
 use crate::unexplained::leftover::{self, Series};
@@ -195,9 +195,14 @@ pub(crate) fn finish(
     let wander = f.wander.filter(|_| !declared);
     let reference = f.situation.reference.as_ref();
     let step_s = reference.and_then(|r| median_step(r.t_s())).unwrap_or(0.0);
-    if let Some((effect, entry)) = wander.and_then(|w| reference_wander::effect(w, step_s)) {
-        effects.push(effect);
-        entries.push(entry);
+    let mut against_wander = None;
+    match wander.and_then(|wander| reference_wander::finding(wander, step_s)) {
+        Some(Finding::Named(effect, entry)) => {
+            effects.push(*effect);
+            entries.push(entry);
+        }
+        Some(Finding::Against(why)) => against_wander = Some(why.to_owned()),
+        None => {}
     }
     let weight = &f.level.weight;
     let (inside, series) = inside.unzip();
@@ -296,7 +301,7 @@ pub(crate) fn finish(
     noise.need(f.situation, f.data, squares)?;
     noise.tell(&mut considered);
     if let Some(mut entry) = reference_wander::consider(f.data, &plain.axes, squares) {
-        entry.against = wander.and_then(|w| reference_wander::against(w, step_s));
+        entry.against = against_wander;
         considered
             .iter_mut()
             .filter(|c| c.id == entry.id)

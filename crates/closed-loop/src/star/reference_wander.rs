@@ -82,41 +82,37 @@ pub(crate) fn consider(
     })
 }
 
-/// Axes about which the error is beyond doubt.
-fn certain(wander: &Wander) -> Vec<usize> {
-    let axes = wander.axes();
-    (0..3).filter(|&axis| axes[axis]).collect()
+/// What an error that is beyond doubt about at least one axis comes to.
+pub(crate) enum Finding {
+    Named(Box<FoundEffect>, EffectEntry),
+    /// What speaks against naming it.
+    Against(&'static str),
 }
 
-/// Whether white noise of samples `step_s` apart makes what there is about an axis.
-fn is_carried(wander: &Wander, axis: usize, step_s: f64) -> bool {
-    let tau_s = wander.noise.reference[axis].tau_s;
-    let bounds = wander.rotations.slow_bounds(&wander.noise, axis);
-    bounds.map_or(tau_s, |b| b.tau_s.interval[0].min(tau_s)) <= step_s
-}
-
-/// What speaks against an error that is beyond doubt, if it is that of the samples of a reference `step_s` apart.
-pub(crate) fn against(wander: &Wander, step_s: f64) -> Option<String> {
-    let axes = certain(wander);
-    let carried = |&axis: &usize| is_carried(wander, axis, step_s);
-    (!axes.is_empty() && axes.iter().all(carried)).then(|| {
-        "white noise of the reference's samples lasts as long as it does, from each to the next"
-            .to_owned()
-    })
-}
-
-/// The effect, where at least one axis is beyond doubt, and its error is not that of samples `step_s` apart.
-pub(crate) fn effect(wander: &Wander, step_s: f64) -> Option<(FoundEffect, EffectEntry)> {
-    let mut axes = certain(wander);
-    axes.retain(|&axis| !is_carried(wander, axis, step_s));
+/// What there is beyond doubt, beside a reference with samples `step_s` apart.
+pub(crate) fn finding(wander: &Wander, step_s: f64) -> Option<Finding> {
+    let claimed = wander.axes();
+    let bounds_of = |axis: usize| wander.rotations.slow_bounds(&wander.noise, axis);
+    let mut axes: Vec<_> = (0..3)
+        .filter(|&axis| claimed[axis])
+        .map(|axis| (axis, bounds_of(axis)))
+        .collect();
     if axes.is_empty() {
         return None;
     }
+    axes.retain(|(axis, bounds)| {
+        let tau_s = wander.noise.reference[*axis].tau_s;
+        bounds.map_or(tau_s, |b| b.tau_s.interval[0].min(tau_s)) > step_s
+    });
+    if axes.is_empty() {
+        return Some(Finding::Against(
+            "white noise of the reference's samples lasts as long as it does, from each to the next",
+        ));
+    }
     let mut parameters = BTreeMap::new();
     let mut written = BTreeMap::new();
-    for &axis in &axes {
+    for &(axis, bounds) in &axes {
         let slow = wander.noise.reference[axis];
-        let bounds = wander.rotations.slow_bounds(&wander.noise, axis);
         let values = [
             (slow.slow, "arcsec", bounds.map(|b| b.slow)),
             (slow.tau_s, "s", bounds.map(|b| b.tau_s)),
@@ -134,7 +130,7 @@ pub(crate) fn effect(wander: &Wander, step_s: f64) -> Option<(FoundEffect, Effec
             parameters.insert(name, estimate);
         }
     }
-    let ratio: f64 = axes.iter().map(|&a| wander.ratio[a]).sum();
+    let ratio: f64 = axes.iter().map(|(axis, _)| wander.ratio[*axis]).sum();
     let freedom = 2.0 * axes.len() as f64;
     let p = ChiSquared::new(freedom).map_or(1.0, |law| law.sf(ratio / WIDENING));
     let found = FoundEffect {
@@ -147,5 +143,6 @@ pub(crate) fn effect(wander: &Wander, step_s: f64) -> Option<(FoundEffect, Effec
         variance_explained: None,
         confusable_with: Vec::new(),
     };
-    Some((found, EffectEntry::new(REFERENCE_ERROR, written)))
+    let entry = EffectEntry::new(REFERENCE_ERROR, written);
+    Some(Finding::Named(Box::new(found), entry))
 }

@@ -2,10 +2,9 @@
 //! is used.
 
 use closed_loop::Closed;
-use focal_plane::StarFrames;
 use telemetry::Bundle;
 
-use crate::kit::{Case, Path, closed};
+use crate::kit::{Case, Path, closed, kept_of};
 
 /// Takes the rates and every sample in `hole` from the reference.
 fn with_holes(bundle: &mut Bundle, hole: impl Fn(f64) -> bool) {
@@ -84,22 +83,8 @@ fn what_needs_the_attitude_alone_does_without_the_motion() {
     assert!(tag.is_some_and(|t| !t.observable), "{tag:?}");
 }
 
-/// Those of the frames for whose number this holds.
-fn some_frames(all: &StarFrames, kept: impl Fn(usize) -> bool) -> StarFrames {
-    let mut frames = StarFrames::new();
-    for k in (0..all.frames()).filter(|&k| kept(k)) {
-        frames.begin(all.t_s[k]);
-        for row in all.rows_of(k) {
-            let (slot, star) = (all.slot[row], all.star_id[row]);
-            frames.push(slot, star, all.x_px[row], all.y_px[row]);
-        }
-    }
-    frames
-}
-
 /// Three frames in ten are missing, or from the middle on nine in ten, and there is no reference: swings of 59 and 81 s
-/// go on across what is missing, no row is set aside for it, and a rolling shutter is
-/// found as with all.
+/// go on across what is missing, no row is set aside for it, and a rolling shutter is found as with all.
 #[test]
 fn missing_frames_take_no_others_along() {
     // of three in ten, without a pattern
@@ -110,7 +95,7 @@ fn missing_frames_take_no_others_along() {
         let mut case = Case::new(Path::Nods, 5).reference("none");
         case = case.with("rolling_shutter", "line_time_s = 3e-4");
         let (model, mut bundle) = case.make();
-        let frames = some_frames(bundle.stars.as_ref().expect("stars"), kept);
+        let frames = kept_of(bundle.stars.as_ref().expect("stars"), kept, |_, _| true);
         let rows = frames.star_id.len();
         bundle.stars = Some(frames);
         let closed = closed(&model, &bundle).expect("the loop closes");
@@ -131,9 +116,11 @@ fn frames_far_apart_know_their_motion() {
         .reference("rate_hz = 10.0\nrates = false")
         .with("time_tag_offset", "offset_s = 0.05");
     let (model, mut bundle) = case.make();
-    let frames = some_frames(bundle.stars.as_ref().expect("stars"), |k| {
-        k.is_multiple_of(8)
-    });
+    let frames = kept_of(
+        bundle.stars.as_ref().expect("stars"),
+        |k| k.is_multiple_of(8),
+        |_, _| true,
+    );
     bundle.stars = Some(frames);
     let closed = closed(&model, &bundle).expect("the loop closes");
     assert_eq!(names(&closed), ["time_tag_offset"]);

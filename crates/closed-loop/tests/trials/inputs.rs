@@ -5,7 +5,7 @@ use focal_plane::{Catalogue, CatalogueStar, StarFrames, ra_dec};
 use nalgebra::{UnitQuaternion, Vector3};
 use telemetry::{Bundle, Model};
 
-use crate::kit::{Case, Path, closed};
+use crate::kit::{Case, Path, closed, kept_of};
 
 fn short() -> Case {
     let mut case = Case::new(Path::Slews, 5);
@@ -15,21 +15,7 @@ fn short() -> Case {
 
 /// The rows of `stars` that `keep(frame, row of the frame)` accepts; frames stay, empty or not.
 fn kept(stars: &StarFrames, keep: impl Fn(usize, usize) -> bool) -> StarFrames {
-    let mut out = StarFrames::new();
-    for k in 0..stars.frames() {
-        out.begin(stars.t_s[k]);
-        for (i, row) in stars.rows_of(k).enumerate() {
-            if keep(k, i) {
-                out.push(
-                    stars.slot[row],
-                    stars.star_id[row],
-                    stars.x_px[row],
-                    stars.y_px[row],
-                );
-            }
-        }
-    }
-    out
+    kept_of(stars, |_| true, keep)
 }
 
 /// The loop on a bundle that `change` has been at.

@@ -3,7 +3,7 @@
 //! Not physics: scenario files, made from parts.
 
 use closed_loop::{CloseError, Closed, close};
-use focal_plane::{Catalogue, CatalogueStar};
+use focal_plane::{Catalogue, CatalogueStar, StarFrames};
 use scenarios::{Scenario, simulate};
 use telemetry::report::Report;
 use telemetry::{Bundle, Model};
@@ -231,6 +231,23 @@ pub(crate) fn reported(scenario: &Scenario) -> Report {
 
 pub(crate) fn closed(model: &Model, bundle: &Bundle) -> Result<Closed, CloseError> {
     close(model, bundle, &|_| {})
+}
+
+/// The frames of `stars` whose number `frame` accepts, with those rows (frame, row of it) that `row` does.
+pub(crate) fn kept_of(
+    stars: &StarFrames,
+    frame: impl Fn(usize) -> bool,
+    row: impl Fn(usize, usize) -> bool,
+) -> StarFrames {
+    let mut out = StarFrames::new();
+    for k in (0..stars.frames()).filter(|&k| frame(k)) {
+        out.begin(stars.t_s[k]);
+        for (_, at) in stars.rows_of(k).enumerate().filter(|(i, _)| row(k, *i)) {
+            let (slot, star) = (stars.slot[at], stars.star_id[at]);
+            out.push(slot, star, stars.x_px[at], stars.y_px[at]);
+        }
+    }
+    out
 }
 
 /// The star of that number.

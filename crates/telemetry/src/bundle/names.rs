@@ -2,7 +2,7 @@
 //!
 //! Source: telemetry bundle format, the names of tables (docs/formats/bundle.md).
 
-use super::TableFormat;
+use super::{TableFormat, table_files};
 use crate::{Files, TelemetryError, layout};
 
 /// Tables that boresight writes beside a bundle or anywhere: never meant to be read as one of it.
@@ -45,11 +45,7 @@ impl TableFiles {
         let names = files.names();
         let mut names =
             names.map_err(|error| TelemetryError::io(files.label(), "read the folder", &error))?;
-        let read: Vec<String> = layout::TABLES
-            .into_iter()
-            .flat_map(|table| TableFormat::ALL.map(|form| form.file_name(table)))
-            .filter(|name| names.contains(name))
-            .collect();
+        let read: Vec<String> = table_files().filter(|name| names.contains(name)).collect();
         names.retain(|name| !read.contains(name) && looks_like_a_table(name));
         names.sort_unstable();
         Ok(Self {

@@ -4,10 +4,9 @@
 
 use std::path::Path;
 
-use super::TableFormat;
 use super::read::METADATA;
+use super::table_files;
 use crate::config::Config;
-use crate::layout;
 
 /// What `source` says of every bundle that is made here.
 const MADE_HERE: &str = " by boresight, seed ";
@@ -26,10 +25,7 @@ pub fn made_here(how: &str, seed: u64, draw: u64) -> String {
 /// Names of the files of a bundle that are in a folder: `bundle.toml` and tables, whatever their form.
 #[must_use]
 pub fn bundle_files(dir: &Path) -> Vec<String> {
-    let tables = layout::TABLES
-        .into_iter()
-        .flat_map(|table| TableFormat::ALL.map(|form| form.file_name(table)));
-    tables
+    table_files()
         .chain([METADATA.to_owned()])
         .filter(|name| dir.join(name).is_file())
         .collect()
