@@ -42,6 +42,7 @@ mod pixel_noise;
 mod robust;
 mod sample;
 mod spline;
+mod spline_sums;
 mod spot;
 mod switching;
 #[cfg(test)]

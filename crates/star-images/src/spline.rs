@@ -24,6 +24,15 @@ pub(crate) struct Grid {
     pub(crate) side: usize,
 }
 
+/// An offset among the knots along one axis.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Place {
+    /// First coefficient that acts there.
+    pub(crate) first: usize,
+    /// Part of the knot interval before it.
+    pub(crate) part: f64,
+}
+
 /// The coefficients that act at one offset along one axis.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Taps {
@@ -56,9 +65,8 @@ impl Grid {
         self.side * self.side
     }
 
-    /// Taps at the offset `d_px`.
-    pub(crate) fn taps(&self, d_px: f64) -> Taps {
-        let inside = d_px.abs() <= self.half_width_px;
+    /// Place of the offset `d_px` among the knots.
+    pub(crate) fn place(&self, d_px: f64) -> Place {
         let d = d_px.clamp(-self.half_width_px, self.half_width_px);
         let u = (d + self.half_width_px) / self.spacing_px;
         #[expect(
@@ -67,7 +75,16 @@ impl Grid {
             reason = "u >= 0 after the clamp; a NaN becomes 0"
         )]
         let first = (u as usize).min(self.side - ORDER);
-        let t = u - first as f64;
+        Place {
+            first,
+            part: u - first as f64,
+        }
+    }
+
+    /// Taps at the offset `d_px`.
+    pub(crate) fn taps(&self, d_px: f64) -> Taps {
+        let inside = d_px.abs() <= self.half_width_px;
+        let Place { first, part: t } = self.place(d_px);
         let s = 1.0 - t;
         let value = [
             s * s * s / 6.0,

@@ -18,7 +18,8 @@
 
 use super::banded::{Banded, Factor};
 use super::sample::Sample;
-use super::spline::{Grid, ORDER, Taps};
+use super::spline::{Grid, Taps};
+use super::spline_sums::{Powers, SplineSums};
 
 /// Share of the mean weight of a coefficient that keeps unseen ones finite.
 const RIDGE: f64 = 1e-9;
@@ -65,44 +66,26 @@ pub(crate) fn normal(
     weight: &[f64],
     background: impl Fn(usize) -> f64,
 ) -> Normal {
-    let mut moment = vec![0.0; grid.len()];
-    let n = grid.side;
-    let last = ORDER - 1;
-    // three spare entries before the diagonal take the lower half of the blocks
-    let stride = n * last + 2 * last + 1;
-    let mut wide = vec![0.0; grid.len() * stride];
-    let mut taps = WindowTaps::default();
+    let mut sums = SplineSums::new(grid);
+    let mut along: [Vec<Powers>; 2] = Default::default();
     for &w in windows {
-        taps.set(grid, sample, w, at[w]);
+        for (axis, powers) in along.iter_mut().enumerate() {
+            let first = sample.corner[w][axis] - at[w][axis];
+            powers.clear();
+            powers
+                .extend((0..sample.size[axis]).map(|i| Powers::new(grid.place(first + i as f64))));
+        }
         let f2 = flux[w] * flux[w];
         let level = background(w);
         for (i, &[c, r]) in sample.cells_of(w).zip(&sample.cells) {
-            let (x, y) = (&taps.x[c], &taps.y[r]);
             let v = weight[i] * f2;
-            let m = weight[i] * flux[w] * (sample.z[i] - level);
-            for a in 0..ORDER {
-                for b in 0..ORDER {
-                    let vab = v * x.value[a] * y.value[b];
-                    let row = (x.first + a) * n + y.first + b;
-                    moment[row] += m * x.value[a] * y.value[b];
-                    for c in a..ORDER {
-                        let start = row * stride + (c - a) * n + last - b;
-                        let k = vab * x.value[c];
-                        let target = &mut wide[start..start + ORDER];
-                        for (t, q) in target.iter_mut().zip(&y.value) {
-                            *t += k * q;
-                        }
-                    }
-                }
+            if v > 0.0 {
+                let m = weight[i] * flux[w] * (sample.z[i] - level);
+                sums.add(&along[0][c], &along[1][r], v, m);
             }
         }
     }
-    let mut band = Banded::zeros(grid.len(), n * last + last);
-    for row in 0..grid.len() {
-        for offset in 0..=band.width {
-            *band.at(row, offset) = wide[row * stride + last + offset];
-        }
-    }
+    let (band, moment) = sums.products();
     Normal { band, moment }
 }
 
