@@ -227,6 +227,12 @@ impl Sample {
         w * self.cells.len()..(w + 1) * self.cells.len()
     }
 
+    /// Offsets of the columns (`axis` 0) or rows (1) of window `w` from `at`, px.
+    pub(crate) fn offsets(&self, w: usize, axis: usize, at: [f64; 2]) -> impl Iterator<Item = f64> {
+        let first = self.corner[w][axis] - at[axis];
+        (0..self.size[axis]).map(move |i| first + i as f64)
+    }
+
     /// Windows of frame `k`.
     pub(crate) fn windows_of(&self, k: usize) -> std::ops::Range<usize> {
         self.first_window[k]..self.first_window[k + 1]

@@ -38,8 +38,7 @@ impl WindowTaps {
     pub(crate) fn set(&mut self, grid: &Grid, sample: &Sample, w: usize, at: [f64; 2]) {
         let axis = |taps: &mut Vec<Taps>, a: usize| {
             taps.clear();
-            let first = sample.corner[w][a] - at[a];
-            taps.extend((0..sample.size[a]).map(|i| grid.taps(first + i as f64)));
+            taps.extend(sample.offsets(w, a, at).map(|d| grid.taps(d)));
         };
         axis(&mut self.x, 0);
         axis(&mut self.y, 1);
@@ -70,19 +69,19 @@ pub(crate) fn normal(
     let mut along: [Vec<Powers>; 2] = Default::default();
     for &w in windows {
         for (axis, powers) in along.iter_mut().enumerate() {
-            let first = sample.corner[w][axis] - at[w][axis];
             powers.clear();
-            powers
-                .extend((0..sample.size[axis]).map(|i| Powers::new(grid.place(first + i as f64))));
+            let offsets = sample.offsets(w, axis, at[w]);
+            powers.extend(offsets.map(|d| Powers::new(grid.place(d))));
         }
         let f2 = flux[w] * flux[w];
         let level = background(w);
         for (i, &[c, r]) in sample.cells_of(w).zip(&sample.cells) {
             let v = weight[i] * f2;
-            if v > 0.0 {
-                let m = weight[i] * flux[w] * (sample.z[i] - level);
-                sums.add(&along[0][c], &along[1][r], v, m);
+            if v == 0.0 {
+                continue;
             }
+            let m = weight[i] * flux[w] * (sample.z[i] - level);
+            sums.add(&along[0][c], &along[1][r], v, m);
         }
     }
     let (band, moment) = sums.products();
