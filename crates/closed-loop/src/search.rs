@@ -22,6 +22,7 @@ use selection::{Selection, Trials, columns_of, costs};
 
 pub(crate) mod catalogue;
 pub(crate) mod empirical;
+pub(crate) mod forms;
 pub(crate) mod group;
 pub(crate) mod instants;
 pub(crate) mod misplaced;
@@ -584,6 +585,7 @@ pub(crate) fn polish(
             candidates[g] = before;
         } else {
             changed = true;
+            forms::along(candidates, g);
         }
     }
     Ok(changed)

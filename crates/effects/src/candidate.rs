@@ -246,6 +246,17 @@ pub trait Candidate: Debug + Send + Sync {
         let _ = values;
         None
     }
+    /// The values of its coefficients about which its columns were [`refined`](Self::refined), where other forms of its
+    /// effect have coefficients of these names; empty: none, or they have not.
+    fn linear_about(&self) -> Vec<(&'static str, f64)> {
+        Vec::new()
+    }
+    /// The same candidate with columns re-linearised about those of these values, by name, that are its own: another
+    /// form of its effect was found there.
+    fn beside_form(&self, values: &[(&'static str, f64)]) -> Option<Box<dyn Candidate>> {
+        let _ = values;
+        None
+    }
     /// Another effect of the catalogue that may have made the same columns in any data, where there is one.
     fn twin(&self) -> Option<Twin> {
         None

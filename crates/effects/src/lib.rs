@@ -28,6 +28,7 @@ mod focal_length_drift;
 mod harness;
 mod hot_pixel;
 mod image_effects;
+mod lens;
 mod magnitude_noise;
 mod optical_distortion;
 mod outliers;

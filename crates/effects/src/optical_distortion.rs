@@ -1,51 +1,57 @@
 //! Optical distortion outside the declared prior: scale, aspect, radial, decentring, tilt, off-centre.
 //!
-//! ```text
-//! x, y    tangent-plane position minus the centre (cx_px, cy_px),   r^2 = x^2 + y^2
-//! dx = x (k0 + k1 r^2 + k2 r^4) + 2 p1 x y + p2 (r^2 + 2 x^2) + b1 x + b2 y + x (t1 x + t2 y)
-//! dy = y (k0 + k1 r^2 + k2 r^4) + p1 (r^2 + 2 y^2) + 2 p2 x y               + y (t1 x + t2 y)     times f: px
-//! ```
+//! The map and its terms stand in [`crate::lens`]. The coefficients have no unit (focal length 1). k0 is what the
+//! declared focal length is short by, as a share of itself: a lens whose focal length is a little off is never fitted
+//! well by k1 and k2. b1 and b2 are pixels that are not square, and axes that are not at right angles; air that lifts
+//! stars the more the lower they stand does the same to a camera that stands still. t1 and t2 are a detector that is
+//! tilted: all but a rotation of the camera, it is also a boresight that is -f t1 and -f t2 px off the middle.
 //!
-//! The coefficients have no unit (focal length 1). k0 is what the declared focal length is short by, as
-//! a share of itself: a lens whose focal length is a little off is never fitted well by k1 and k2. b1 and b2
-//! are pixels that are not square, and axes that are not at right angles; air that lifts stars the more the lower
-//! they stand does the same to a camera that stands still. t1 and t2 are a detector that is tilted: all but a
-//! rotation of the camera, it is also a boresight that is -f t1 and -f t2 px off the middle. As regressors, all enter about the boresight; to first order a displaced centre of a radial term is
-//! itself a decentring one, so cx, cy are not fitted. Short star tracks do not tell r^2 from r^4: the
-//! candidates are nested sets of terms, and the data decides how many it supports.
+//! As regressors, terms enter to first order about the boresight, and where that misses a thousandth of a pixel they
+//! are made linear about what was found: pixels see what the lens has bent. To first order a displaced centre of a
+//! radial term is itself a decentring one. So the centre is looked for by the widest set alone, where an uncalibrated
+//! lens has an r^6. Short star tracks do not tell r^2 from r^4: the candidates are nested sets of terms, and the data
+//! decides how many it supports.
 //!
-//! Source: Brown, "Decentering distortion of lenses", Photogrammetric Engineering 32 (1966) 444; Fraser, "Digital
-//! camera self-calibration", ISPRS Journal of Photogrammetry 52 (1997) 149 (b1, b2); a plane seen through a pinhole
-//! at an angle, to first order (t1, t2).
+//! Source: linearity about zero or about what was found; the terms' sources are those of [`crate::lens`].
 
 use focal_plane::{Camera, Pixel};
 use star_tracker::StarView;
 
+use crate::lens::{Bend, TERMS};
 use crate::parameters::Reader;
 use crate::shift::{Shift, ShiftCandidate, Shifted};
 use crate::{
-    ActsOn, Candidate, Coefficient, Effect, EffectError, EffectKind, Parameter, Parameters, Scene,
-    Surroundings,
+    ActsOn, Candidate, Coefficient, Effect, EffectError, EffectKind, Nonlinear, Parameter,
+    Parameters, Scene, Surroundings,
 };
 
 const ID: &str = "optical_distortion";
-const TERMS: [&str; 9] = ["k0", "k1", "k2", "p1", "p2", "b1", "b2", "t1", "t2"];
 
 /// Sets of terms that are tried, as indices into [`TERMS`].
 const SETS: [&[usize]; 10] = [
     &[0],
     &[1],
     &[0, 1],
-    &[3, 4],
-    &[1, 3, 4],
+    &[4, 5],
+    &[1, 4, 5],
     &[1, 2],
     &[0, 1, 2],
-    &[0, 1, 2, 3, 4],
-    &[5, 6],
-    &[7, 8],
+    &[0, 1, 2, 4, 5],
+    &[6, 7],
+    &[8, 9],
 ];
 /// The same of a camera whose attitude comes of its own stars: it need not have been calibrated, and may stand under air.
-const SETS_OF_ITS_OWN: [&[usize]; 3] = [&[0, 5, 6], &[0, 1, 7, 8], &[0, 1, 2, 3, 4, 5, 6, 7, 8]];
+const SETS_OF_ITS_OWN: [&[usize]; 4] = [
+    &[0, 6, 7],
+    &[0, 1, 8, 9],
+    &[0, 1, 2, 4, 5, 6, 7, 8, 9],
+    &[0, 1, 2, 3, 4, 5, 6, 7, 8, 9],
+];
+
+/// What the columns may miss in the corners of the detector, px.
+const LINEAR_PX: f64 = 1e-3;
+/// How far from the boresight a centre is looked for, as a share of half the detector.
+const FARTHEST: f64 = 0.2;
 
 /// Shift at the edge of the field that would not surprise, as a share of the distance from the
 /// boresight: a tenth of what an uncalibrated photographic lens of a narrow field has. Wide fields are bent by more,
@@ -96,6 +102,8 @@ impl EffectKind for Kind {
             camera: surroundings.camera.clone(),
             centre,
             terms,
+            about: [0.0; TERMS.len()],
+            off_centre: false,
             stands_for: 1.0,
         };
         Ok(Box::new(Shifted::new(brown, values)))
@@ -118,6 +126,8 @@ impl EffectKind for Kind {
                     camera: scene.surroundings.camera.clone(),
                     centre: Pixel::default(),
                     terms: terms.to_vec(),
+                    about: [0.0; TERMS.len()],
+                    off_centre: terms.len() == TERMS.len(),
                     stands_for,
                 })
             })
@@ -131,8 +141,27 @@ struct Brown {
     centre: Pixel,
     /// Which of [`TERMS`] it has.
     terms: Vec<usize>,
+    /// Values of [`TERMS`] at which the map is made linear.
+    about: [f64; TERMS.len()],
+    /// Whether the centre is looked for.
+    off_centre: bool,
     /// Of how many that are looked at it is one.
     stands_for: f64,
+}
+
+impl Brown {
+    fn bend(&self, at: Pixel, values: &[f64; TERMS.len()]) -> Bend {
+        let (at, centre) = (self.camera.tangent(at), self.camera.tangent(self.centre));
+        Bend::at(values, [centre.x, centre.y], [at.x, at.y])
+    }
+
+    fn all(&self, values: &[f64]) -> [f64; TERMS.len()] {
+        let mut all = [0.0; TERMS.len()];
+        for (&k, &value) in self.terms.iter().zip(values) {
+            all[k] = value;
+        }
+        all
+    }
 }
 
 impl Shift for Brown {
@@ -149,6 +178,7 @@ impl Shift for Brown {
             size / edge,
             size / edge.powi(3),
             size / edge.powi(5),
+            size / edge.powi(7),
             size / edge.powi(2),
             size / edge.powi(2),
             size / edge,
@@ -161,31 +191,118 @@ impl Shift for Brown {
             .map(|&k| Coefficient::new(TERMS[k], "", plausible[k]))
             .collect()
     }
+    fn nonlinear(&self) -> Vec<Nonlinear> {
+        if !self.off_centre {
+            return Vec::new();
+        }
+        let half = self.camera.half_size_px();
+        let axis = |name, value: f64, half: f64| Nonlinear {
+            name,
+            unit: "px",
+            value,
+            range: [-FARTHEST * half, FARTHEST * half],
+            step: FARTHEST * half / 4.0,
+        };
+        vec![
+            axis("cx_px", self.centre.x, half[0]),
+            axis("cy_px", self.centre.y, half[1]),
+        ]
+    }
+    fn with_nonlinear(&self, values: &[f64]) -> Option<Self> {
+        let inside = self
+            .nonlinear()
+            .iter()
+            .zip(values)
+            .all(|(n, v)| (n.range[0]..=n.range[1]).contains(v));
+        inside.then(|| Self {
+            centre: Pixel {
+                x: values[0],
+                y: values[1],
+            },
+            ..self.clone()
+        })
+    }
+    fn refined(&self, values: &[f64]) -> Option<Self> {
+        let all = self.all(values);
+        let [half_x, half_y] = self.camera.half_size_px();
+        let [fx, fy] = self.camera.focal_length_px();
+        let mut terms = [[0.0; 2]; TERMS.len()];
+        let off = [
+            (half_x, half_y),
+            (-half_x, half_y),
+            (half_x, -half_y),
+            (-half_x, -half_y),
+        ]
+        .into_iter()
+        .map(|(x, y)| {
+            let star = StarView {
+                t_s: 0.0,
+                slot: 0,
+                star_id: 0,
+                mag: f64::NAN,
+                bv: f64::NAN,
+                at: Pixel { x, y },
+            };
+            self.terms(&star, &mut terms[..values.len()]);
+            let exact = self.bend(star.at, &all).shift;
+            let sum = |axis: usize| {
+                terms
+                    .iter()
+                    .zip(values)
+                    .map(|(t, v)| t[axis] * v)
+                    .sum::<f64>()
+            };
+            f64::max(
+                (sum(0) - fx * exact[0]).abs(),
+                (sum(1) - fy * exact[1]).abs(),
+            )
+        })
+        .fold(0.0, f64::max);
+        (off > LINEAR_PX).then(|| self.clone().exactly(values))
+    }
+    fn linear_about(&self) -> Vec<(&'static str, f64)> {
+        let own = self.terms.iter().map(|&k| (TERMS[k], self.about[k]));
+        own.filter(|(_, value)| *value != 0.0).collect()
+    }
+    fn beside_form(&self, values: &[(&'static str, f64)]) -> Option<Self> {
+        let mut about = [0.0; TERMS.len()];
+        for &k in &self.terms {
+            let value = values.iter().find(|(name, _)| *name == TERMS[k]);
+            about[k] = value.map_or(0.0, |v| v.1);
+        }
+        (!values.is_empty()).then(|| Self {
+            about,
+            ..self.clone()
+        })
+    }
+    fn exactly(self, values: &[f64]) -> Self {
+        Self {
+            about: self.all(values),
+            ..self
+        }
+    }
     fn stands_for(&self) -> f64 {
         self.stands_for
     }
     fn terms(&self, star: &StarView, out: &mut [[f64; 2]]) {
-        let off = Pixel {
-            x: star.at.x - self.centre.x,
-            y: star.at.y - self.centre.y,
-        };
-        let t = self.camera.tangent(off);
-        let (x, y) = (t.x, t.y);
-        let r2 = x * x + y * y;
-        let [fx, fy] = self.camera.focal_length_px();
-        let all = [
-            [fx * x, fy * y],
-            [fx * x * r2, fy * y * r2],
-            [fx * x * r2 * r2, fy * y * r2 * r2],
-            [fx * 2.0 * x * y, fy * (r2 + 2.0 * y * y)],
-            [fx * (r2 + 2.0 * x * x), fy * 2.0 * x * y],
-            [fx * x, 0.0],
-            [fx * y, 0.0],
-            [fx * x * x, fy * x * y],
-            [fx * x * y, fy * y * y],
-        ];
+        let bend = self.bend(star.at, &self.about);
+        let mut left = bend.shift;
+        let mut square = 0.0;
+        for &k in &self.terms {
+            for axis in 0..2 {
+                left[axis] -= self.about[k] * bend.slopes[k][axis];
+            }
+            square += self.about[k].powi(2);
+        }
+        let focal = self.camera.focal_length_px();
         for (out, &k) in out.iter_mut().zip(&self.terms) {
-            *out = all[k];
+            // what the slopes leave of the shift goes by the coefficients' sizes
+            let share = if square > 0.0 {
+                self.about[k] / square
+            } else {
+                0.0
+            };
+            *out = [0, 1].map(|axis| focal[axis] * (bend.slopes[k][axis] + share * left[axis]));
         }
     }
     fn parameters(&self, values: &[f64]) -> Vec<Parameter> {

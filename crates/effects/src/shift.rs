@@ -18,7 +18,8 @@ use star_tracker::{Disturbance, Stages, StarView};
 
 use crate::candidate::check_columns;
 use crate::{
-    AttitudeRows, Candidate, Coefficient, Effect, EffectError, Parameter, StarRows, Surroundings,
+    AttitudeRows, Candidate, Coefficient, Effect, EffectError, Nonlinear, Parameter, StarRows,
+    Surroundings,
 };
 
 /// Most terms of one effect.
@@ -57,6 +58,34 @@ pub(crate) trait Shift: Clone + Debug + Send + Sync + 'static {
     /// What tells it from others of its kind.
     fn selectors(&self) -> BTreeMap<String, String> {
         BTreeMap::new()
+    }
+    /// See [`Candidate::nonlinear`].
+    fn nonlinear(&self) -> Vec<Nonlinear> {
+        Vec::new()
+    }
+    /// See [`Candidate::with_nonlinear`].
+    fn with_nonlinear(&self, values: &[f64]) -> Option<Self> {
+        let _ = values;
+        None
+    }
+    /// See [`Candidate::refined`].
+    fn refined(&self, values: &[f64]) -> Option<Self> {
+        let _ = values;
+        None
+    }
+    /// See [`Candidate::linear_about`].
+    fn linear_about(&self) -> Vec<(&'static str, f64)> {
+        Vec::new()
+    }
+    /// See [`Candidate::beside_form`].
+    fn beside_form(&self, values: &[(&'static str, f64)]) -> Option<Self> {
+        let _ = values;
+        None
+    }
+    /// The same with terms of which `terms x values` is the exact shift at these `values`, where that differs.
+    fn exactly(self, values: &[f64]) -> Self {
+        let _ = values;
+        self
     }
     /// See [`Candidate::choices`].
     fn choices(&self) -> usize {
@@ -98,7 +127,10 @@ pub(crate) struct Shifted<S> {
 impl<S: Shift> Shifted<S> {
     pub(crate) fn new(shift: S, values: Vec<f64>) -> Self {
         assert!(values.len() <= MAX_TERMS, "at most {MAX_TERMS} terms");
-        Self { shift, values }
+        Self {
+            shift: shift.exactly(&values),
+            values,
+        }
     }
 
     fn total(&self, star: &StarView) -> [f64; 2] {
@@ -163,6 +195,21 @@ impl<S: Shift> Candidate for ShiftCandidate<S> {
     }
     fn coefficients(&self) -> &[Coefficient] {
         &self.coefficients
+    }
+    fn nonlinear(&self) -> Vec<Nonlinear> {
+        self.shift.nonlinear()
+    }
+    fn with_nonlinear(&self, values: &[f64]) -> Option<Box<dyn Candidate>> {
+        self.shift.with_nonlinear(values).map(Self::boxed)
+    }
+    fn refined(&self, values: &[f64]) -> Option<Box<dyn Candidate>> {
+        self.shift.refined(values).map(Self::boxed)
+    }
+    fn linear_about(&self) -> Vec<(&'static str, f64)> {
+        self.shift.linear_about()
+    }
+    fn beside_form(&self, values: &[(&'static str, f64)]) -> Option<Box<dyn Candidate>> {
+        self.shift.beside_form(values).map(Self::boxed)
     }
     fn choices(&self) -> usize {
         self.shift.choices()

@@ -25,8 +25,8 @@ use crate::image_level::{self, ImageLevel, Side};
 use crate::motion::{self, Around, gyro::with_rates, source};
 use crate::outcome::Closed;
 use crate::search::catalogue;
-use crate::search::family;
 use crate::search::orbits::{self, Look};
+use crate::search::{family, forms};
 use crate::situation::Situation;
 use crate::star::data::{Inputs, Star, StarData};
 use crate::star::evidence::StarEvidence;
@@ -231,6 +231,7 @@ impl Known<'_> {
             let same = candidate.filter(|c| cause(c.as_ref()) == cause(form.as_ref()));
             if let Some(candidate) = same {
                 candidate.clone_from(form);
+                forms::along(list, *g);
             }
         }
     }
