@@ -469,7 +469,7 @@ fn suffice(
 /// Families of the chosen effects that see the acceleration, where it comes from the samples of a reference
 /// that errs slowly: such a path follows the error, and what it makes of it goes with the error itself.
 fn of_own_path(level: &StarEvidence<'_>, searched: &Searched<'_>) -> Vec<String> {
-    if searched.wander.is_none() || !level.own_paths {
+    if searched.slow_error().is_none() || !level.own_paths {
         return Vec::new();
     }
     let chosen = searched.found.selection.chosen.iter();

@@ -43,7 +43,6 @@ mod outcome;
 mod questions;
 mod search;
 mod situation;
-mod standing_out;
 mod star;
 mod unexplained;
 

@@ -47,6 +47,7 @@ mod multitaper;
 mod psd;
 pub mod robust;
 mod slepian;
+pub mod standing_out;
 mod welch;
 mod window;
 

@@ -36,10 +36,10 @@ use crate::search::refusal::{Refusal, Refused};
 use crate::search::selection::columns_of;
 use crate::search::{Found, amplitudes, borrowed, fit};
 use crate::situation::{Situation, channels_of_interest};
-use crate::standing_out::mark;
 use crate::unexplained::leftover::{self, Series};
 use nalgebra::{DVector, UnitQuaternion};
 use spectra::robust::median_step;
+use spectra::standing_out::mark;
 use telemetry::AttitudeResiduals;
 use telemetry::report::{Errors, Report, Rows};
 

@@ -8,8 +8,8 @@
 
 use rayon::prelude::*;
 use spectra::robust;
+use spectra::standing_out::happened;
 
-use crate::standing_out::happened;
 use crate::star::data::StarData;
 
 /// A star with fewer rows has no scatter of its own: the median deviation of so many

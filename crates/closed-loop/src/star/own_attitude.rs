@@ -11,11 +11,11 @@ use std::collections::BTreeMap;
 use block_regression::Folds;
 use focal_plane::rotation_vector;
 use rayon::prelude::*;
+use spectra::standing_out;
 use telemetry::AttitudeResiduals;
 
 use crate::evidence::Residuals;
 use crate::situation::Situation;
-use crate::standing_out;
 use crate::star::data::StarData;
 use crate::star::frame_rotation::rotation_of;
 use crate::star::settling::Settled;

@@ -381,12 +381,12 @@ fn explain(
         }
     }
     if let (None, false, Some(reference)) = (path, by_rates, reference)
-        && let Some(wander) = &outcome.searched.wander
+        && let Some(noise) = outcome.searched.slow_error()
         && let Some((residual, _)) = &inside
         && outcome.follows_own_path()
     {
         let residual = [residual[0].as_slice(), &residual[1]];
-        if let Some(path) = steadied(data, reference, wander, residual, &level.weight) {
+        if let Some(path) = steadied(data, reference, noise, residual, &level.weight) {
             progress("searching again along the path less the reference's slow error");
             return Ok(Explained::Steadier(path));
         }

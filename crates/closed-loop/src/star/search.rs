@@ -237,6 +237,18 @@ fn prepared(
 }
 
 impl Searched<'_> {
+    /// The noise of what was found, or of what the model declares, where the reference errs slowly.
+    pub(crate) fn slow_error(&self) -> Option<&CommonNoise> {
+        let found = self.wander.as_ref().map(|w| &w.noise);
+        let declared = || self.evidence.as_ref()?.noise.as_ref();
+        let noise = found.or_else(declared)?;
+        noise
+            .reference
+            .iter()
+            .any(|axis| axis.slow > 0.0)
+            .then_some(noise)
+    }
+
     /// Of white evidence alone.
     fn plain(found: Found) -> Self {
         Self {

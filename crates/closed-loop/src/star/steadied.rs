@@ -13,21 +13,20 @@
 //!
 //! Source: Henderson 1975 (best linear unbiased prediction); Fuller 1987 (regression calibration).
 
-use coloured_noise::Rotations;
+use coloured_noise::{CommonNoise, Rotations};
 use focal_plane::AttitudeSeries;
 use nalgebra::Vector3;
 
 use crate::motion::turned_by;
 use crate::star::data::StarData;
 use crate::star::frame_rotation::Turns;
-use crate::star::search::Wander;
 
 /// `reference` less its slow error; `residual` by rows, arcsec: what the best fit leaves, that error with it.
 /// `None` where hardly a frame tells of it.
 pub(crate) fn steadied(
     data: &StarData,
     reference: &AttitudeSeries,
-    wander: &Wander,
+    noise: &CommonNoise,
     residual: [&[f64]; 2],
     weight: &[f64],
 ) -> Option<AttitudeSeries> {
@@ -42,7 +41,6 @@ pub(crate) fn steadied(
         .flat_map(|theta| [theta.x, theta.y, theta.z])
         .collect();
     let t_s = &data.frames.t_s;
-    let noise = &wander.noise;
     let frames = vec![1; t_s.len()];
     let slow = Rotations::new(t_s.clone(), theta, frames, inverse, noise.centroid).slow_part(noise);
     let back = data.turn().inverse();

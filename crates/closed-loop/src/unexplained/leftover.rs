@@ -19,11 +19,11 @@ use coloured_noise::Coloured;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3, Vector4};
 use rayon::prelude::*;
 use spectra::robust::median_step;
+use spectra::standing_out::mark;
 
 use crate::attitude::spatial_errors::SpatialErrors;
 use crate::bins::{self, Bins};
 use crate::figures;
-use crate::standing_out::mark;
 use crate::star::data::StarData;
 use crate::star::frame_rotation::rotation_row;
 use crate::unexplained::SEARCH_ALPHA;

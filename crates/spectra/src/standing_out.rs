@@ -2,7 +2,7 @@
 //!
 //! Not physics: bookkeeping of rows.
 
-use spectra::robust;
+use crate::robust;
 
 /// Samples in a row, and part of their rows: where more than that stands out something happened.
 const TOGETHER: usize = 16;
@@ -10,8 +10,19 @@ const PART: usize = 3;
 /// Part of all rows from which what happened matters: a tracker loses its stars for a minute now and then.
 const LASTS: usize = 20;
 
-/// Of each sample whether it lies among so many of which too large a part stands out; `out` of `all` of its rows do.
-pub(crate) fn happened(out: &[usize], all: &[usize]) -> Vec<bool> {
+/// Of each sample whether it lies among 16 in a row of which more than a third of the rows stand out, and all that do
+/// so are a twentieth of the rows or more; `out` of `all` of the rows of each sample stand out.
+///
+/// ```
+/// // the last thirty of a hundred samples
+/// let out: Vec<usize> = (0..100).map(|k| usize::from(k >= 70)).collect();
+/// assert!(spectra::standing_out::happened(&out, &[1; 100])[99]);
+/// // one sample alone is an outlier
+/// let out: Vec<usize> = (0..100).map(|k| usize::from(k == 70)).collect();
+/// assert!(!spectra::standing_out::happened(&out, &[1; 100])[70]);
+/// ```
+#[must_use]
+pub fn happened(out: &[usize], all: &[usize]) -> Vec<bool> {
     let mut happened = vec![false; out.len()];
     let starts = out.windows(TOGETHER).zip(all.windows(TOGETHER)).enumerate();
     for (first, (out, all)) in starts {
@@ -28,8 +39,13 @@ pub(crate) fn happened(out: &[usize], all: &[usize]) -> Vec<bool> {
     happened
 }
 
-/// Marks the values of a series that stand out, but where something happened; returns how many.
-pub(crate) fn mark(value: &[f64], marked: &mut [bool]) -> usize {
+/// Marks the values of a series that stand out by the rule of [`robust`], but where something
+/// [`happened`]; returns how many were added.
+///
+/// # Panics
+///
+/// Unless both slices have one length.
+pub fn mark(value: &[f64], marked: &mut [bool]) -> usize {
     let mut out = marked.to_vec();
     robust::mark_outliers(value, &vec![0; value.len()], 1, &mut out);
     let count: Vec<usize> = out.iter().map(|o| usize::from(*o)).collect();
