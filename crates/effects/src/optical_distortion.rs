@@ -50,6 +50,9 @@ const SETS_OF_ITS_OWN: [&[usize]; 4] = [
 
 /// What the columns may miss in the corners of the detector, px.
 const LINEAR_PX: f64 = 1e-3;
+/// What r^6 bends the edge of the field by, px, from which it is looked for, and the centre of the lens with it, where the
+/// image is in proportion to the angle: k3 = -1/7. In narrow fields such a lens has nothing to bend but each star by itself.
+const WIDE_PX: f64 = 0.1;
 /// How far from the boresight a centre is looked for, as a share of half the detector.
 const FARTHEST: f64 = 0.2;
 
@@ -112,10 +115,12 @@ impl EffectKind for Kind {
         if !scene.has_stars {
             return Vec::new();
         }
-        let own: &[&[usize]] = if scene.has_reference {
-            &[]
-        } else {
-            &SETS_OF_ITS_OWN
+        let [half, _] = scene.surroundings.camera.half_size_px();
+        let edge = half / scene.surroundings.camera.focal_length_px()[0];
+        let own: &[&[usize]] = match scene.has_reference {
+            true => &[],
+            false if half * edge.powi(6) / 7.0 > WIDE_PX => &SETS_OF_ITS_OWN,
+            false => &SETS_OF_ITS_OWN[..SETS_OF_ITS_OWN.len() - 1],
         };
         // sets share their terms: there is as much to be found by chance as there are of these
         let stands_for = TERMS.len() as f64 / (SETS.len() + own.len()) as f64;

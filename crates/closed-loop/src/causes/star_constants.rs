@@ -45,6 +45,7 @@ const BESIDE: f64 = 0.1;
 const TOGETHER: usize = 8;
 /// Name in the report.
 const STAR: &str = "star";
+const SLOT: &str = "slot";
 
 /// What was chosen, and what it leaves of resting stars.
 pub(crate) struct Constants<'a> {
@@ -216,27 +217,41 @@ impl<'a> Constants<'a> {
             return;
         };
         let paid = described.looked() + BY_FAR;
+        let of = |parts: &[Part]| {
+            let (_, mut shifts) = self.shifting();
+            shifts.extend(parts.iter().map(|part| term_of(described, part)));
+            let means = Means::of(self.level, &shifts, &self.left);
+            let each = standing.len()..shifts.len();
+            let judged = each.map(|own| {
+                let with = [standing.as_slice(), &[own]].concat();
+                let share = means.scatter(&with).map_or(0.0, |(share, _)| share);
+                let gain = means.gain(&with, &[own]);
+                // one slope that explains the same is before many stars
+                let stands = gain > paid || gain > 0.0 && means.are_noise(&with);
+                (stands, gain, share)
+            });
+            judged.collect::<Vec<_>>()
+        };
         let (mut before, mut behind) = (Vec::new(), Vec::new());
-        for entry in std::mem::take(&mut unattributed.depends_on) {
+        let mut entries = std::mem::take(&mut unattributed.depends_on);
+        // rows hardly pay for all slots: fewer numbers than stars may hold all that these hold
+        let slots = described.parts_of(SLOT);
+        let slots = slots.into_iter().max_by_key(|(_, columns)| columns.len());
+        let slots = slots.and_then(|all| of(&[all]).pop());
+        if let Some((true, _, own)) = slots.filter(|(_, _, own)| share > 2.0 * own) {
+            entries.retain(|e| e.variable != SLOT);
+            before.push(Dependence {
+                variable: SLOT.to_owned(),
+                variance_explained: share - own,
+                p_value,
+            });
+            share = own;
+        }
+        for entry in entries {
             if entry.variable == STAR || entry.variable == IN_TIME {
                 continue;
             }
             let parts = described.parts_of(&entry.variable);
-            let of = |parts: &[Part]| {
-                let (_, mut shifts) = self.shifting();
-                shifts.extend(parts.iter().map(|part| term_of(described, part)));
-                let means = Means::of(self.level, &shifts, &self.left);
-                let each = standing.len()..shifts.len();
-                let judged = each.map(|own| {
-                    let with = [standing.as_slice(), &[own]].concat();
-                    let share = means.scatter(&with).map_or(0.0, |(share, _)| share);
-                    let gain = means.gain(&with, &[own]);
-                    // one slope that explains the same is before many stars
-                    let stands = gain > paid || gain > 0.0 && means.are_noise(&with);
-                    (stands, gain, share)
-                });
-                judged.collect::<Vec<_>>()
-            };
             let gains = parts.chunks(TOGETHER).flat_map(of);
             let best = gains.max_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
             let (stands, own) = best.map_or((true, share), |(stands, _, own)| (stands, own));
