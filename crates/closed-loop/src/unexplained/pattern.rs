@@ -34,11 +34,11 @@
 
 use std::ops::Range;
 
-use block_regression::Folds;
+use block_regression::{Folds, beyond};
 use nalgebra::{Cholesky, Matrix2, Matrix4, Vector2, Vector4};
 use pulp::Arch;
 use rayon::prelude::*;
-use statrs::distribution::{ContinuousCDF, FisherSnedecor};
+use statrs::distribution::FisherSnedecor;
 use telemetry::report::{Dependence, Unattributed};
 
 use crate::star::data::StarData;
@@ -647,5 +647,5 @@ fn hotelling(clusters: &[Vector4<f64>]) -> Option<f64> {
     let covariance = spread * (n / (n - 1.0));
     let square = sum.dot(&Cholesky::new(covariance)?.solve(&sum));
     let law = FisherSnedecor::new(4.0, n - 4.0).ok()?;
-    Some(law.sf(square * (n - 4.0) / (4.0 * (n - 1.0))))
+    Some(beyond(&law, square * (n - 4.0) / (4.0 * (n - 1.0))))
 }

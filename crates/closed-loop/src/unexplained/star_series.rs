@@ -21,6 +21,7 @@
 
 use std::cell::LazyCell;
 
+use block_regression::beyond;
 use rayon::prelude::*;
 use spectra::robust::median_step;
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
@@ -298,11 +299,17 @@ impl Lines {
         // power over what is usual around, and how many it is the mean of
         let relative = |p: &Vec<f64>| -> (f64, f64) {
             let (sum, count) = USUAL.sum(p, k);
-            (p[k] * count / sum, count)
+            let ratio = p[k] * count / sum;
+            // a star of one value has no power around, and says nothing
+            if sum > 0.0 && ratio.is_finite() {
+                (ratio, count)
+            } else {
+                (1.0, 0.0)
+            }
         };
         let chance = |mean: f64, of: f64, around: f64, share: f64| -> f64 {
             FisherSnedecor::new(4.0 * share * of, 4.0 * share * around)
-                .map_or(1.0, |law| law.sf(mean))
+                .map_or(1.0, |law| beyond(&law, mean))
         };
         let stars = self.power.len() as f64;
         let each: Vec<(f64, f64)> = self.power.iter().map(relative).collect();
@@ -597,6 +604,15 @@ mod tests {
             assert!(size < 1.0 || found.jump_s == Some(290.25));
             assert_eq!(found.line_hz, None, "{size}");
         }
+    }
+
+    /// Stars that have no noise have no line, and nothing to hold one against.
+    #[test]
+    fn stars_of_one_value_have_no_line() {
+        let data = at_rest((0..1500).map(|k| 0.5 * f64::from(k)).collect());
+        let still = [(); 2].map(|()| vec![0.0; data.t_s.len()]);
+        let found = search(&data, &still, || still.clone(), &vec![1.0; data.t_s.len()]);
+        assert_eq!((found.line_hz, found.jump_s), (None, None));
     }
 
     /// A jump that all stars share and each by itself is one.
