@@ -31,7 +31,7 @@ use crate::causes::commonness::{self, IN_TIME, MOSTLY, stars_first};
 use crate::figures;
 use crate::star::data::StarData;
 use crate::unexplained::around::Around;
-use crate::unexplained::grid::{Grid, top};
+use crate::unexplained::grid::{Grid, coherent_s, top};
 use crate::unexplained::star_freedom::Freedom;
 use by_place::by_place;
 
@@ -155,14 +155,15 @@ pub(crate) fn search(
         p_value: 1.0,
         ..OwnSeries::default()
     };
-    let (Some(&first), Some(&last)) = (data.frames.t_s.first(), data.frames.t_s.last()) else {
+    let span_s = coherent_s(&data.frames.t_s);
+    if span_s <= 0.0 {
         return out;
-    };
-    out.bin_hz = 1.0 / (last - first);
+    }
+    out.bin_hz = 1.0 / span_s;
     out.apart_s = NEAR_STEPS * median_step(&data.frames.t_s).unwrap_or(0.0);
-    let apart = LazyCell::new(|| Lines::of(&by_itself, *beside_rotation, last - first));
+    let apart = LazyCell::new(|| Lines::of(&by_itself, *beside_rotation, span_s));
     let line_in = |series: &[Own]| {
-        let lines = Lines::of(series, freedom, last - first)?;
+        let lines = Lines::of(series, freedom, span_s)?;
         let (k, found) = lines.best(series)?;
         let apart = apart.as_ref()?;
         let alone = (k < apart.grid.bins).then(|| apart.at(k))?;
