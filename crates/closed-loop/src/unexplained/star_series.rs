@@ -124,6 +124,8 @@ impl OwnSeries {
 struct Own {
     t_s: Vec<f64>,
     value: [Vec<f64>; 2],
+    /// Squares of its rows, both axes.
+    rows_squares: f64,
     /// Rows that a point is the mean of: its variance is one over it.
     count: Vec<f64>,
     /// Sums of the rows, and of both axes over them, before each point.
@@ -150,7 +152,8 @@ pub(crate) fn search(
         Freedom::WHOLE
     };
     let series = series(data, own, weight);
-    let rows: f64 = series.iter().map(|s| s.count.iter().sum::<f64>()).sum();
+    // neighbours tell the noise, and slow noise is more than that: a share is of all that the rows have
+    let all: f64 = series.iter().map(|s| s.rows_squares).sum();
     let mut out = OwnSeries {
         p_value: 1.0,
         ..OwnSeries::default()
@@ -188,7 +191,7 @@ pub(crate) fn search(
     }
     for found in [&line, &jump].into_iter().flatten() {
         out.p_value = out.p_value.min(found.p_value);
-        out.explained = out.explained.max(found.squares / (2.0 * rows));
+        out.explained = out.explained.max(found.squares / all);
     }
     out.places = match (&line, &jump) {
         (Some(line), jump) if jump.is_none_or(|t| t.squares <= line.squares) => {
@@ -257,6 +260,7 @@ fn series(data: &StarData, own: &[Vec<f64>], weight: &[f64]) -> Vec<Own> {
             left.iter_mut().for_each(|v| *v /= noise);
             left
         });
+        let rows_squares = value.iter().flatten().map(|v| v * v).sum();
         let (mut t_s, mut count) = (Vec::new(), Vec::new());
         let mut means = [Vec::new(), Vec::new()];
         for at in (0..rows.len()).step_by(size) {
@@ -268,7 +272,7 @@ fn series(data: &StarData, own: &[Vec<f64>], weight: &[f64]) -> Vec<Own> {
             }
             count.push(k);
         }
-        Some(Own::of(t_s, means, count))
+        Some(Own::of(t_s, means, count, rows_squares))
     });
     each.collect()
 }
@@ -439,7 +443,7 @@ impl Sums {
 
 impl Own {
     /// With the sums of the rows.
-    fn of(t_s: Vec<f64>, value: [Vec<f64>; 2], count: Vec<f64>) -> Self {
+    fn of(t_s: Vec<f64>, value: [Vec<f64>; 2], count: Vec<f64>, rows_squares: f64) -> Self {
         let sums = |of: &dyn Fn(usize) -> f64| -> Vec<f64> {
             let mut all = vec![0.0];
             for k in 0..count.len() {
@@ -452,6 +456,7 @@ impl Own {
             running: [0, 1].map(|a| sums(&|k| count[k] * value[a][k])),
             t_s,
             value,
+            rows_squares,
             count,
         }
     }
@@ -510,7 +515,12 @@ impl Own {
                 *v -= a * c + b * s;
             }
         }
-        Self::of(self.t_s.clone(), value, self.count.clone())
+        Self::of(
+            self.t_s.clone(),
+            value,
+            self.count.clone(),
+            self.rows_squares,
+        )
     }
 
     /// Squares that a sinusoid takes of both axes, in units of the noise, at the frequencies of
@@ -590,6 +600,9 @@ mod tests {
                 "{size}: {off}"
             );
             assert_eq!(found.jump_s, None, "{size}");
+            // of a variance of a half of the size's square, beside that of the noise; a line takes a little noise too
+            let share = 0.5 * size * size / (1.0 + 0.5 * size * size);
+            assert!((found.explained - share).abs() < 0.01, "{size}: {found:?}");
         }
         assert_eq!(swing(0.5, 0.0).line_hz, None);
     }
