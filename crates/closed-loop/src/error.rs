@@ -42,6 +42,20 @@ pub enum CloseError {
         /// Where the others went.
         why: &'static str,
     },
+    /// No rows are left of the stars.
+    #[error(
+        "table stars: of {rows} rows those of {frames} frames are left, and {need} frames are needed at least: {where_to}"
+    )]
+    NoRowsLeft {
+        /// Rows of the table.
+        rows: usize,
+        /// Frames that have some left.
+        frames: usize,
+        /// The least that is needed.
+        need: usize,
+        /// Where the others went.
+        where_to: String,
+    },
     /// Nothing was measured while the reference was there.
     #[error(
         "table {what} spans {} to {} s and table reference {} to {} s: they have no time in common", measured_s[0], measured_s[1], reference_s[0], reference_s[1]
