@@ -29,7 +29,7 @@ pub(super) fn in_a_line_each(page: &mut Page, report: &Report) {
             escaped(&selectors(&effect.selectors)),
             escaped(meaning(&effect.id)),
             escaped(&sizes.join(", ")),
-            p_is(effect.p_value),
+            escaped(&p_is(effect.p_value)),
             effect
                 .variance_explained
                 .map_or_else(String::new, |v| format!(
