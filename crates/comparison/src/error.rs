@@ -29,6 +29,26 @@ pub enum ComparisonError {
         /// Frames whose stars do not fix an attitude.
         unsolved: usize,
     },
+    /// A residual that has no scale.
+    #[error(
+        "the residual about {axis}: most of {frames} frames are outliers beside the others (8 robust sigma), so that it has no standard deviation to compare; are attitude and reference in one frame and on one clock?"
+    )]
+    MostlyOutliers {
+        /// The axis.
+        axis: &'static str,
+        /// Frames with a residual.
+        frames: usize,
+    },
+    /// Draws that have no attitude in next to all frames.
+    #[error(
+        "a model has no attitude in {lost} of the {frames} frames with a residual (no stars in its field, or an exposure beyond the reference): too few are left to compare"
+    )]
+    NothingFlown {
+        /// Frames with a residual.
+        frames: usize,
+        /// Those without an attitude of a draw.
+        lost: usize,
+    },
     /// A star without a direction.
     #[error("star {id} of table `stars` is not in table `catalog`")]
     UnknownStar {

@@ -29,6 +29,7 @@ use telemetry::report::StarSource;
 use telemetry::{Bundle, Model, ModelKind};
 
 use crate::ComparisonError;
+use crate::residual::are_most;
 use crate::stars::Stars;
 
 /// Frames that are simulated at once: bounds the memory of a draw.
@@ -259,7 +260,7 @@ fn starless<'a>(t_s: &'a [f64], first_row: &'a [usize]) -> Rows<'a> {
 pub(crate) fn without_outliers(theta: &mut [f64]) {
     let group = vec![0; theta.len()];
     let mut out = vec![false; theta.len()];
-    while robust::mark_outliers(theta, &group, 1, &mut out) > 0 {}
+    while robust::mark_outliers(theta, &group, 1, &mut out) > 0 && !are_most(&out) {}
     let median = robust::median(&mut theta.to_vec()).unwrap_or(0.0);
     for (value, out) in theta.iter_mut().zip(out) {
         if out || !value.is_finite() {

@@ -28,7 +28,7 @@ use crate::ComparisonError;
 pub const AXES: [&str; 3] = ["x", "y", "z"];
 
 /// Frames that a spectrum and a fit need at least.
-const NEED: usize = 16;
+pub(crate) const NEED: usize = 16;
 
 /// Where the measured attitude came from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -62,7 +62,7 @@ impl Residual {
     /// # Errors
     ///
     /// No reference, neither attitude nor stars with a camera, a star without direction, or fewer
-    /// than 16 frames.
+    /// than 16 frames, or most of them outliers.
     pub fn of(bundle: &Bundle) -> Result<Self, ComparisonError> {
         let reference = Self::reference(bundle)?;
         let (t_s, q, unsolved, measured_by) = match (&bundle.attitude, &bundle.stars) {
@@ -98,6 +98,7 @@ impl Residual {
             });
         }
         out.mark_outliers();
+        out.check_outliers()?;
         Ok(out)
     }
 
@@ -109,11 +110,23 @@ impl Residual {
         Ok(table.series_with_gaps()?)
     }
 
-    /// Marks until nothing new turns up: a mask changes the scale that it is judged by.
+    /// Marks until nothing new turns up: a mask changes the scale that it is judged by. A median tells nothing of rows
+    /// of which most are marked, and the scale would go on to shrink until none is left.
     fn mark_outliers(&mut self) {
         let group = vec![0; self.t_s.len()];
         for (values, outlier) in self.arcsec.iter().zip(&mut self.outlier) {
-            while robust::mark_outliers(values, &group, 1, outlier) > 0 {}
+            while robust::mark_outliers(values, &group, 1, outlier) > 0 && !are_most(outlier) {}
+        }
+    }
+
+    /// Refuses a residual of which most are outliers.
+    fn check_outliers(&self) -> Result<(), ComparisonError> {
+        match (0..3).find(|&axis| are_most(&self.outlier[axis])) {
+            None => Ok(()),
+            Some(axis) => Err(ComparisonError::MostlyOutliers {
+                axis: AXES[axis],
+                frames: self.t_s.len(),
+            }),
         }
     }
 
@@ -142,6 +155,11 @@ impl Residual {
     pub fn std_arcsec(&self, axis: usize) -> f64 {
         std_of(&self.kept(axis))
     }
+}
+
+/// Whether more than half are marked.
+pub(crate) fn are_most(marked: &[bool]) -> bool {
+    2 * marked.iter().filter(|m| **m).count() > marked.len()
 }
 
 /// `values` with NaN where `out`.
@@ -229,4 +247,30 @@ pub(crate) fn directions(
         let of = |id: &i64| known.get(id).unwrap_or(&nowhere)[axis];
         stars.star_id.iter().map(of).collect()
     }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Values of all sizes have no scale: each that is found makes the largest of those left stand out.
+    #[test]
+    fn a_residual_without_a_scale_is_refused() {
+        let mut residual = Residual {
+            t_s: (0..128).map(f64::from).collect(),
+            arcsec: std::array::from_fn(|_| {
+                let each = (0..128).map(|k| [1.0, -1.0][k % 2] * 1.5_f64.powi(k as i32 / 2));
+                each.collect()
+            }),
+            outlier: std::array::from_fn(|_| vec![false; 128]),
+            outside_reference: 0,
+            unsolved: 0,
+            measured_by: MeasuredBy::Attitude,
+        };
+        assert!(residual.check_outliers().is_ok());
+        residual.mark_outliers();
+        assert!(residual.outliers(0) < 128);
+        let refused = residual.check_outliers().unwrap_err().to_string();
+        assert!(refused.contains("about x: most of 128 frames"), "{refused}");
+    }
 }
