@@ -45,6 +45,7 @@ mod search;
 mod situation;
 mod standing_out;
 mod star;
+mod undetermined;
 mod unexplained;
 
 pub use close::{close, close_asking};

@@ -143,6 +143,7 @@ fn on_rows(
     });
     if data.frames.frames() < MIN_FRAMES {
         return Err(CloseError::TooFewFrames {
+            table: "stars",
             frames: data.frames.frames(),
             need: MIN_FRAMES,
             why: "the others lie outside the reference, or have no two stars to solve an attitude from",
