@@ -75,6 +75,18 @@ pub enum AssessError {
         /// Why it stopped.
         reason: String,
     },
+    /// A body whose motion is too long to be integrated.
+    #[error(
+        "a body that turns by {rate_rad_s:.3e} rad/s with an axial ratio of its moments of inertia of {axial_ratio:.3e} turns too often in the {span_s:.0} s of the attitudes to be integrated: attitudes that no rigid body has, or gaps that are too long"
+    )]
+    TooManyTurns {
+        /// Rate of the body that was tried, rad/s.
+        rate_rad_s: f64,
+        /// Axial over transverse moment of inertia.
+        axial_ratio: f64,
+        /// Time that the attitudes span, s.
+        span_s: f64,
+    },
     /// An attitude.
     #[error(transparent)]
     Attitude(#[from] AttitudeError),

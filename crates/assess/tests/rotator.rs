@@ -2,7 +2,9 @@
 
 #![expect(clippy::unwrap_used, reason = "helpers of tests")]
 
-use assess::{Body, Fitter, Free, Inertia, Observed, Rotating, axisymmetric, nutation_rates};
+use assess::{
+    AssessError, Body, Fitter, Free, Inertia, Observed, Rotating, axisymmetric, nutation_rates,
+};
 use focal_plane::{AttitudeSource, rotation_from_vector, rotation_vector};
 use nalgebra::{Matrix4, Quaternion, UnitQuaternion, Vector3, Vector4};
 
@@ -76,6 +78,17 @@ fn integration_meets_the_closed_form() {
         .map(|k| off(-1700.0 + 1.13 * f64::from(k)))
         .fold(0.0, f64::max);
     assert!(worst < 1e-7, "{worst:.1e}");
+}
+
+/// A trial of a fit may turn as fast as it likes: it is refused before memory is.
+#[test]
+fn a_body_that_turns_too_often_is_refused() {
+    let fast = body(Inertia::principal([1.0, 1.4, 1.9]).unwrap(), 40.0);
+    let refused = fast.motion([-1e11, 1e11]).unwrap_err();
+    assert!(
+        matches!(refused, AssessError::TooManyTurns { .. }),
+        "{refused}"
+    );
 }
 
 /// A triaxial body, far from symmetric: energy and momentum stay, by the same bound as above with all of

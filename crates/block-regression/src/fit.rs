@@ -145,6 +145,12 @@ impl Layout {
             None => first + self.residuals - 1,
         }
     }
+
+    /// Mean square of the residual before anything is out, from its Gram and its scalars.
+    fn residual_variance(&self, (gram, scalars): &(DMatrix<f64>, f64)) -> f64 {
+        let k = self.residual(None);
+        gram[(k, k)] / scalars.max(1.0)
+    }
 }
 
 /// All fits that a choice among candidates needs, on one set of Grams.
@@ -169,6 +175,8 @@ pub struct Fits {
     inner_by_source: Vec<DMatrix<f64>>,
     /// Squared length of each candidate column before the nuisance is out.
     raw: Vec<f64>,
+    /// Noise variance that is held for least.
+    least: f64,
     /// [`Folds::prior_blocks`].
     prior: f64,
     /// What all columns say of the noise, once it is asked for.
@@ -279,6 +287,7 @@ impl Fits {
             inner,
             inner_by_source,
             raw: layout.raw(&sums.all.0),
+            least: out_of_fold::least_variance(layout.residual_variance(&sums.all)),
             prior: folds.prior_blocks,
             usual: OnceLock::new(),
         })
@@ -326,6 +335,7 @@ impl Fits {
             inner: Vec::new(),
             inner_by_source: Vec::new(),
             raw: layout.raw(&total.0),
+            least: out_of_fold::least_variance(layout.residual_variance(&total)),
             prior: 0.0,
             usual: OnceLock::new(),
         })
@@ -356,7 +366,8 @@ impl Fits {
             let with = self.whole.get(f).unwrap_or(&self.all);
             let (with, without) = (with.with_prior(set, &unit)?, fold.with_prior(set, &unit)?);
             let (gram, scalars) = &self.held[f];
-            let loglik = with.beyond(&without, *scalars, without.variance(fold, set));
+            let variance = without.variance(fold, set).max(self.least);
+            let loglik = with.beyond(&without, *scalars, variance);
             let beta = fold.shrunk(set, &ridge)?;
             out.add(quadratic(gram, set, &beta), *scalars, loglik);
         }
@@ -365,7 +376,8 @@ impl Fits {
                 self.all.with_prior(set, &unit)?,
                 free.with_prior(set, &unit)?,
             );
-            out.prior = with.beyond(&without, 0.0, with.variance(&self.all, set));
+            let variance = with.variance(&self.all, set).max(self.least);
+            out.prior = with.beyond(&without, 0.0, variance);
         }
         Some(out)
     }
@@ -379,6 +391,7 @@ impl Fits {
                 let fold = &self.folds[f];
                 let beta = fold.shrunk(set, &ridge)?;
                 let variance = fold.with_prior(set, &unit)?.variance(fold, set);
+                let variance = variance.max(self.least);
                 let residual = self.layout.residual(Some(f));
                 let mut z = DVector::zeros(n + self.layout.candidates + self.layout.residuals);
                 z[residual] = 1.0;

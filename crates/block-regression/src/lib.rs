@@ -21,6 +21,7 @@
 //! | fits of any set of candidates | [`Fits`] |
 //! | what they predict where they were not fitted | [`Fits::out_of_fold`], [`OutOfFold`] |
 //! | amplitudes, standard errors, p-values | [`Fits::estimate`], [`Estimate`] |
+//! | chances of ratios that may be no number | [`beyond`] |
 //!
 //! A frame is what was measured at one instant, in any number of scalars. Nuisance columns are in every
 //! fit, each with a prior of its own precision or free; candidates are in a fit if they are asked for.
@@ -76,7 +77,9 @@
 mod fit;
 mod folds;
 mod gram;
+mod tail;
 
 pub use fit::{Estimate, Fits, Layout, OutOfFold};
 pub use folds::Folds;
 pub use gram::{BlockGrams, Design, FoldSums, Gram, add_products, mirror_lower};
+pub use tail::beyond;

@@ -21,6 +21,7 @@ use crate::outcome::Closed;
 use crate::questions::hypothesis::Questions;
 use crate::situation::Situation;
 use crate::star;
+use crate::undetermined;
 
 /// Closes the loop between `model` and `bundle`. `progress` hears what is being
 /// done, in words.
@@ -49,9 +50,10 @@ pub fn close_asking(
     let situation = Situation::join(model, bundle, questions)?;
     conventions::check(&situation)?;
     declared::refuse_on_images(&situation)?;
-    if bundle.stars.is_some() {
+    let closed = if bundle.stars.is_some() {
         star::run(&situation, progress)
     } else {
         attitude::run(&situation, progress)
-    }
+    };
+    closed.map_err(|error| undetermined::in_words(error, model, bundle))
 }

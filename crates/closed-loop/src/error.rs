@@ -33,14 +33,30 @@ pub enum CloseError {
     #[error("nothing to compare: {0}")]
     NothingToCompare(&'static str),
     /// Too little is left after rows were set aside.
-    #[error("{frames} usable frames of at least {need} needed ({why})")]
+    #[error("table {table}: {frames} usable frames of at least {need} needed ({why})")]
     TooFewFrames {
+        /// The table of what was measured.
+        table: &'static str,
         /// Frames that remain.
         frames: usize,
         /// The least that is needed.
         need: usize,
         /// Where the others went.
         why: &'static str,
+    },
+    /// No rows are left of the stars.
+    #[error(
+        "table stars: of {rows} rows those of {frames} frames are left, and {need} frames are needed at least: {where_to}"
+    )]
+    NoRowsLeft {
+        /// Rows of the table.
+        rows: usize,
+        /// Frames that have some left.
+        frames: usize,
+        /// The least that is needed.
+        need: usize,
+        /// Where the others went.
+        where_to: String,
     },
     /// Nothing was measured while the reference was there.
     #[error(
@@ -107,4 +123,33 @@ pub enum CloseError {
         "the declared unknowns cannot be estimated from this data: the normal equations are singular"
     )]
     Singular,
+    /// The same, with what they are.
+    #[error(
+        "table {table}: {rows} rows in {frames} frames do not determine what has to be estimated from them: {unknown}"
+    )]
+    Undetermined {
+        /// The table of what was measured.
+        table: &'static str,
+        /// Its rows.
+        rows: usize,
+        /// Its instants.
+        frames: usize,
+        /// What is not known, with the tables that would tell it.
+        unknown: String,
+    },
+}
+
+impl CloseError {
+    /// Whether it is the bundle that holds too little.
+    #[must_use]
+    pub fn is_of_bundle(&self) -> bool {
+        matches!(
+            self,
+            Self::TooFewFrames { .. }
+                | Self::NoRowsLeft { .. }
+                | Self::NoOverlap { .. }
+                | Self::NothingToCompare(_)
+                | Self::Undetermined { .. }
+        )
+    }
 }

@@ -23,10 +23,10 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use block_regression::{Folds, OutOfFold};
+use block_regression::{Folds, OutOfFold, beyond};
 use effects::Candidate;
 use star_images::{Formed, Stars, Unusable, Variants};
-use statrs::distribution::{ContinuousCDF, StudentsT};
+use statrs::distribution::StudentsT;
 use telemetry::report::{Estimate, FoundEffect, Selector};
 use telemetry::{EffectEntry, EffectValue, WindowTable};
 
@@ -484,7 +484,7 @@ fn one_sided(gain: &[f64]) -> f64 {
     if variance.is_nan() || variance <= 0.0 {
         return if mean > 0.0 { 0.0 } else { 1.0 };
     }
-    StudentsT::new(0.0, 1.0, n - 1.0).map_or(1.0, |law| law.sf(mean / (variance / n).sqrt()))
+    StudentsT::new(0.0, 1.0, n - 1.0).map_or(1.0, |law| beyond(&law, mean / (variance / n).sqrt()))
 }
 
 /// The adopted steps as effects of the report and entries of the model.

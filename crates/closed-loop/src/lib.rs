@@ -44,6 +44,7 @@ mod questions;
 mod search;
 mod situation;
 mod star;
+mod undetermined;
 mod unexplained;
 
 pub use close::{close, close_asking};

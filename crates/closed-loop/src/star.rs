@@ -50,6 +50,7 @@ mod placing;
 mod pointed;
 mod reference_noise;
 mod reference_wander;
+mod rows_left;
 mod run;
 pub(crate) mod search;
 mod seen_directions;

@@ -21,7 +21,7 @@ use spectra::Psd;
 use crate::ensemble::ensemble;
 use crate::fit::first_notes;
 use crate::flight::{Flight, missing, without_outliers};
-use crate::residual::std_of;
+use crate::residual::{NEED, std_of};
 use crate::{AXES, ComparisonError, Ensemble, Residual, Spectrum};
 
 /// Ends of the bands, Hz: below, between and above. \[M23\] reads its figures at 3 mHz (where distortion
@@ -128,6 +128,7 @@ pub fn compare(
         .map(|k| first.iter().any(|theta| missing(theta, k)))
         .collect();
     let count = lost.iter().filter(|lost| **lost).count();
+    check_flown(residual.t_s.len(), count)?;
     if count > 0 {
         notes.push(format!(
             "{count} frames are left out: the model has no attitude there (no stars, or an exposure beyond the reference)"
@@ -223,6 +224,15 @@ pub fn compare(
     })
 }
 
+/// Refuses draws that leave fewer frames than a spectrum needs.
+fn check_flown(frames: usize, lost: usize) -> Result<(), ComparisonError> {
+    if frames - lost >= NEED {
+        Ok(())
+    } else {
+        Err(ComparisonError::NothingFlown { frames, lost })
+    }
+}
+
 /// The reference's own error is in the measured residual; a model has it only where it declares it.
 fn reference_note(bundle: &Bundle, models: &[&Model], kept: &[Vec<f64>; 3]) -> Option<String> {
     let sigmas = bundle.reference.as_ref()?.sigma_arcsec.as_ref()?;
@@ -286,5 +296,18 @@ fn axis(drawn: &Ensemble, measured: &Psd, first: &[f64], silent: bool) -> Compar
         log_psd_cost: whole.map_or(f64::NAN, |s| s.cost),
         above_3_sigma: whole.map_or(f64::NAN, |s| s.above),
         bands,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of no frames there is no spectrum, and no scatter that could be rounding.
+    #[test]
+    fn draws_without_attitudes_are_refused() {
+        assert!(check_flown(20, 4).is_ok());
+        let refused = check_flown(20, 20).unwrap_err().to_string();
+        assert!(refused.contains("20 of the 20 frames"), "{refused}");
     }
 }

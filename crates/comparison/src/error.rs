@@ -29,6 +29,16 @@ pub enum ComparisonError {
         /// Frames whose stars do not fix an attitude.
         unsolved: usize,
     },
+    /// Draws that have no attitude in next to all frames.
+    #[error(
+        "a model has no attitude in {lost} of the {frames} frames with a residual (no stars in its field, or an exposure beyond the reference): too few are left to compare"
+    )]
+    NothingFlown {
+        /// Frames with a residual.
+        frames: usize,
+        /// Those without an attitude of a draw.
+        lost: usize,
+    },
     /// A star without a direction.
     #[error("star {id} of table `stars` is not in table `catalog`")]
     UnknownStar {

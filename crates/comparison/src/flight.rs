@@ -23,7 +23,7 @@ use focal_plane::{
 use fogm_fit::{Fogm, FogmWhite};
 use rayon::prelude::*;
 use scenarios::{Declared, effect_parameters};
-use spectra::robust;
+use spectra::{robust, standing_out};
 use star_tracker::{Disturbance, HemState, Measured, NoiseStreams, Purpose, Rows, Scratch, stream};
 use telemetry::report::StarSource;
 use telemetry::{Bundle, Model, ModelKind};
@@ -257,9 +257,8 @@ fn starless<'a>(t_s: &'a [f64], first_row: &'a [usize]) -> Rows<'a> {
 /// Sets what a measured series would have masked to the median: values beyond 8 robust sigma, and
 /// frames without an attitude.
 pub(crate) fn without_outliers(theta: &mut [f64]) {
-    let group = vec![0; theta.len()];
     let mut out = vec![false; theta.len()];
-    while robust::mark_outliers(theta, &group, 1, &mut out) > 0 {}
+    while standing_out::mark(theta, &mut out) > 0 {}
     let median = robust::median(&mut theta.to_vec()).unwrap_or(0.0);
     for (value, out) in theta.iter_mut().zip(out) {
         if out || !value.is_finite() {

@@ -28,7 +28,7 @@ use crate::ComparisonError;
 pub const AXES: [&str; 3] = ["x", "y", "z"];
 
 /// Frames that a spectrum and a fit need at least.
-const NEED: usize = 16;
+pub(crate) const NEED: usize = 16;
 
 /// Where the measured attitude came from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -62,7 +62,7 @@ impl Residual {
     /// # Errors
     ///
     /// No reference, neither attitude nor stars with a camera, a star without direction, or fewer
-    /// than 16 frames.
+    /// than 16 frames, or most of them outliers.
     pub fn of(bundle: &Bundle) -> Result<Self, ComparisonError> {
         let reference = Self::reference(bundle)?;
         let (t_s, q, unsolved, measured_by) = match (&bundle.attitude, &bundle.stars) {
@@ -109,7 +109,8 @@ impl Residual {
         Ok(table.series_with_gaps()?)
     }
 
-    /// Marks until nothing new turns up: a mask changes the scale that it is judged by.
+    /// Marks until nothing new turns up: a mask changes the scale that it is judged by. Where that goes
+    /// on throughout, something [`happened`](standing_out::happened) throughout, and no row is marked.
     fn mark_outliers(&mut self) {
         for (values, outlier) in self.arcsec.iter().zip(&mut self.outlier) {
             while standing_out::mark(values, outlier) > 0 {}

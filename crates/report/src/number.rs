@@ -74,6 +74,46 @@ pub(crate) fn percent(share: f64) -> String {
     text.replace('-', "−")
 }
 
+/// A number with so many `decimals`, as a power of ten where that is longer than a table's column can be, and a dash
+/// where there is none.
+pub(crate) fn decimal(value: f64, decimals: usize) -> String {
+    if !value.is_finite() {
+        "-".to_owned()
+    } else if value.abs() < 1e10 {
+        format!("{value:.decimals$}")
+    } else {
+        format!("{value:.3e}")
+    }
+}
+
+/// As [`number`]; a large one that this rounds by more than it is `known_to`, with two digits of that.
+pub(crate) fn number_to(value: f64, known_to: f64) -> String {
+    let told = number(value);
+    let rounded = told.parse::<f64>().map_or(0.0, |told| (told - value).abs());
+    if value.abs() >= 1.0 && known_to > 0.0 && rounded > known_to {
+        known_digits(value, known_to)
+    } else {
+        told
+    }
+}
+
+/// As [`short`]; one with a power of ten that is `known_to` better than a unit of its last digit, with two digits of that.
+pub(crate) fn short_to(value: f64, known_to: f64) -> String {
+    if (1e5..f64::INFINITY).contains(&value.abs())
+        && known_to > 0.0
+        && known_to < 10_f64.powf(value.abs().log10().floor() - 2.0)
+    {
+        known_digits(value, known_to).replace('-', "−")
+    } else {
+        short(value)
+    }
+}
+
+fn known_digits(value: f64, known_to: f64) -> String {
+    let digits = decimals(1.0 - known_to.log10().floor());
+    format!("{value:.digits$}")
+}
+
 /// A change with its sign, one decimal; nothing has no sign.
 pub(crate) fn change(value: f64) -> String {
     let text = format!("{value:+.1}");
@@ -157,6 +197,27 @@ mod tests {
         assert_eq!(number(408.0), "408");
         assert_eq!(number(12345.6), "12346");
         assert_eq!(number(0.0), "0");
+    }
+
+    #[test]
+    fn a_number_has_as_many_digits_as_are_known() {
+        assert_eq!(number_to(1.0e9 + 1.53, 0.5), "1000000001.53");
+        assert_eq!(number_to(1.0e9 + 1.53, 30.0), "1.000e9");
+        assert_eq!(number_to(1_234_567.0, 30.0), "1234567");
+        assert_eq!(number_to(0.0301, 1.9e-4), "0.0301");
+        assert_eq!(number_to(5.0612, 2e-3), "5.061");
+        assert_eq!(number_to(812.5, 12.0), "812.5");
+        assert_eq!(short_to(-1.0e9 - 1.53, 0.5), "−1000000001.53");
+        assert_eq!(short_to(1.0e9 + 1.53, 2e7), "1.00 × 10⁹");
+        assert_eq!(short_to(812.5, 1.0), "812");
+    }
+
+    #[test]
+    fn columns_hold_what_is_no_usual_number() {
+        assert_eq!(decimal(-1.352e272, 4), "-1.352e272");
+        assert_eq!(decimal(-12.74221, 4), "-12.7422");
+        let none = [f64::NAN, f64::INFINITY].map(|v| decimal(v, 1));
+        assert_eq!(none, ["-", "-"]);
     }
 
     #[test]

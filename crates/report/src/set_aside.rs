@@ -18,11 +18,14 @@ pub(crate) fn stars(rows: Option<&StarResiduals>) -> Vec<String> {
         return Vec::new();
     };
     let mut each: BTreeMap<i64, (usize, Vec<f64>)> = BTreeMap::new();
-    for ((&id, &t_s), &outlier) in rows.star_id.iter().zip(&rows.t_s).zip(&rows.outlier) {
+    let [x, y] = &rows.before_arcsec;
+    for (k, &id) in rows.star_id.iter().enumerate() {
         let (all, aside) = each.entry(id).or_default();
         *all += 1;
-        if outlier {
-            aside.push(t_s);
+        // a row without a residual is none that stands out: it is counted as outside of the reference
+        let has_residual = |axis: &Vec<f64>| axis.get(k).is_none_or(|r| r.is_finite());
+        if rows.outlier[k] && has_residual(x) && has_residual(y) {
+            aside.push(rows.t_s[k]);
         }
     }
     let many = |(all, aside): &(usize, Vec<f64>)| {
@@ -49,7 +52,7 @@ pub(crate) fn stars(rows: Option<&StarResiduals>) -> Vec<String> {
 mod tests {
     use super::*;
 
-    /// Of two stars of 40 rows one loses its second half and one three rows; six more lose all of twenty.
+    /// Of two stars of 40 rows one loses its second half and one three rows, a third has no residuals; six more lose all of twenty.
     #[test]
     fn stars_that_lose_many_rows_are_told() {
         let mut rows = StarResiduals::default();
@@ -57,10 +60,13 @@ mod tests {
             rows.t_s.push(t_s);
             rows.star_id.push(id);
             rows.outlier.push(outlier);
+            let known = if id == 9 { f64::NAN } else { 1.0 };
+            rows.before_arcsec.iter_mut().for_each(|r| r.push(known));
         };
         for k in 0..40_i32 {
             put(7, f64::from(k), k >= 20);
             put(8, f64::from(k), k < 3);
+            put(9, f64::from(k), true);
         }
         let one = "star 7: 20 of 40 rows are outliers, from 20 to 39 s";
         assert_eq!(stars(Some(&rows)), [one]);

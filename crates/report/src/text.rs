@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 use closed_loop::{Closed, p_is};
 use telemetry::report::{Dependence, Errors, RefusedSize, Report, Selector, listed};
 
-use crate::number::number;
+use crate::number::{decimal, number, number_to};
 use crate::order::by_number;
 use crate::set_aside;
 use crate::verdict::sentence;
@@ -83,10 +83,10 @@ fn figures(out: &mut String, report: &Report) {
         for (k, axis) in ["X", "Y", "Z"].into_iter().enumerate() {
             line!(
                 out,
-                "{:<28} {:>11.3} {:>11.3}",
+                "{:<28} {:>11} {:>11}",
                 format!("log-PSD cost {axis}"),
-                b[k],
-                a[k]
+                decimal(b[k], 3),
+                decimal(a[k], 3)
             );
         }
     }
@@ -98,7 +98,8 @@ fn figures(out: &mut String, report: &Report) {
         ("log-likelihood per frame", |e| e.loglik_per_frame),
     ] {
         if let (Some(b), Some(a)) = (get(before), get(after)) {
-            line!(out, "{name:<28} {b:>11.4} {a:>11.4}");
+            let [b, a] = [b, a].map(|value| decimal(value, 4));
+            line!(out, "{name:<28} {b:>11} {a:>11}");
         }
     }
     line!(out);
@@ -108,8 +109,11 @@ fn figure(out: &mut String, name: &str, before: f64, after: f64) {
     let digits = if before < 1.0 { 4 } else { 3 };
     line!(
         out,
-        "{name:<28} {before:>11.digits$} {after:>11.digits$} {:>9.3}",
-        after / before
+        "{name:<28} {:>11} {:>11} {:>9}",
+        decimal(before, digits),
+        decimal(after, digits),
+        // nothing over nothing is no ratio
+        decimal(after / before, 3)
     );
 }
 
@@ -130,13 +134,16 @@ fn effects(out: &mut String, report: &Report) {
             let sigma = estimate
                 .sigma
                 .map_or_else(String::new, |s| format!(" +- {}", number(s)));
+            let width = estimate.interval.map(|[low, high]| high - low);
+            let known_to = estimate.sigma.or(width).unwrap_or(f64::NAN);
             let bounds = estimate.interval.map_or_else(String::new, |[low, high]| {
-                format!(" (95 %: {} to {})", number(low), number(high))
+                let [low, high] = [low, high].map(|end| number_to(end, known_to));
+                format!(" (95 %: {low} to {high})")
             });
             line!(
                 out,
                 "            {name} = {}{sigma}{unit}{bounds}",
-                number(estimate.value)
+                number_to(estimate.value, known_to)
             );
         }
         let share = effect.variance_explained.map_or(String::new(), |v| {
@@ -144,8 +151,8 @@ fn effects(out: &mut String, report: &Report) {
         });
         line!(
             out,
-            "            gain {:.1} nats out of fold, {}{share}",
-            effect.delta_loglik,
+            "            gain {} nats out of fold, {}{share}",
+            decimal(effect.delta_loglik, 1),
             p_is(effect.p_value)
         );
         let alike: Vec<String> = effect
@@ -228,9 +235,9 @@ fn rivals(out: &mut String, closed: &Closed) {
     for rival in &closed.rivals {
         let mut row = format!("  {:<50}", rival.what);
         for rms in &rival.rms_arcsec {
-            let _ = write!(row, " {rms:>8.4}");
+            let _ = write!(row, " {:>8}", decimal(*rms, 4));
         }
-        line!(out, "{row} {:>11.1}", rival.delta_loglik);
+        line!(out, "{row} {:>11}", decimal(rival.delta_loglik, 1));
     }
     line!(out);
 }
@@ -271,7 +278,7 @@ fn considered(out: &mut String, report: &Report) {
                 }
                 _ => String::new(),
             };
-            let gain = c.delta_loglik.map_or("-".to_owned(), |g| format!("{g:.1}"));
+            let gain = c.delta_loglik.map_or("-".to_owned(), |g| decimal(g, 1));
             line!(out, "  {:<26} {gain:>8}   {size}", c.id);
             if let Some(why) = &c.against {
                 line!(out, "    not named: {why}");

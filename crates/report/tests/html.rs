@@ -486,6 +486,15 @@ fn text_of_users_is_no_markup() {
     }
 }
 
+#[test]
+fn a_chance_below_all_numbers_is_no_markup() {
+    for (name, mut closed) in kinds() {
+        let effects = &mut closed.report.effects;
+        effects.iter_mut().for_each(|e| e.p_value = 0.0);
+        well_formed(&page(&closed)).unwrap_or_else(|why| panic!("{name}: {why}"));
+    }
+}
+
 /// The finite numbers of a JSON value with their pointers.
 fn numbers(at: &str, value: &Value, out: &mut BTreeMap<String, f64>) {
     match value {

@@ -24,6 +24,9 @@ use crate::AssessError;
 const STEP_RAD: f64 = 0.1;
 /// Longest step, s, of a body that hardly turns.
 const LONGEST_S: f64 = 600.0;
+/// Steps to either side at most, which are kept: 1e5 rad of turn. Over a week a body that needs more turns in forty
+/// seconds, and a tracker that follows it between frames of a second sees some 1e6 of them.
+const MOST_STEPS: f64 = 1e6;
 const ROOT_15: f64 = 3.872_983_346_207_417;
 const NODES: [f64; 3] = [0.5 - ROOT_15 / 10.0, 0.5, 0.5 + ROOT_15 / 10.0];
 const STAGES: [[f64; 3]; 3] = [
@@ -49,7 +52,7 @@ impl Body {
     /// Attitude and rate over a span that holds t = 0, inertial to body, body axes.
     ///
     /// # Errors
-    /// Numbers that are not finite.
+    /// Numbers that are not finite, or a body that turns too often in the span to be followed.
     ///
     /// # Panics
     /// Unless the span holds 0.
@@ -58,6 +61,14 @@ impl Body {
         let fastest = 1.0_f64.max(1.0 / self.inertia.axial_ratio);
         let turn = self.momentum_rad_s().norm() * fastest;
         let step_s = (STEP_RAD / turn).min(LONGEST_S);
+        let longest_s = span_s[1].max(-span_s[0]);
+        if longest_s / step_s > MOST_STEPS {
+            return Err(AssessError::TooManyTurns {
+                rate_rad_s: self.rate_rad_s.norm(),
+                axial_ratio: self.inertia.axial_ratio,
+                span_s: span_s[1] - span_s[0],
+            });
+        }
         let mut before = self.walk(span_s[0], step_s);
         before.reverse();
         let after = self.walk(span_s[1], step_s);

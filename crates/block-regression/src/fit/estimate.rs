@@ -12,9 +12,10 @@
 //! Source: Box 1954 and Greenhouse & Geisser 1959 (F of unequal variances).
 
 use nalgebra::{Cholesky, DMatrix, DVector, SymmetricEigen};
-use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
+use statrs::distribution::{ChiSquared, FisherSnedecor};
 
 use super::symmetric;
+use crate::tail::beyond;
 
 /// A set of amplitudes from all data with their cluster-robust covariance.
 ///
@@ -108,10 +109,10 @@ fn part(matrix: &DMatrix<f64>, which: &[usize]) -> DMatrix<f64> {
 
 /// Chance of chi-squared of `p` parameters beyond `square`.
 fn chi_squared_tail(square: f64, p: f64) -> f64 {
-    ChiSquared::new(p).map_or(1.0, |law| law.sf(square))
+    ChiSquared::new(p).map_or(1.0, |law| beyond(&law, square))
 }
 
 /// Chance of F beyond `f` with `p` parameters, each with a variance from `blocks` blocks.
 fn f_tail(f: f64, p: f64, blocks: f64) -> f64 {
-    FisherSnedecor::new(p, p * (blocks - 1.0)).map_or(1.0, |law| law.sf(f))
+    FisherSnedecor::new(p, p * (blocks - 1.0)).map_or(1.0, |law| beyond(&law, f))
 }

@@ -16,6 +16,12 @@ pub struct OutOfFold {
     pub prior: f64,
 }
 
+/// The noise variance that is held for least, of scalars of this variance in all: a training that leaves less than the
+/// rounding of its sums leaves nothing, and of no noise at all any error would be infinitely unlikely.
+pub(super) fn least_variance(of_all: f64) -> f64 {
+    (f64::EPSILON * of_all).max(f64::MIN_POSITIVE)
+}
+
 /// ln of the density of `scalars` of this `variance` with this squared error.
 pub(super) fn gaussian(scalars: f64, error: f64, variance: f64) -> f64 {
     -0.5 * (scalars * (std::f64::consts::TAU * variance).ln() + error / variance)

@@ -52,7 +52,8 @@ pub(crate) fn run(options: &Close, console: &Console) -> anyhow::Result<()> {
     };
     inputs::warn_of_magnitudes(&[&model], &bundle, console);
     let progress = |what: &str| console.progress(what);
-    let mut closed = close_asking(&model, &bundle, &questions, &progress)?;
+    let closed = close_asking(&model, &bundle, &questions, &progress);
+    let mut closed = closed.map_err(|error| in_its_bundle(error, options))?;
     let compared = (options.out.is_some() || console.json())
         .then(|| flown(&model, &bundle, &mut closed, console));
     let mut text = summary(&closed);
@@ -96,6 +97,16 @@ pub(crate) fn run(options: &Close, console: &Console) -> anyhow::Result<()> {
             .machine(&serde_json::to_string_pretty(&closed.report).context("the report as JSON")?);
     }
     Ok(())
+}
+
+/// With the bundle that an error is about.
+fn in_its_bundle(error: CloseError, options: &Close) -> anyhow::Error {
+    match &options.bundle {
+        Some(bundle) if error.is_of_bundle() => {
+            anyhow::anyhow!("{}: {error}", bundle.display())
+        }
+        _ => error.into(),
+    }
 }
 
 /// A misspelt effect is answered with the nearest, too.

@@ -72,6 +72,7 @@ pub(crate) fn run(
     let mut data = AttitudeData::against(&table.t_s, &table.q, reference);
     if data.t_s.len() < MIN_FRAMES {
         return Err(CloseError::TooFewFrames {
+            table: "attitude",
             frames: data.t_s.len(),
             need: MIN_FRAMES,
             why: "the others lie outside the reference or in its gaps",

@@ -25,7 +25,7 @@
 
 use std::cell::OnceCell;
 
-use block_regression::Folds;
+use block_regression::{Folds, beyond};
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
 
 use super::rows::Row;
@@ -571,7 +571,7 @@ fn wald(value: f64, variance: f64, clusters: usize, spent: usize) -> f64 {
     if variance <= 0.0 || freedom < 1.0 {
         return 1.0;
     }
-    FisherSnedecor::new(1.0, freedom).map_or(1.0, |law| law.sf(value * value / variance))
+    FisherSnedecor::new(1.0, freedom).map_or(1.0, |law| beyond(&law, value * value / variance))
 }
 
 #[cfg(test)]

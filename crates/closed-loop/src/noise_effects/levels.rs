@@ -19,6 +19,7 @@
 //!
 //! Source: Smyth 2004 (moderated variances); Satterthwaite 1946; Rosner 1983 (more than one odd value).
 
+use block_regression::beyond;
 use nalgebra::{Cholesky, DMatrix, DVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor, StudentsT};
 
@@ -153,7 +154,7 @@ impl Table {
         let more: f64 = (0..n)
             .map(|i| (left[i].powi(2) - 1.0) * root[i].powi(2))
             .sum();
-        Some([law.sf(square), (more / seen).max(0.0).sqrt()])
+        Some([beyond(&law, square), (more / seen).max(0.0).sqrt()])
     }
 }
 
@@ -204,7 +205,7 @@ fn beside_line(stars: &[Level], f: &[f64], of_rows: Option<f64>) -> Option<(f64,
     let variance = factor.inverse()[(0, 0)] * spread.variance;
     let law = StudentsT::new(0.0, 1.0, spread.freedom).ok()?;
     let t = beta[0] / variance.sqrt();
-    let p = 2.0 * law.sf(t.abs());
+    let p = 2.0 * beyond(&law, t.abs());
     let mean = f.iter().sum::<f64>() / n as f64;
     let spread = f.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n as f64;
     t.is_finite().then(|| (p, beta[0].abs() * spread.sqrt()))

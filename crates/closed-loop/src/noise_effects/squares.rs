@@ -13,6 +13,7 @@
 //!
 //! Source: Breusch & Pagan 1979, studentised by Koenker 1981; clusters as in Liang & Zeger 1986.
 
+use block_regression::beyond;
 use nalgebra::{Cholesky, DMatrix, DVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
 
@@ -238,7 +239,7 @@ impl Table {
         let covariance = spread * (blocks / (blocks - k));
         let square = score.dot(&Cholesky::new(covariance)?.solve(&score));
         let law = FisherSnedecor::new(k, blocks - k).ok()?;
-        let p = law.sf(square / k);
+        let p = beyond(&law, square / k);
         Some([p.max(p_white), (beta.dot(&score).max(0.0) / n).sqrt()])
     }
 }

@@ -65,6 +65,8 @@ pub(crate) fn consider(
     let squares: f64 = theta.windows(2).map(|w| (w[1] - w[0]).powi(2)).sum();
     let white = squares / (2.0 * pairs as f64);
     let decay = (-step_s / TYPICAL_TAU_S).exp();
+    // correlations below the rounding of what they are sums of are none
+    let observable = decay * decay > f64::EPSILON;
     let sigma = white * ((1.0 - decay * decay) / (theta.len() as f64 * decay * decay)).sqrt();
     let rows = data.counted().max(1) as f64;
     Some(ConsideredEffect {
@@ -72,8 +74,8 @@ pub(crate) fn consider(
         id: REFERENCE_ERROR.to_owned(),
         delta_loglik: None,
         p_value: None,
-        observable: true,
-        detectable: Some((SEEN * sigma).sqrt()),
+        observable,
+        detectable: observable.then(|| (SEEN * sigma).sqrt()),
         // about X and Y alike
         needed: (excess > 0.0).then(|| (0.5 * excess / rows).sqrt()),
         parameter: Some(NAMES[0][0].to_owned()),
@@ -145,4 +147,24 @@ pub(crate) fn finding(wander: &Wander, step_s: f64) -> Option<Finding> {
     };
     let entry = EffectEntry::new(REFERENCE_ERROR, written);
     Some(Finding::Named(Box::new(found), entry))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::star::harness::at_rest;
+
+    /// Frames that are hours apart have no correlations left of a minute's error.
+    #[test]
+    fn frames_far_apart_show_no_slow_error() {
+        let shown = |step_s: f64| {
+            let data = at_rest((0..60).map(|k| step_s * f64::from(k)).collect());
+            let row = |r: usize| [1.0, -1.0][(r / 6 + r % 6) % 2];
+            let left = vec![(0..data.t_s.len()).map(row).collect::<Vec<f64>>(); 2];
+            let shown = consider(&data, &left, 1.0).unwrap();
+            (shown.observable, shown.detectable)
+        };
+        assert!(matches!(shown(0.5), (true, Some(size)) if size.is_finite()));
+        assert_eq!(shown(7200.0), (false, None));
+    }
 }

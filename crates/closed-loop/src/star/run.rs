@@ -33,6 +33,7 @@ use crate::star::evidence::StarEvidence;
 use crate::star::finish::{Finish, finish};
 use crate::star::landing::Elsewhere;
 use crate::star::pointed::Pointed;
+use crate::star::rows_left;
 use crate::star::search::{Searched, Wander, in_vain};
 use crate::star::settling::{Settled, settle};
 use crate::star::steadied::steadied;
@@ -142,11 +143,13 @@ fn on_rows(
     });
     if data.frames.frames() < MIN_FRAMES {
         return Err(CloseError::TooFewFrames {
+            table: "stars",
             frames: data.frames.frames(),
             need: MIN_FRAMES,
             why: "the others lie outside the reference, or have no two stars to solve an attitude from",
         });
     }
+    rows_left::check(&data, &declared::effects(situation)?, MIN_FRAMES)?;
     if let Some(windows) = situation.windows {
         data.see_windows(windows);
     }
@@ -182,6 +185,7 @@ fn trace(
     progress("residuals of the declared model");
     data.lands_as_modelled();
     let mut settled = settle(data, situation, phase, folds)?;
+    rows_left::check(data, &declared::effects(situation)?, MIN_FRAMES)?;
     let mut known = Known {
         landings: LANDINGS,
         ..before.clone()

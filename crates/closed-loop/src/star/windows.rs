@@ -81,9 +81,11 @@ fn rows_of(all: &StarFrames, kept: &[bool]) -> StarFrames {
 /// Why the stars that have windows are not enough by themselves, if that is what an error says.
 pub(super) fn too_few(error: &CloseError) -> Option<AsMeasured> {
     match error {
-        CloseError::TooFewFrames { .. } | CloseError::Singular => Some(AsMeasured::Unusable(
-            format!("the rows that have windows do not suffice by themselves: {error}"),
-        )),
+        CloseError::TooFewFrames { .. } | CloseError::NoRowsLeft { .. } | CloseError::Singular => {
+            Some(AsMeasured::Unusable(format!(
+                "the rows that have windows do not suffice by themselves: {error}"
+            )))
+        }
         _ => None,
     }
 }

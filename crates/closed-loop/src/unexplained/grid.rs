@@ -2,6 +2,22 @@
 //!
 //! Not physics: bookkeeping of frequencies.
 
+use spectra::robust::median_step;
+
+/// Independent frequencies that are looked at at most, over those that as many samples without a gap have: N samples
+/// hold N numbers, N/2 frequencies, and over gaps nine times as long as all that was sampled nearly all others are
+/// fringes of these.
+const MOST_FRINGES: f64 = 10.0;
+
+/// Time, s, over which samples at `t_s` tell frequencies apart: their span, but for gaps that are far longer than all that
+/// was sampled.
+pub(crate) fn coherent_s(t_s: &[f64]) -> f64 {
+    let (Some(first), Some(last), Some(step)) = (t_s.first(), t_s.last(), median_step(t_s)) else {
+        return 0.0;
+    };
+    (last - first).min(MOST_FRINGES * t_s.len() as f64 * step)
+}
+
 /// Evenly spaced frequencies.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Grid {
@@ -58,4 +74,23 @@ pub(crate) fn top(f: f64, step: f64, power: impl Fn(f64) -> f64) -> f64 {
         width *= 0.5;
     }
     centre
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A gap as long as what was sampled leaves the span as it is, one of weeks no more than the samples tell.
+    #[test]
+    fn gaps_of_weeks_make_no_frequencies() {
+        let with_gap = |gap_s: f64| -> Vec<f64> {
+            let each = (0..600).map(f64::from);
+            each.map(|t| if t < 300.0 { t } else { t + gap_s })
+                .collect()
+        };
+        assert_eq!(coherent_s(&with_gap(0.0)), 599.0);
+        assert_eq!(coherent_s(&with_gap(3000.0)), 3599.0);
+        assert_eq!(coherent_s(&with_gap(1e6)), 6000.0);
+        assert_eq!(coherent_s(&[1.0]), 0.0);
+    }
 }

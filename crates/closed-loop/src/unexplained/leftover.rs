@@ -27,6 +27,7 @@ use crate::figures;
 use crate::star::data::StarData;
 use crate::star::frame_rotation::rotation_row;
 use crate::unexplained::SEARCH_ALPHA;
+use crate::unexplained::grid::coherent_s;
 use lines::Spectrum;
 use telemetry::report::Unattributed;
 
@@ -182,10 +183,10 @@ impl Series {
             .collect();
         let mut out = Leftover::default();
         for (track, lines, jumps) in each {
-            let span = track.span();
+            let apart_hz = 1.0 / coherent_s(&track.t_s);
             for f in lines {
                 // the same line in two series is one
-                if out.lines_hz.iter().all(|g| (f - g).abs() > 1.0 / span) {
+                if out.lines_hz.iter().all(|g| (f - g).abs() > apart_hz) {
                     out.lines_hz.push(f);
                 }
             }

@@ -34,11 +34,11 @@
 
 use std::ops::Range;
 
-use block_regression::Folds;
+use block_regression::{Folds, beyond};
 use nalgebra::{Cholesky, Matrix2, Matrix4, Vector2, Vector4};
 use pulp::Arch;
 use rayon::prelude::*;
-use statrs::distribution::{ContinuousCDF, FisherSnedecor};
+use statrs::distribution::FisherSnedecor;
 use telemetry::report::{Dependence, Unattributed};
 
 use crate::star::data::StarData;
@@ -343,8 +343,8 @@ impl Field {
         order: Option<u32>,
     ) -> Vec<Pattern> {
         let extent = self.extent();
-        let small = extent.iter().any(|l| *l < LEAST_EXTENT_PX);
-        if self.frame.is_empty() || small || self.take_out_pixel_phase().is_none() {
+        let small = extent.iter().any(|l| *l < LEAST_EXTENT_PX) || !self.has_clusters(folds);
+        if small || self.take_out_pixel_phase().is_none() {
             return Vec::new();
         }
         let cycles = ORDERS * f64::from(order.unwrap_or(USUAL_ORDER).max(3));
@@ -353,6 +353,24 @@ impl Field {
         self.round();
         let ring = self.ring(as_left, folds, cycles);
         wave.into_iter().chain(ring).collect()
+    }
+
+    /// Whether there are as many clusters of both kinds as a chance takes: a transform costs the same of few rows as of many.
+    fn has_clusters(&self, folds: &Folds) -> bool {
+        let block = block_of_frame(folds);
+        let mut frames = vec![false; block.len()];
+        let mut cells = 0;
+        for rows in &self.stars {
+            let mut last = usize::MAX;
+            for &frame in &self.frame[rows.clone()] {
+                let frame = frame as usize;
+                frames[frame] = true;
+                cells += usize::from(block[frame] != last);
+                last = block[frame];
+            }
+        }
+        let frames = frames.into_iter().filter(|seen| *seen).count();
+        frames.min(cells) >= LEAST_CLUSTERS
     }
 
     fn wave(&self, as_left: &dyn Fn() -> Self, folds: &Folds, own: &Own) -> Option<Pattern> {
@@ -647,5 +665,5 @@ fn hotelling(clusters: &[Vector4<f64>]) -> Option<f64> {
     let covariance = spread * (n / (n - 1.0));
     let square = sum.dot(&Cholesky::new(covariance)?.solve(&sum));
     let law = FisherSnedecor::new(4.0, n - 4.0).ok()?;
-    Some(law.sf(square * (n - 4.0) / (4.0 * (n - 1.0))))
+    Some(beyond(&law, square * (n - 4.0) / (4.0 * (n - 1.0))))
 }

@@ -21,6 +21,7 @@
 
 use std::cell::LazyCell;
 
+use block_regression::beyond;
 use rayon::prelude::*;
 use spectra::robust::median_step;
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
@@ -30,7 +31,7 @@ use crate::causes::commonness::{self, IN_TIME, MOSTLY, stars_first};
 use crate::figures;
 use crate::star::data::StarData;
 use crate::unexplained::around::Around;
-use crate::unexplained::grid::{Grid, top};
+use crate::unexplained::grid::{Grid, coherent_s, top};
 use crate::unexplained::star_freedom::Freedom;
 use by_place::by_place;
 
@@ -123,6 +124,8 @@ impl OwnSeries {
 struct Own {
     t_s: Vec<f64>,
     value: [Vec<f64>; 2],
+    /// Squares of its rows, both axes.
+    rows_squares: f64,
     /// Rows that a point is the mean of: its variance is one over it.
     count: Vec<f64>,
     /// Sums of the rows, and of both axes over them, before each point.
@@ -149,19 +152,21 @@ pub(crate) fn search(
         Freedom::WHOLE
     };
     let series = series(data, own, weight);
-    let rows: f64 = series.iter().map(|s| s.count.iter().sum::<f64>()).sum();
+    // neighbours tell the noise, and slow noise is more than that: a share is of all that the rows have
+    let all: f64 = series.iter().map(|s| s.rows_squares).sum();
     let mut out = OwnSeries {
         p_value: 1.0,
         ..OwnSeries::default()
     };
-    let (Some(&first), Some(&last)) = (data.frames.t_s.first(), data.frames.t_s.last()) else {
+    let span_s = coherent_s(&data.frames.t_s);
+    if span_s <= 0.0 {
         return out;
-    };
-    out.bin_hz = 1.0 / (last - first);
+    }
+    out.bin_hz = 1.0 / span_s;
     out.apart_s = NEAR_STEPS * median_step(&data.frames.t_s).unwrap_or(0.0);
-    let apart = LazyCell::new(|| Lines::of(&by_itself, *beside_rotation, last - first));
+    let apart = LazyCell::new(|| Lines::of(&by_itself, *beside_rotation, span_s));
     let line_in = |series: &[Own]| {
-        let lines = Lines::of(series, freedom, last - first)?;
+        let lines = Lines::of(series, freedom, span_s)?;
         let (k, found) = lines.best(series)?;
         let apart = apart.as_ref()?;
         let alone = (k < apart.grid.bins).then(|| apart.at(k))?;
@@ -186,7 +191,7 @@ pub(crate) fn search(
     }
     for found in [&line, &jump].into_iter().flatten() {
         out.p_value = out.p_value.min(found.p_value);
-        out.explained = out.explained.max(found.squares / (2.0 * rows));
+        out.explained = out.explained.max(found.squares / all);
     }
     out.places = match (&line, &jump) {
         (Some(line), jump) if jump.is_none_or(|t| t.squares <= line.squares) => {
@@ -255,6 +260,7 @@ fn series(data: &StarData, own: &[Vec<f64>], weight: &[f64]) -> Vec<Own> {
             left.iter_mut().for_each(|v| *v /= noise);
             left
         });
+        let rows_squares = value.iter().flatten().map(|v| v * v).sum();
         let (mut t_s, mut count) = (Vec::new(), Vec::new());
         let mut means = [Vec::new(), Vec::new()];
         for at in (0..rows.len()).step_by(size) {
@@ -266,7 +272,7 @@ fn series(data: &StarData, own: &[Vec<f64>], weight: &[f64]) -> Vec<Own> {
             }
             count.push(k);
         }
-        Some(Own::of(t_s, means, count))
+        Some(Own::of(t_s, means, count, rows_squares))
     });
     each.collect()
 }
@@ -298,11 +304,17 @@ impl Lines {
         // power over what is usual around, and how many it is the mean of
         let relative = |p: &Vec<f64>| -> (f64, f64) {
             let (sum, count) = USUAL.sum(p, k);
-            (p[k] * count / sum, count)
+            let ratio = p[k] * count / sum;
+            // a star of one value has no power around, and says nothing
+            if sum > 0.0 && ratio.is_finite() {
+                (ratio, count)
+            } else {
+                (1.0, 0.0)
+            }
         };
         let chance = |mean: f64, of: f64, around: f64, share: f64| -> f64 {
             FisherSnedecor::new(4.0 * share * of, 4.0 * share * around)
-                .map_or(1.0, |law| law.sf(mean))
+                .map_or(1.0, |law| beyond(&law, mean))
         };
         let stars = self.power.len() as f64;
         let each: Vec<(f64, f64)> = self.power.iter().map(relative).collect();
@@ -431,7 +443,7 @@ impl Sums {
 
 impl Own {
     /// With the sums of the rows.
-    fn of(t_s: Vec<f64>, value: [Vec<f64>; 2], count: Vec<f64>) -> Self {
+    fn of(t_s: Vec<f64>, value: [Vec<f64>; 2], count: Vec<f64>, rows_squares: f64) -> Self {
         let sums = |of: &dyn Fn(usize) -> f64| -> Vec<f64> {
             let mut all = vec![0.0];
             for k in 0..count.len() {
@@ -444,6 +456,7 @@ impl Own {
             running: [0, 1].map(|a| sums(&|k| count[k] * value[a][k])),
             t_s,
             value,
+            rows_squares,
             count,
         }
     }
@@ -502,7 +515,12 @@ impl Own {
                 *v -= a * c + b * s;
             }
         }
-        Self::of(self.t_s.clone(), value, self.count.clone())
+        Self::of(
+            self.t_s.clone(),
+            value,
+            self.count.clone(),
+            self.rows_squares,
+        )
     }
 
     /// Squares that a sinusoid takes of both axes, in units of the noise, at the frequencies of
@@ -582,6 +600,9 @@ mod tests {
                 "{size}: {off}"
             );
             assert_eq!(found.jump_s, None, "{size}");
+            // of a variance of a half of the size's square, beside that of the noise; a line takes a little noise too
+            let share = 0.5 * size * size / (1.0 + 0.5 * size * size);
+            assert!((found.explained - share).abs() < 0.01, "{size}: {found:?}");
         }
         assert_eq!(swing(0.5, 0.0).line_hz, None);
     }
@@ -597,6 +618,15 @@ mod tests {
             assert!(size < 1.0 || found.jump_s == Some(290.25));
             assert_eq!(found.line_hz, None, "{size}");
         }
+    }
+
+    /// Stars that have no noise have no line, and nothing to hold one against.
+    #[test]
+    fn stars_of_one_value_have_no_line() {
+        let data = at_rest((0..1500).map(|k| 0.5 * f64::from(k)).collect());
+        let still = [(); 2].map(|()| vec![0.0; data.t_s.len()]);
+        let found = search(&data, &still, || still.clone(), &vec![1.0; data.t_s.len()]);
+        assert_eq!((found.line_hz, found.jump_s), (None, None));
     }
 
     /// A jump that all stars share and each by itself is one.

@@ -5,7 +5,7 @@ use telemetry::report::{ConsideredEffect, Dependence, Errors, Estimate, FoundEff
 
 use super::Page;
 use super::write::{Cell, datum, escaped, step};
-use crate::number::{change, hertz, p_is, percent, probability, short, with_sigma};
+use crate::number::{change, hertz, p_is, percent, probability, short, short_to, with_sigma};
 use crate::order::by_number;
 use crate::text::{is_certain, of_size, selectors};
 
@@ -29,7 +29,7 @@ pub(super) fn in_a_line_each(page: &mut Page, report: &Report) {
             escaped(&selectors(&effect.selectors)),
             escaped(meaning(&effect.id)),
             escaped(&sizes.join(", ")),
-            p_is(effect.p_value),
+            escaped(&p_is(effect.p_value)),
             effect
                 .variance_explained
                 .map_or_else(String::new, |v| format!(
@@ -47,9 +47,9 @@ fn size(estimate: &Estimate) -> String {
         (None, Some([from, to])) => {
             format!(
                 "{} (95 %: {} to {})",
-                short(estimate.value),
-                short(from),
-                short(to)
+                short_to(estimate.value, to - from),
+                short_to(from, to - from),
+                short_to(to, to - from)
             )
         }
         (None, None) => short(estimate.value),
@@ -248,8 +248,12 @@ fn estimate(k: usize, name: &str, e: &Estimate) -> String {
     if let Some([from, to]) = e.interval {
         out.push_str(&format!(
             " <small>(95 %: {} to {})</small>",
-            datum(&format!("{at}/interval/0"), from, &short(from)),
-            datum(&format!("{at}/interval/1"), to, &short(to))
+            datum(
+                &format!("{at}/interval/0"),
+                from,
+                &short_to(from, to - from)
+            ),
+            datum(&format!("{at}/interval/1"), to, &short_to(to, to - from))
         ));
     }
     if !e.unit.is_empty() {

@@ -9,6 +9,7 @@
 //!
 //! Source: Wilks 1938 (likelihood ratio).
 
+use block_regression::beyond;
 use focal_plane::{ARCSEC_PER_RAD, SPEED_OF_LIGHT_M_S};
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
 
@@ -172,7 +173,7 @@ impl Trial<'_, '_> {
         let around = line_level(t_s, &with.left, &self.data.count, &with.noise, frequency_hz)?;
         let k = columns as f64;
         let law = FisherSnedecor::new(k, around.freedom).ok()?;
-        let p = law.sf(ratio.max(0.0) / k / around.level.max(1.0));
+        let p = beyond(&law, ratio.max(0.0) / k / around.level.max(1.0));
         Some((p * self.cost[g]).min(1.0))
     }
 

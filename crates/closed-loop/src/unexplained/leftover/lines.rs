@@ -22,7 +22,7 @@ use spectra::{LombScargle, LombScargleSettings};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use crate::unexplained::around::Around;
-use crate::unexplained::grid::{Grid, top};
+use crate::unexplained::grid::{Grid, coherent_s, top};
 
 use super::{MOST, Series, Track};
 
@@ -50,7 +50,13 @@ const ALIKE: f64 = 0.1;
 fn grid_of(track: &Track) -> Option<Grid> {
     let step_s = median_step(&track.t_s)?;
     let fewest = 4 * USUAL.finer * USUAL.count;
-    Grid::of(track.span(), step_s, MIN_CYCLES, USUAL.finer, fewest)
+    Grid::of(
+        coherent_s(&track.t_s),
+        step_s,
+        MIN_CYCLES,
+        USUAL.finer,
+        fewest,
+    )
 }
 
 impl Grid {

@@ -19,7 +19,8 @@
 
 use std::f64::consts::PI;
 
-use statrs::distribution::{ContinuousCDF, FisherSnedecor};
+use block_regression::beyond;
+use statrs::distribution::FisherSnedecor;
 
 /// What each independent wave vector pays for: see the module.
 pub(super) const CHANCES: f64 = 8.0 * 4.0;
@@ -53,7 +54,7 @@ impl Others {
         let uneven = (2.0 * scatter - 1.0).max(0.0) / (8.0 * scatter + 2.0).max(1.0);
         let freedom = (uneven + 0.25 / self.independent).recip();
         let law = FisherSnedecor::new(4.0, freedom).ok()?;
-        Some(law.sf(power / usual))
+        Some(beyond(&law, power / usual))
     }
 }
 

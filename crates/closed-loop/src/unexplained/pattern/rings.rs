@@ -30,6 +30,9 @@ use super::{Field, LEAST_EXTENT_PX, LEAST_MOTION, Pattern, REFINED, climb, could
 const BINS: f64 = 0.5;
 /// Waves of the transform in a cycle over the extent.
 const FINER: usize = 4;
+/// Bins of the transform at most: places of a detector keep below it by far, those that an effect of the model moves off it
+/// may be anywhere.
+const MOST_BINS: usize = 1 << 16;
 /// A peak of the transform grows by less than this where it is refined: a quarter of a cycle at most loses
 /// 1 - sinc^2(1/4) = 0.19.
 const REFINES: f64 = 1.25;
@@ -125,16 +128,18 @@ impl Field {
         #[expect(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
-            reason = "bins from the lowest radius, of a detector"
+            reason = "bins from the lowest radius"
         )]
         let bin = |at: f64| (BINS * (at - low)) as usize;
-        let n = (FINER * (bin(low + range.extent) + 1)).next_power_of_two();
+        // of more bins a wave has the phase of those that it turns whole cycles from
+        let most = bin(low + range.extent).min(MOST_BINS / FINER - 1);
+        let n = (FINER * (most + 1)).next_power_of_two();
         let mut line = vec![Complex::new(0.0, 0.0); n];
         let scale = variance.map(|v| v.sqrt().recip());
         for (rows, weight) in self.stars.iter().zip(&self.weight) {
             for row in rows.clone() {
                 let [out, across] = [0, 1].map(|a| weight * self.residual[a][row] * scale[a]);
-                line[bin(self.x_px[row])] += Complex::new(out, across);
+                line[bin(self.x_px[row]) % n] += Complex::new(out, across);
             }
         }
         fourier::forward(n).process(&mut line);

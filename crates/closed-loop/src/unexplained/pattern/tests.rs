@@ -74,6 +74,29 @@ fn wave(k: [f64; 2], size: f64) -> impl Fn(f64, f64) -> f64 {
     move |x, y| size * (TAU * (k[0] * x + k[1] * y) + 0.7).sin()
 }
 
+/// A transform finds nothing for a chance that no few rows have.
+#[test]
+fn few_rows_are_not_transformed() {
+    let noise = field(1, 60.0, [1.0, 0.0], &|_, _| 0.0);
+    assert!(noise.has_clusters(&Folds::cut(FRAMES)));
+    let few = Field::new(
+        [&noise.x_px[..7], &noise.y_px[..7]],
+        noise.residual.each_ref().map(|r| &r[..7]),
+        &noise.frame[..7],
+        &[(0..7).collect()],
+        &[1.0; 7],
+    );
+    assert!(!few.has_clusters(&Folds::cut(FRAMES)));
+}
+
+/// The transform along the radius has a size of its own, whatever the places.
+#[test]
+fn stars_far_off_the_detector_are_searched_like_others() {
+    let mut far = field(1, 60.0, [1.0, 0.0], &|_, _| 0.0);
+    far.x_px[..FRAMES].iter_mut().for_each(|x| *x += 1e12);
+    assert_eq!(search(&far), None);
+}
+
 /// The top of a wave over 200 px, sinc^2 on both axes, from up to 0.7 cycles off: outside of the first three points,
 /// too. A parabola's top is off by (pi step)^2 / 5 of the way at most, 0.12 of it at a quarter of a cycle and a
 /// sixteenth of that each round: 0.7 x 0.12 x 0.008 x 0.0005 cycles, and what rounding makes of a flat top, 1e-8.

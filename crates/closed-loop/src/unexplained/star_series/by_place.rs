@@ -11,8 +11,9 @@
 //!
 //! Source: Fisher 1922 (the ratio of variances).
 
+use block_regression::beyond;
 use nalgebra::{Cholesky, DMatrix, DVector};
-use statrs::distribution::{ContinuousCDF, FisherSnedecor};
+use statrs::distribution::FisherSnedecor;
 
 use crate::star::data::StarData;
 
@@ -83,7 +84,7 @@ fn told<const K: usize>(
     // of stars that move on, places may take more than each star's own
     let rest = (each - both).max(0.0) / freedom;
     let law = FisherSnedecor::new(numbers, freedom).ok()?;
-    if both < MOST * each || law.sf(both / numbers / rest) >= ALPHA {
+    if both < MOST * each || beyond(&law, both / numbers / rest) >= ALPHA {
         return None;
     }
     let mut alone = Vec::new();
