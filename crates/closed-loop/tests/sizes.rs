@@ -53,6 +53,10 @@ fn nothing_is_needed_where_nothing_is_left() {
     for name in ["time_tag", "null_wrong_noise"] {
         let report = world(name);
         assert!(!report.unattributed.present, "{name}");
+        assert!(
+            report.considered.iter().all(|c| c.needed.is_none()),
+            "{name}"
+        );
         for asked in report.hypotheses.iter().filter(|h| !h.added) {
             assert!(asked.sizes.iter().all(|s| s.needed.is_none()), "{name}");
             assert!(

@@ -273,7 +273,8 @@ pub struct HypothesisSize {
     pub detectable: Option<f64>,
     /// At which it would explain by itself what is left beside the other effects added.
     pub needed: Option<f64>,
-    /// At which it would explain by itself all that the declared model leaves: what the effects added explain, and what is left.
+    /// At which it would explain by itself all that the declared model leaves: what the effects added explain, and
+    /// what is left.
     pub needed_alone: Option<f64>,
     /// 1 sigma of the sizes that nature makes.
     pub plausible: Option<f64>,

@@ -312,12 +312,15 @@ pub(crate) fn finish(
         }
     }
     considered.retain(|c| !effects.iter().any(|e| e.id == c.id));
-    let squares = excess(f, last);
+    // a noise that is as loud everywhere is the declared level's fault, and no effect's
+    let squares = if unattributed.present {
+        excess(f, last)
+    } else {
+        0.0
+    };
     noise.need(f.situation, f.data, squares)?;
     noise.tell(&mut considered);
-    // noise of the stars that is louder than declared is no error of the reference
-    let of_reference = if unattributed.present { squares } else { 0.0 };
-    if let Some(mut entry) = reference_wander::consider(f.data, &plain.axes, of_reference) {
+    if let Some(mut entry) = reference_wander::consider(f.data, &plain.axes, squares) {
         entry.against = against_wander;
         considered
             .iter_mut()
