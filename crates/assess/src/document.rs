@@ -199,6 +199,7 @@ impl Assessment {
                 .considered
                 .iter()
                 .map(|c| ConsideredEffect {
+                    selectors: std::collections::BTreeMap::new(),
                     against: None,
                     id: c.term.id().into(),
                     delta_loglik: c.delta_loglik,

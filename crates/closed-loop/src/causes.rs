@@ -27,6 +27,7 @@ use crate::declared::OnCentroids;
 use crate::error::CloseError;
 use crate::figures;
 use crate::noise_effects;
+use crate::questions::needed::ToExplain;
 use crate::search::empirical::Empirical;
 use crate::search::group::open_beside;
 use crate::search::misplaced::{MISPLACED, piled};
@@ -180,8 +181,13 @@ pub(crate) fn run<'a>(
         }
         let last = round == MOST_REFUSALS;
         if round == 0 {
-            oversize =
-                figures::considered(&searched.found, 0.0, &Refused::new(), &quest.surroundings);
+            let nothing = ToExplain::NOTHING;
+            oversize = figures::considered(
+                &searched.found,
+                &nothing,
+                &Refused::new(),
+                &quest.surroundings,
+            );
             oversize.retain(|c| c.refused.is_some());
         }
         let all = &searched.found.candidates;

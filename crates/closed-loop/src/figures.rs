@@ -4,7 +4,7 @@
 //! ```text
 //! variance explained   share of the before mean square that goes, out of fold
 //! detectable           5 sigma of the amplitude that was not added
-//! needed               amplitude whose mean square equals what is left over noise
+//! needed               amplitude that explains what is left by itself (questions/needed.rs)
 //! ```
 //!
 //! Source: formats.md of the design notes (report.json).
@@ -23,7 +23,9 @@ use telemetry::{EffectEntry, EffectValue};
 
 use crate::error::CloseError;
 use crate::evidence::Residuals;
-use crate::questions::hypothesis::{Questions, Told};
+use crate::questions::hypothesis::{Questions, SEEN};
+use crate::questions::needed::ToExplain;
+use crate::questions::told::Told;
 use crate::search::empirical::EMPIRICAL;
 use crate::search::group::{Group, is_believed};
 use crate::search::refusal::{Refusal, Refused};
@@ -35,7 +37,7 @@ use crate::unexplained::SEARCH_ALPHA;
 /// Shares within this factor are the same.
 const SAME: f64 = 3.0;
 /// Correlations below this are not worth a reader's time.
-const CONFUSABLE: f64 = 0.3;
+pub const CONFUSABLE: f64 = 0.3;
 
 /// The added effects, in the order added, with joint estimates from all data.
 /// `explained` is the share of the before variance of each.
@@ -201,7 +203,7 @@ pub(crate) fn told(selectors: &BTreeMap<String, String>) -> BTreeMap<String, Sel
 /// Every effect of the catalogue that was not added.
 pub(crate) fn considered(
     found: &Found,
-    excess: f64,
+    to_explain: &ToExplain<'_>,
     against: &Refused,
     surroundings: &Surroundings<'_>,
 ) -> Vec<ConsideredEffect> {
@@ -214,14 +216,14 @@ pub(crate) fn considered(
                 .iter()
                 .any(|&g| found.candidates[g].id() == kind.id())
         })
-        .map(|kind| consider(found, kind.id(), excess, against, surroundings))
+        .map(|kind| consider(found, kind.id(), to_explain, against, surroundings))
         .collect()
 }
 
 fn consider(
     found: &Found,
     id: &str,
-    excess: f64,
+    to_explain: &ToExplain<'_>,
     against: &Refused,
     surroundings: &Surroundings<'_>,
 ) -> ConsideredEffect {
@@ -234,6 +236,7 @@ fn consider(
         });
     let mut entry = ConsideredEffect {
         id: id.to_owned(),
+        selectors: BTreeMap::new(),
         delta_loglik: None,
         p_value: None,
         observable: best.is_some(),
@@ -255,19 +258,26 @@ fn consider(
     entry.delta_loglik = Some(judged.delta_loglik);
     entry.p_value = Some(judged.p_value);
     let first = first_column(&found.candidates, g);
-    let mut set = columns_of(&found.fitted.groups, &found.selection.chosen);
-    let own = set.len();
-    set.extend(&found.fitted.groups[g].columns);
-    if let (Some(estimate), Some(&column)) = (
-        found.fitted.fits.estimate(&set),
-        found.fitted.groups[g].columns.first(),
-    ) {
-        let coefficient = &found.candidates[g].coefficients()[column - first];
-        entry.detectable = Some(5.0 * estimate.sigma(own));
-        let information = found.fitted.fits.information(column);
-        entry.needed = (excess > 0.0 && information > 0.0).then(|| (excess / information).sqrt());
-        entry.parameter = Some(coefficient.name.clone());
-        entry.unit = Some(coefficient.unit.to_owned());
+    let candidate = found.candidates[g].as_ref();
+    let group = &found.fitted.groups[g];
+    let added = columns_of(&found.fitted.groups, &found.selection.chosen);
+    let mut set = added.clone();
+    set.extend(&group.columns);
+    if let (Some(estimate), Some(&column)) =
+        (found.fitted.fits.estimate(&set), group.columns.first())
+    {
+        let own = added.len();
+        let shows = judged.stands() || entry.refused.is_some() || entry.against.is_some();
+        if !shows && !group.could_show(&estimate, own) {
+            entry.observable = false;
+            return entry;
+        }
+        let told = Told::of_magnitude(candidate, column - first, surroundings);
+        entry.detectable = Some(told.size(SEEN * estimate.sigma(own)));
+        entry.needed = to_explain.needed(column, &added).map(|n| told.size(n));
+        entry.selectors = self::told(&candidate.selectors());
+        entry.parameter = Some(told.name);
+        entry.unit = Some(told.unit);
     }
     entry
 }
@@ -314,20 +324,11 @@ fn refused(found: &Found, id: &str, surroundings: &Surroundings<'_>) -> Option<R
             return None;
         }
         let candidate = found.candidates[g].as_ref();
-        if value < low {
-            // below what the parameter can be there is only the coefficient
-            let coefficient = &candidate.coefficients()[column - first];
-            return Some(RefusedSize {
-                parameter: coefficient.name.clone(),
-                unit: coefficient.unit.to_owned(),
-                value,
-                believed: [low, high],
-            });
-        }
-        let told = Told::of(candidate, column - first, surroundings);
+        let told = Told::of_magnitude(candidate, column - first, surroundings);
+        let (value, believed) = told.beyond(value, [low, high]);
         Some(RefusedSize {
-            value: told.size(value),
-            believed: [low, high].map(|v| told.size(v)),
+            value,
+            believed,
             parameter: told.name,
             unit: told.unit,
         })

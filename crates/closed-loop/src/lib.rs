@@ -19,6 +19,7 @@
 //! questions          what else it could be, what would tell, and what somebody asks by name
 //! unexplained        what no effect explains: lines, jumps, waves on the detector
 //! figures            findings turned into the report
+//! noise_level        whether what is left is as loud as declared
 //! motion  bins       whether samples resolve a motion; long series as means over short stretches
 //! ```
 //!
@@ -39,6 +40,7 @@ mod gaps;
 mod image_level;
 mod motion;
 mod noise_effects;
+mod noise_level;
 mod outcome;
 mod questions;
 mod search;
@@ -49,8 +51,11 @@ mod unexplained;
 
 pub use close::{close, close_asking};
 pub use error::CloseError;
+pub use figures::CONFUSABLE;
+pub use noise_level::{noise_ratio, times};
 pub use outcome::{Closed, Rival};
-pub use questions::hypothesis::{NEXT_TO_NEVER, Questions, p_is};
+pub use questions::hypothesis::{NEXT_TO_NEVER, Questions, of_size, p_is};
+pub use questions::manoeuvre::NEEDED_SIGMA;
 
 /// Seeds of a trial of alarms and the most of them that may raise one: `seeds` and
 /// `most`, or as many as `BORESIGHT_SEEDS` says and 5 sigma above one in `rarity`.

@@ -79,7 +79,8 @@ pub(crate) struct NoiseEffects {
 
 impl NoiseEffects {
     /// Sizes at which each effect that was not claimed would explain `excess` by itself: squared
-    /// residual beyond the noise, arcsec^2, over all rows. Of spikes, those of [`SPIKE`] sigmas.
+    /// residual beyond the noise, arcsec^2, over all rows. Of spikes, those of [`SPIKE`] sigmas. None where it
+    /// is not of a kind that the effect makes: only a slope of faint stars that are quieter, or more spikes than rows.
     pub(crate) fn need(
         &mut self,
         situation: &Situation<'_>,
@@ -116,7 +117,8 @@ impl NoiseEffects {
                 OUTLIERS => Some(wanted / (SPIKE * SPIKE * mean(&|r| declared[r]))),
                 _ => None,
             }
-            .filter(|n| n.is_finite());
+            .filter(|n| n.is_finite() && *n > 0.0)
+            .filter(|n| entry.id != OUTLIERS || *n <= 1.0);
         }
         Ok(())
     }
@@ -272,6 +274,11 @@ pub(crate) fn claim(
         &[("arcsec_per_deg_s", "arcsec/(deg/s)")],
         &verdicts.rate,
     );
+    // a square that is estimated as none has no error
+    let least = source.least_rate(SEEN);
+    for entry in out.considered.iter_mut().filter(|c| c.id == RATE) {
+        entry.detectable = entry.detectable.or(least);
+    }
     out.add(
         OUTLIERS,
         &[("rate", ""), ("size_arcsec", "arcsec")],
@@ -309,9 +316,10 @@ impl NoiseEffects {
             return;
         }
         if !judged.stands {
-            let [value, sigma] = judged.values[0];
+            let [_, sigma] = judged.values[0];
             let significant = judged.p_value < FAMILY_ALPHA && judged.gain > 0.0;
             self.considered.push(ConsideredEffect {
+                selectors: BTreeMap::new(),
                 against: judged.against.filter(|_| significant).map(str::to_owned),
                 id: id.to_owned(),
                 delta_loglik: Some(judged.gain),
@@ -320,9 +328,8 @@ impl NoiseEffects {
                 // a slope has to differ from the declared one, a rate adds in square; of spikes, the fewest
                 // that make a share
                 detectable: match id {
-                    OUTLIERS => judged.fewest,
+                    OUTLIERS | RATE => judged.least_seen,
                     MAGNITUDE => Some(judged.least + SEEN * sigma),
-                    RATE if value > 0.0 => Some((2.0 * SEEN * value * sigma).sqrt()),
                     _ => None,
                 },
                 needed: None,

@@ -4,6 +4,8 @@
 //! hypothesis      what the data says of an effect that somebody asks about by name
 //! confusion       what else could have explained the residual
 //! manoeuvre       which small motion would tell the two apart
+//! needed          how large an effect would have to be to explain the residual by itself
+//! told            coefficients as the parameters of the catalogue
 //! ```
 //!
 //! Not physics: the contents of a folder.
@@ -11,3 +13,5 @@
 pub(crate) mod confusion;
 pub(crate) mod hypothesis;
 pub(crate) mod manoeuvre;
+pub(crate) mod needed;
+pub(crate) mod told;

@@ -5,6 +5,8 @@
 
 mod assess_figures;
 mod assess_text;
+#[cfg(test)]
+mod bare;
 mod compare_figures;
 mod compare_tables;
 mod compare_text;
@@ -16,6 +18,7 @@ mod scene_figures;
 mod set_aside;
 mod text;
 mod verdict;
+mod why_not;
 mod windows;
 
 pub use assess_figures::assess_figures;

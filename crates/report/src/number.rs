@@ -23,6 +23,16 @@ pub(crate) fn number(value: f64) -> String {
     format!("{value:.3e}")
 }
 
+/// One decimal, as [`decimal`] has it; nothing has no sign.
+pub(crate) fn tenths(value: f64) -> String {
+    let text = decimal(value, 1);
+    if text == "-0.0" {
+        "0.0".to_owned()
+    } else {
+        text
+    }
+}
+
 /// Three significant digits, with typographic signs.
 pub(crate) fn short(value: f64) -> String {
     if !value.is_finite() {

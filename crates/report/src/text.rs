@@ -3,13 +3,16 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-use closed_loop::{Closed, p_is};
-use telemetry::report::{Dependence, Errors, RefusedSize, Report, Selector, listed};
+use closed_loop::{CONFUSABLE, Closed, NEEDED_SIGMA, p_is};
+use telemetry::report::{
+    Confusable, ConsideredEffect, Dependence, Errors, Report, Selector, listed,
+};
 
-use crate::number::{decimal, number, number_to};
+use crate::number::{decimal, number, number_to, tenths};
 use crate::order::by_number;
 use crate::set_aside;
 use crate::verdict::sentence;
+use crate::why_not::in_spite_of_its_gain;
 use crate::windows;
 
 /// The findings of a run in words and numbers, some 20 lines of at most 100 columns.
@@ -24,7 +27,13 @@ pub fn summary(closed: &Closed) -> String {
     rivals(&mut out, closed);
     considered(&mut out, report);
     leftover(&mut out, report);
-    out
+    trimmed(&out)
+}
+
+/// Without the blanks that empty columns leave at the end of a row.
+fn trimmed(text: &str) -> String {
+    let rows = text.lines();
+    rows.fold(String::new(), |all, row| all + row.trim_end() + "\n")
 }
 
 /// Writing to a string cannot fail.
@@ -158,6 +167,7 @@ fn effects(out: &mut String, report: &Report) {
         let alike: Vec<String> = effect
             .confusable_with
             .iter()
+            .filter(|c| c.correlation.abs() >= CONFUSABLE)
             .take(3)
             .map(|c| {
                 let on = selectors(&c.selectors);
@@ -173,7 +183,7 @@ fn effects(out: &mut String, report: &Report) {
                 let here = format!("this data tells it from {}{on} at {here:.1} sigma", c.id);
                 wrapped(out, "            ", &here);
             }
-            if let Some(manoeuvre) = &c.manoeuvre {
+            if let Some(manoeuvre) = c.manoeuvre.as_ref().filter(|_| !is_told_apart(c)) {
                 wrapped(out, "            ", &manoeuvre.text);
             }
         }
@@ -181,6 +191,13 @@ fn effects(out: &mut String, report: &Report) {
     if !report.effects.is_empty() {
         line!(out);
     }
+}
+
+/// Whether this data tells the two apart already, and better than the manoeuvre would.
+fn is_told_apart(c: &Confusable) -> bool {
+    let flown = c.manoeuvre.as_ref().map_or(0.0, |m| m.sigma);
+    c.separation_sigma
+        .is_some_and(|here| here > NEEDED_SIGMA && here > flown)
 }
 
 /// The answers to what was asked by name.
@@ -218,6 +235,13 @@ pub(crate) fn selectors(of: &BTreeMap<String, Selector>) -> String {
     format!(" ({})", listed(of))
 }
 
+/// As wide as the longest name, and at least `usual`.
+fn column<'a>(names: impl Iterator<Item = &'a str>, usual: usize) -> usize {
+    names
+        .map(|name| name.chars().count())
+        .fold(usual, usize::max)
+}
+
 fn rivals(out: &mut String, closed: &Closed) {
     if closed.rivals.is_empty() {
         return;
@@ -227,62 +251,69 @@ fn rivals(out: &mut String, closed: &Closed) {
     } else {
         &["X", "Y", "Z"]
     };
-    let mut row = format!("{:<52}", "Rival explanations, rms in arcsec out of fold");
+    let title = "Rival explanations, rms in arcsec out of fold";
+    let width = column(
+        closed.rivals.iter().map(|r| r.what.as_str()),
+        title.len() + 5,
+    );
+    let mut row = format!("{title:<0$}", width + 2);
     for axis in axes {
         let _ = write!(row, "{axis:>9}");
     }
     line!(out, "{row}{:>12}", "gain, nats");
     for rival in &closed.rivals {
-        let mut row = format!("  {:<50}", rival.what);
+        let mut row = format!("  {:<width$}", rival.what);
         for rms in &rival.rms_arcsec {
             let _ = write!(row, " {:>8}", decimal(*rms, 4));
         }
-        line!(out, "{row} {:>11}", decimal(rival.delta_loglik, 1));
+        line!(out, "{row} {:>11}", tenths(rival.delta_loglik));
     }
     line!(out);
 }
 
-/// Why an effect was refused by its size.
-pub(crate) fn of_size(size: &RefusedSize) -> String {
-    let [least, most] = size.believed.map(number);
-    let RefusedSize {
-        parameter,
-        unit,
-        value,
-        ..
-    } = size;
-    format!(
-        "of a size that nature does not make: {parameter} {} {unit} (believed: {least} to {most})",
-        number(*value)
-    )
-}
+/// Effects that are told of those that were not added.
+const FIRST: usize = 8;
+/// Columns for what a row is about.
+const NAMES: usize = 26;
 
 fn considered(out: &mut String, report: &Report) {
-    let (seen, unseen): (Vec<_>, Vec<_>) = report.considered.iter().partition(|c| c.observable);
-    let mut tried = seen;
-    tried.sort_by(|a, b| {
-        b.delta_loglik
-            .unwrap_or(0.0)
-            .total_cmp(&a.delta_loglik.unwrap_or(0.0))
-    });
+    let (mut tried, unseen): (Vec<_>, Vec<_>) =
+        report.considered.iter().partition(|c| c.observable);
+    // those without a fit of their own come last
+    let gain = |c: &ConsideredEffect| c.delta_loglik.unwrap_or(f64::NEG_INFINITY);
+    tried.sort_by(|a, b| gain(b).total_cmp(&gain(a)));
     if !tried.is_empty() {
         line!(
             out,
-            "Considered and not added (gain in nats; size that would have shown at 5 sigma):"
+            "Considered and not added (gain in nats, its chance, size that would have shown at 5 sigma):"
         );
-        for c in tried.iter().take(8) {
+        let (told, more) = tried.split_at(FIRST.min(tried.len()));
+        let width = column(told.iter().map(|c| c.id.as_str()), NAMES);
+        for c in told {
             let size = match (&c.parameter, c.detectable, &c.unit) {
-                _ if c.refused.is_some() => c.refused.iter().map(of_size).collect(),
-                (Some(parameter), Some(d), Some(unit)) => {
+                (Some(parameter), Some(d), Some(unit)) if c.refused.is_none() => {
                     format!("{parameter} {} {unit}", number(d))
                 }
                 _ => String::new(),
             };
-            let gain = c.delta_loglik.map_or("-".to_owned(), |g| decimal(g, 1));
-            line!(out, "  {:<26} {gain:>8}   {size}", c.id);
-            if let Some(why) = &c.against {
-                line!(out, "    not named: {why}");
+            let on = selectors(&c.selectors);
+            let gain = c.delta_loglik.map_or("-".to_owned(), tenths);
+            let chance = c.p_value.map_or(String::new(), p_is);
+            line!(
+                out,
+                "  {:<width$} {gain:>8}   {chance:<11} {size}{on}",
+                c.id
+            );
+            if let Some(why) = in_spite_of_its_gain(c, report) {
+                wrapped(out, "    ", &why);
             }
+        }
+        if let Some(next) = more.first() {
+            let above = match next.delta_loglik {
+                Some(gain) => format!("none above {} nats", tenths(gain)),
+                None => "without a fit of their own".to_owned(),
+            };
+            line!(out, "  and {} more, {above}", more.len());
         }
     }
     if !unseen.is_empty() {
@@ -336,10 +367,12 @@ pub(crate) fn is_certain(d: &Dependence) -> bool {
 }
 
 fn follows(out: &mut String, list: &[Dependence]) {
-    for d in list.iter().filter(|d| is_certain(d)).take(5) {
+    let told: Vec<_> = list.iter().filter(|d| is_certain(d)).take(5).collect();
+    let width = column(told.iter().map(|d| d.variable.as_str()), 34);
+    for d in told {
         line!(
             out,
-            "  {:<34} {:>6.1} %   {}",
+            "  {:<width$} {:>6.1} %   {}",
             d.variable,
             100.0 * d.variance_explained,
             p_is(d.p_value)
@@ -350,26 +383,9 @@ fn follows(out: &mut String, list: &[Dependence]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use telemetry::report::{REPORT_FORMAT, Rows, Unattributed};
 
     fn report() -> Report {
-        Report {
-            format: REPORT_FORMAT.to_owned(),
-            verdict: telemetry::report::Verdict::Unexplained,
-            folds: 5,
-            rows: Rows {
-                used: 100,
-                outliers: 0,
-                outside_reference: 0,
-            },
-            windows: None,
-            before: Errors::default(),
-            after: Errors::default(),
-            effects: vec![],
-            considered: vec![],
-            hypotheses: vec![],
-            unattributed: Unattributed::default(),
-        }
+        crate::bare::report(telemetry::report::Verdict::Unexplained)
     }
 
     #[test]
@@ -401,5 +417,108 @@ mod tests {
             out,
             "Lines in its spectrum, Hz: 0.0125, 0.25\nJumps, at s: 812.5\n"
         );
+    }
+
+    fn tried(id: &str, delta_loglik: Option<f64>) -> ConsideredEffect {
+        ConsideredEffect {
+            id: id.to_owned(),
+            selectors: BTreeMap::new(),
+            delta_loglik,
+            p_value: delta_loglik.map(|_| 0.5),
+            observable: true,
+            detectable: Some(0.2),
+            needed: None,
+            against: None,
+            parameter: Some("scale".to_owned()),
+            unit: Some(String::new()),
+            refused: None,
+        }
+    }
+
+    /// Rows that are not printed are counted, and what has no gain is not more than what loses a little.
+    #[test]
+    fn what_was_considered_is_all_accounted_for() {
+        let mut report = report();
+        report.considered = (0..7).map(|k| tried("a", Some(f64::from(k)))).collect();
+        report.considered.push(tried("without", None));
+        report
+            .considered
+            .push(tried("next_to_nothing", Some(-0.04)));
+        report.considered.push(tried("loses", Some(-3.0)));
+        report.considered[6].p_value = Some(2e-5);
+        let mut out = String::new();
+        considered(&mut out, &report);
+        let out = trimmed(&out);
+        assert!(!out.contains("-0.0"), "{out}");
+        assert!(
+            !out.contains("  without") && out.contains("next_to_nothing"),
+            "{out}"
+        );
+        assert!(
+            out.contains("  and 2 more, none above -3.0 nats\n"),
+            "{out}"
+        );
+        assert!(
+            out.contains("p = 2.0e-5") && out.contains("visible alone, but"),
+            "{out}"
+        );
+        assert!(out.lines().all(|row| row == row.trim_end()), "{out}");
+    }
+
+    /// Asked about is not alike; and nobody needs to fly what the data has told better.
+    #[test]
+    fn what_is_told_apart_is_no_likeness() {
+        let of = |id: &str, correlation: f64, here: f64| Confusable {
+            id: id.to_owned(),
+            selectors: BTreeMap::new(),
+            correlation,
+            delta_loglik: None,
+            separation_sigma: Some(here),
+            manoeuvre: Some(telemetry::report::Manoeuvre {
+                kind: "slew".to_owned(),
+                axis: [0.0, 0.0, 1.0],
+                rate_deg_s: 0.2,
+                duration_s: 60.0,
+                ramp_s: 12.0,
+                sigma: 11.0,
+                text: format!("a slew tells {id}"),
+            }),
+        };
+        let mut report = report();
+        report.effects = vec![telemetry::report::FoundEffect {
+            id: "rolling_shutter".to_owned(),
+            selectors: BTreeMap::new(),
+            parameters: BTreeMap::new(),
+            delta_loglik: 50.0,
+            p_value: 1e-9,
+            variance_explained: None,
+            confusable_with: vec![
+                of("time_tag_offset", 0.6, 584.0),
+                of("step_misalignment", -0.4, 7.0),
+                of("exposure_smear", 0.002, 3.0),
+            ],
+        }];
+        let mut out = String::new();
+        effects(&mut out, &report);
+        let alike = "looks like time_tag_offset (+0.60), step_misalignment (-0.40)\n";
+        assert!(out.contains(alike), "{out}");
+        assert!(!out.contains("a slew tells time_tag_offset"), "{out}");
+        assert!(out.contains("a slew tells step_misalignment"), "{out}");
+        assert!(out.contains("a slew tells exposure_smear"), "{out}");
+    }
+
+    /// A long name moves no column of the others.
+    #[test]
+    fn columns_are_as_wide_as_their_names() {
+        let long = "housekeeping:a_temperature_somewhere*housekeeping:another";
+        let of = |variable: &str| Dependence {
+            variable: variable.to_owned(),
+            variance_explained: 0.05,
+            p_value: 1e-6,
+        };
+        let mut out = String::new();
+        follows(&mut out, &[of(long), of("rate")]);
+        let at: Vec<_> = out.lines().map(|row| row.find('%')).collect();
+        assert!(at[0].is_some() && at[0] == at[1], "{out}");
     }
 }

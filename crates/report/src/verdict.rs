@@ -1,11 +1,7 @@
 //! The verdict of a run as a sentence.
 
+use closed_loop::{noise_ratio, times};
 use telemetry::report::{Report, Verdict};
-
-/// What a declared noise level may be off by without a word: by 20 % either way it usually is.
-const NOMINAL: f64 = 1.25;
-/// Standard deviations by which the level must be off, too: few rows do not tell it.
-const BEYOND_DOUBT: f64 = 5.0;
 
 /// The verdict in words. Where nothing is left, all of chi-squared is noise: a level far from the declared one
 /// is said.
@@ -13,11 +9,14 @@ pub(crate) fn sentence(report: &Report) -> String {
     let causes = report.effects.iter().filter(|e| e.id != "empirical");
     let names: Vec<&str> = causes.map(|e| e.id.as_str()).collect();
     let names = names.join(" + ");
-    let noise = noise_ratio(report).map(times);
+    let noise = noise_ratio(report.after.chi2_per_dof, report.rows.used).map(times);
     match (report.verdict, noise) {
-        (Verdict::Consistent, None) => {
-            "the data follows the declared model; nothing is left to explain".to_owned()
-        }
+        (Verdict::Consistent, None) => match cost_of_another(report) {
+            None => "the data follows the declared model; nothing is left to explain".to_owned(),
+            Some(cost) => format!(
+                "nothing is left to explain, but the error's spectrum is not the declared model's: log-PSD cost {cost:.1} for 1"
+            ),
+        },
         (Verdict::Consistent, Some(noise)) => format!(
             "the data follows the declared model with {noise} its noise; nothing else is left"
         ),
@@ -34,49 +33,34 @@ pub(crate) fn sentence(report: &Report) -> String {
     }
 }
 
-/// Noise over the declared, sigma over sigma, where that is far off: of n values chi-squared per degree of
-/// freedom scatters by sqrt(2 / n).
-fn noise_ratio(report: &Report) -> Option<f64> {
-    let chi2 = report.after.chi2_per_dof.filter(|c| *c > 0.0)?;
-    let ratio = chi2.sqrt();
-    let values = 2.0 * report.rows.used as f64;
-    let far = ratio.max(1.0 / ratio) > NOMINAL;
-    let sure = chi2.ln().abs() > BEYOND_DOUBT * (2.0 / values).sqrt();
-    (far && sure).then_some(ratio)
-}
+/// What a log-PSD cost may be by chance. It is the mean square over the bins of what each is off by in its sigmas: at 5
+/// that is 2.2 of them all over the band. Of a draw of the model it scatters by sqrt(2 / bins) around 1, of eight bins by
+/// 0.5, so that 5 is eight times that away.
+const COST_OF_ANOTHER: f64 = 5.0;
 
-fn times(ratio: f64) -> String {
-    let digits = if ratio < 1.0 { 2 } else { 1 };
-    format!("{ratio:.digits$} times")
+/// The largest log-PSD cost after, where the spectrum is not one of the model.
+fn cost_of_another(report: &Report) -> Option<f64> {
+    let costs = report.after.log_psd_cost?;
+    let most = costs.into_iter().fold(0.0, f64::max);
+    (most > COST_OF_ANOTHER).then_some(most)
 }
 
 #[cfg(test)]
 mod tests {
-    use telemetry::report::{Errors, REPORT_FORMAT, Rows, Unattributed};
+    use telemetry::report::Errors;
 
     use super::*;
+    use crate::bare;
 
     fn said(verdict: Verdict, chi2: Option<f64>, used: usize) -> String {
         let errors = || Errors {
             chi2_per_dof: chi2,
             ..Errors::default()
         };
-        sentence(&Report {
-            format: REPORT_FORMAT.to_owned(),
-            verdict,
-            folds: 5,
-            rows: Rows {
-                used,
-                ..Rows::default()
-            },
-            windows: None,
-            before: errors(),
-            after: errors(),
-            effects: vec![],
-            considered: vec![],
-            hypotheses: vec![],
-            unattributed: Unattributed::default(),
-        })
+        let mut report = bare::report(verdict);
+        report.rows.used = used;
+        (report.before, report.after) = (errors(), errors());
+        sentence(&report)
     }
 
     /// Twenty percent either way is as declared, and few rows prove nothing; four times is not.
@@ -94,5 +78,17 @@ mod tests {
         assert!(explained.ends_with("nothing is left, but noise is 4.0 times the declared"));
         // where something is left nobody knows what of it is noise
         assert!(!said(Verdict::Unexplained, Some(16.0), 1000).contains("noise"));
+    }
+
+    /// Nothing that is left is not the same as a spectrum of the model's.
+    #[test]
+    fn a_spectrum_of_another_model_is_said() {
+        let of = |cost: f64| {
+            let mut report = bare::report(Verdict::Consistent);
+            report.after.log_psd_cost = Some([1.0, cost, 1.1]);
+            sentence(&report)
+        };
+        assert!(of(1.3).contains("follows the declared model"));
+        assert!(!of(8.0).contains("follows") && of(8.0).contains("log-PSD cost 8.0"));
     }
 }

@@ -123,6 +123,7 @@ fn findings(stars: bool, attitude: bool) -> Report {
         }],
     };
     let tried = |id: &str, observable: bool| ConsideredEffect {
+        selectors: BTreeMap::new(),
         against: None,
         id: id.to_owned(),
         delta_loglik: observable.then_some(-0.42),

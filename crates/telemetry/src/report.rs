@@ -271,13 +271,17 @@ pub struct HypothesisSize {
     pub sigma: Option<f64>,
     /// What this data would have shown at 5 sigma.
     pub detectable: Option<f64>,
-    /// At which it would explain by itself what is left beyond the noise beside the other effects added.
+    /// At which it would explain by itself what is left beside the other effects added.
     pub needed: Option<f64>,
-    /// At which it would explain by itself all that the declared model leaves beyond the noise.
+    /// At which it would explain by itself all that the declared model leaves: what the effects added explain, and
+    /// what is left.
     pub needed_alone: Option<f64>,
     /// 1 sigma of the sizes that nature makes.
     pub plausible: Option<f64>,
-    /// Whether `needed` (or `needed_alone`) is within three of those.
+    /// The largest size that is believed: the effect is named up to it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub believed_to: Option<f64>,
+    /// Whether `needed` (or `needed_alone`) is believed.
     pub needed_is_plausible: Option<bool>,
 }
 
@@ -286,6 +290,9 @@ pub struct HypothesisSize {
 pub struct ConsideredEffect {
     /// Name in the catalogue.
     pub id: String,
+    /// Of its forms the one that fits best.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub selectors: BTreeMap<String, Selector>,
     /// Gain in out-of-fold log-likelihood, nats.
     pub delta_loglik: Option<f64>,
     /// Chance of such a gain without the effect.

@@ -28,6 +28,7 @@ use crate::outcome::{Closed, Rival};
 use crate::questions::confusion;
 use crate::questions::hypothesis::{self, Grounds};
 use crate::questions::manoeuvre::attitudes::fly;
+use crate::questions::needed::{ToExplain, beyond};
 use crate::search::catalogue;
 use crate::search::empirical::{Empirical, Variable, range};
 use crate::search::instants;
@@ -424,11 +425,33 @@ fn beyond_white(data: &AttitudeData, residual: &Residuals) -> Option<f64> {
         let rows: f64 = data.count[axis].iter().sum();
         let white = noise[axis].white * noise[axis].white;
         let square = figures::rms(&residual.axes[axis], &data.outlier[axis])?.powi(2);
-        if let Some(excess) = hypothesis::beyond(rows * (square - white), white, rows) {
+        if let Some(excess) = beyond(rows * (square - white), white, rows) {
             *whole.get_or_insert(0.0) += excess;
         }
     }
     whole
+}
+
+/// What is left of the squared residual `with` what was added, arcsec^2, and all that is left of `bare`, without it.
+/// `described` is the share of the latter that follows something; `None` where nothing is left.
+fn unexplained(
+    data: &AttitudeData,
+    [bare, with]: [&Residuals; 2],
+    described: Option<f64>,
+) -> [Option<f64>; 2] {
+    let square = |r: &Residuals| -> f64 {
+        let axis = |a: usize| {
+            let rows: f64 = data.count[a].iter().sum();
+            Some(rows * figures::rms(&r.axes[a], &data.outlier[a])?.powi(2))
+        };
+        (0..3).filter_map(axis).sum()
+    };
+    let left = described.map(|share| {
+        let over = beyond_white(data, with).unwrap_or(0.0);
+        over.max(share * square(bare))
+    });
+    let all = (square(bare) - square(with)).max(0.0) + left.unwrap_or(0.0);
+    [left, Some(all)].map(|excess| excess.filter(|e| *e > 0.0))
 }
 
 fn finish(
@@ -544,19 +567,30 @@ fn finish(
         chi2_per_dof: None,
         loglik_per_frame: Some(loglik_per_frame(data, r)),
     };
-    let mut considered = figures::considered(found, 0.0, refused, &situation.surroundings());
+    let lengths = column_lengths(&evidence, found);
+    let inside = |chosen: &[usize]| in_sample(&evidence, found, chosen);
+    let bare = inside(&[]).unwrap_or_else(|| before.clone());
+    let with = inside(chosen).unwrap_or_else(|| plain.clone());
+    let described = unattributed.variance_fraction.unwrap_or(0.0);
+    let described = unattributed.present.then_some(described);
+    let [left, alone] = unexplained(data, [&bare, &with], described);
+    let to_explain = ToExplain {
+        left,
+        alone,
+        length: &|column, _| lengths[column],
+    };
+    let mut considered = figures::considered(found, &to_explain, refused, &surroundings);
     if let Some(look) = look {
         look.tell(&mut considered);
     }
-    let lengths = column_lengths(&evidence, found);
     let hypotheses = hypothesis::answer(
         situation.questions,
         &Grounds {
             found,
             surroundings: situation.surroundings(),
-            information: &|c| lengths[c],
-            alone: beyond_white(data, &before),
-            left: beyond_white(data, &plain),
+            to_explain: &to_explain,
+            something_left: unattributed.present,
+            noise_ratio: None,
             resolved: motion.resolved(),
             unusable: None,
             effects: &effects,

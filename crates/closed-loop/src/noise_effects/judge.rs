@@ -77,8 +77,9 @@ pub(super) struct Judged {
     pub(super) stands: bool,
     /// What speaks against it although it is significant.
     pub(super) against: Option<&'static str>,
-    /// The share of rows that the fewest spikes are which make one.
-    pub(super) fewest: Option<f64>,
+    /// Of spikes the share of rows that the fewest are which make one, of a rate, which adds in square, the least that
+    /// would have shown.
+    pub(super) least_seen: Option<f64>,
     /// Values with sigmas: slope; rate; share and size.
     pub(super) values: [[f64; 2]; 2],
     /// What of the first value passes for nothing.
@@ -119,7 +120,7 @@ const UNSEEN: Judged = Judged {
     observable: false,
     stands: false,
     against: None,
-    fewest: None,
+    least_seen: None,
     values: [[0.0; 2]; 2],
     least: 0.0,
 };
@@ -432,7 +433,7 @@ impl Bench<'_> {
             observable: true,
             stands: against.is_none() && significant,
             against,
-            fewest: None,
+            least_seen: (k == RATE && sigma2 > 0.0).then(|| (super::SEEN * sigma2.sqrt()).sqrt()),
             values: [values, [0.0; 2]],
             least,
         }
@@ -499,7 +500,7 @@ impl Bench<'_> {
             observable: true,
             stands: against.is_none() && gain > 0.0 && p_value < FAMILY_ALPHA,
             against,
-            fewest: Some(MIN_SPIKES / rows.len().max(1) as f64),
+            least_seen: Some(MIN_SPIKES / rows.len().max(1) as f64),
             values: [
                 [share, share * part.hypot(sigma(SHARE) * (1.0 - share))],
                 [size, 0.5 * size * larger.hypot(sigma(SIZE))],

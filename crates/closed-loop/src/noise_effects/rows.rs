@@ -122,6 +122,30 @@ pub(super) struct Source<'a> {
 }
 
 impl Source<'_> {
+    /// The rate noise that would show at `sigmas` in white noise of the residual's level, arcsec/(deg/s); `None` where the
+    /// rate is the same everywhere.
+    ///
+    /// ```text
+    /// var(c^2) = 1 / sum (u - mean u)^2     u = rate^2 / variance: two squares a row, each with 2 variance^2 of its own,
+    ///                                       and the level unknown
+    /// ```
+    pub(super) fn least_rate(&self, sigmas: f64) -> Option<f64> {
+        let counted = |r: &usize| {
+            let axes = self.residual.iter().all(|a| a[*r].is_finite());
+            !self.data.outlier[*r] && axes && self.rate[*r].is_finite() && self.declared[*r] > 0.0
+        };
+        let rows: Vec<usize> = (0..self.rate.len()).filter(counted).collect();
+        let mean = |of: &dyn Fn(usize) -> f64| {
+            rows.iter().map(|&r| of(r)).sum::<f64>() / rows.len().max(1) as f64
+        };
+        let square = |r: usize| 0.5 * self.residual.iter().map(|a| a[r] * a[r]).sum::<f64>();
+        let level = mean(&|r| square(r) / self.declared[r]);
+        let u = |r: usize| self.rate[r] / (level * self.declared[r]);
+        let middle = mean(&u);
+        let spread = rows.len() as f64 * mean(&|r| (u(r) - middle).powi(2));
+        (spread > 0.0 && spread.is_finite()).then(|| (sigmas / spread.sqrt()).sqrt())
+    }
+
     /// All rows under `belief`: the variance of a row and how likely it is no spike.
     pub(super) fn rows(&self, belief: &dyn Fn(&Row) -> [f64; 2]) -> Vec<Row> {
         let step = self.data.t_s.len().div_ceil(MOST_ROWS).max(1);

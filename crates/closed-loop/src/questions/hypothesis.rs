@@ -2,14 +2,13 @@
 //!
 //! ```text
 //! detectable     5 sigma of the size, everything else estimated beside it
-//! needed         size c with c^2 |column|^2 = squared residual beyond the noise
+//! needed         needed.rs
 //! share          (E_without - E_with) / E_without, E the squared error at the best fit, in sample
 //! at most        (sqrt(E_without - E_with) + sqrt(k v chi2_95))^2 / E_without
 //! ```
 //!
-//! `|column|^2` is what the declared unknowns leave of the effect's regressor, `v` the noise
-//! variance, `chi2_95` the 95 % point for the effect's number of coefficients, and `k` how much
-//! wider than white noise the coefficients scatter from block to block. All of it is worked out
+//! `v` is the noise variance, `chi2_95` the 95 % point for the effect's number of coefficients, and `k`
+//! how much wider than white noise the coefficients scatter from block to block. All of it is worked out
 //! beside the other effects that were added. Sizes are given as the effect's parameter: a smear
 //! enters with the square of its exposure, and is told as an exposure.
 //!
@@ -22,13 +21,15 @@ use telemetry::report::{ConsideredEffect, FoundEffect, Hypothesis, HypothesisSiz
 
 use crate::error::CloseError;
 use crate::figures::told;
+use crate::noise_level::times;
+use crate::questions::needed::ToExplain;
+use crate::questions::told::Told;
+use crate::search::group::largest;
 use crate::search::selection::{FAMILY_ALPHA, columns_of};
 use crate::search::{Found, first_column, without};
 
 /// Sigmas that a size takes to be seen.
-const SEEN: f64 = 5.0;
-/// Sizes within this many sigmas of what nature makes are plausible.
-const PLAUSIBLE: f64 = 3.0;
+pub(crate) const SEEN: f64 = 5.0;
 /// Below it a chance is told by this bound alone.
 pub const NEXT_TO_NEVER: f64 = 1e-300;
 
@@ -94,24 +95,17 @@ impl Questions {
 pub(crate) struct Grounds<'a> {
     pub(crate) found: &'a Found,
     pub(crate) surroundings: Surroundings<'a>,
-    /// Squared length of a candidate column, in the square of the residual's unit.
-    pub(crate) information: &'a dyn Fn(usize) -> f64,
-    /// Squared residual beyond the noise of the declared model, and with what was added; `None`
-    /// where there is none to speak of.
-    pub(crate) alone: Option<f64>,
-    pub(crate) left: Option<f64>,
+    pub(crate) to_explain: &'a ToExplain<'a>,
+    /// Whether the verdict is that something is left.
+    pub(crate) something_left: bool,
+    /// Noise over the declared, where that is far off.
+    pub(crate) noise_ratio: Option<f64>,
     /// Whether the samples tell how the tracker moved between them.
     pub(crate) resolved: bool,
     /// Why the raw windows that there are tell nothing.
     pub(crate) unusable: Option<String>,
     pub(crate) effects: &'a [FoundEffect],
     pub(crate) considered: &'a [ConsideredEffect],
-}
-
-/// Whether a squared residual stands out of noise with `scalars` numbers of `variance` each: by 5
-/// sigma of the sum of their squares.
-pub(crate) fn beyond(excess: f64, variance: f64, scalars: f64) -> Option<f64> {
-    (excess > SEEN * variance * (2.0 * scalars).sqrt()).then_some(excess)
 }
 
 /// Answers in the order asked.
@@ -143,8 +137,20 @@ impl Grounds<'_> {
         }
         answer.added = self.effects.iter().any(|e| e.id == id);
         let against = considered.and_then(|c| c.against.as_deref());
-        answer.finding = finding(&answer, against, !self.effects.is_empty());
+        answer.finding = finding(&answer, against, !self.effects.is_empty(), &self.rest());
         answer
+    }
+
+    /// Why an effect has nothing to explain, in the words of the verdict.
+    fn rest(&self) -> String {
+        match (self.something_left, self.noise_ratio) {
+            (false, None) => "nothing is left that it could explain".to_owned(),
+            (false, Some(ratio)) => format!(
+                "nothing is left that it could explain: only the noise is {} the declared",
+                times(ratio)
+            ),
+            (true, _) => "it could explain none of what is left".to_owned(),
+        }
     }
 
     /// The form of an effect that was added, or that gains most.
@@ -176,10 +182,11 @@ impl Grounds<'_> {
             ..Hypothesis::default()
         };
         let fits = &found.fitted.fits;
+        let group = &found.fitted.groups[g];
         let others = without(&found.selection.chosen, &[g]);
         let beside = columns_of(&found.fitted.groups, &others);
         let mut with = beside.clone();
-        with.extend(&found.fitted.groups[g].columns);
+        with.extend(&group.columns);
         let (Some(estimate), Some(e0), Some(e1), Some(variance)) = (
             fits.estimate(&with),
             fits.error(&beside),
@@ -197,41 +204,48 @@ impl Grounds<'_> {
         let chi2 = ChiSquared::new(p as f64).map_or(0.0, |law| law.inverse_cdf(0.95));
         let most = (taken.sqrt() + (widening * variance * chi2).sqrt()).powi(2);
         // of what was added all that it explains is told, and nothing of what is left
-        let left = self.left.filter(|_| !chosen);
         answer.variance_share = Some(taken / e0);
         answer.variance_share_at_most = Some((most / e0).min(1.0));
         let first = first_column(&found.candidates, g);
-        answer.sizes = found.fitted.groups[g]
+        answer.sizes = group
             .columns
             .iter()
             .enumerate()
             .map(|(k, &column)| {
                 let at = (column, column - first, own + k);
-                self.size(candidate, at, &estimate, left)
+                let bounds = group.bounds[k];
+                self.size(
+                    candidate,
+                    at,
+                    bounds,
+                    &estimate,
+                    (!chosen).then_some(&beside),
+                )
             })
             .collect();
+        if !chosen && !answer.significant && !group.could_show(&estimate, own) {
+            answer.observable = false;
+            answer.reason = answer.sizes.first().map(unseen);
+        }
         answer
     }
 
-    /// The sizes of coefficient `j` of a candidate, whose column is `column` and whose estimate is number `at`; `left`
-    /// is what it is to explain.
+    /// The sizes of coefficient `j` of a candidate, whose column is `column` and whose estimate is number `at`; `beside`
+    /// are the columns that leave what it is to explain.
     fn size(
         &self,
         candidate: &dyn Candidate,
         (column, j, at): (usize, usize, usize),
+        bounds: [f64; 2],
         estimate: &Estimate,
-        left: Option<f64>,
+        beside: Option<&Vec<usize>>,
     ) -> HypothesisSize {
         let coefficient = &candidate.coefficients()[j];
         let told = Told::of(candidate, j, &self.surroundings);
         let (value, sigma) = (estimate.value[at], estimate.sigma(at));
-        let information = (self.information)(column);
-        let needed = |excess: Option<f64>| {
-            excess
-                .filter(|_| information > 0.0)
-                .map(|e| (e / information).sqrt())
-        };
-        let [left, alone] = [needed(left), needed(self.alone)];
+        let most = largest(bounds);
+        let left = beside.and_then(|added| self.to_explain.needed(column, added));
+        let alone = self.to_explain.needed_alone(column);
         HypothesisSize {
             parameter: told.name.clone(),
             unit: told.unit.clone(),
@@ -244,9 +258,8 @@ impl Grounds<'_> {
                 .plausible
                 .is_finite()
                 .then(|| told.size(coefficient.plausible)),
-            needed_is_plausible: left
-                .or(alone)
-                .map(|n| n <= PLAUSIBLE * coefficient.plausible),
+            believed_to: most.is_finite().then(|| told.size(most)),
+            needed_is_plausible: left.or(alone).map(|n| n <= most),
         }
     }
 
@@ -288,7 +301,7 @@ impl Grounds<'_> {
                         parameter: parameter.clone(),
                         unit: c.unit.clone().unwrap_or_default(),
                         detectable: c.detectable,
-                        needed: c.needed.filter(|_| self.left.is_some()),
+                        needed: c.needed,
                         ..HypothesisSize::default()
                     })
                     .collect(),
@@ -323,74 +336,6 @@ impl Grounds<'_> {
     }
 }
 
-/// The parameter by which a coefficient is told.
-pub(crate) struct Told<'a> {
-    candidate: &'a dyn Candidate,
-    surroundings: &'a Surroundings<'a>,
-    j: usize,
-    pub(crate) name: String,
-    pub(crate) unit: String,
-    /// Position among the effect's parameters; `None`: the coefficient is its own parameter.
-    parameter: Option<usize>,
-}
-
-impl<'a> Told<'a> {
-    pub(crate) fn of(
-        candidate: &'a dyn Candidate,
-        j: usize,
-        surroundings: &'a Surroundings<'a>,
-    ) -> Self {
-        let coefficient = &candidate.coefficients()[j];
-        let mut told = Self {
-            candidate,
-            surroundings,
-            j,
-            name: coefficient.name.clone(),
-            unit: coefficient.unit.to_owned(),
-            parameter: None,
-        };
-        let typical = if coefficient.plausible.is_finite() {
-            coefficient.plausible
-        } else {
-            1.0
-        };
-        if let (Some(small), Some(large)) = (told.realised(0.5 * typical), told.realised(typical)) {
-            let moved = small
-                .iter()
-                .zip(&large)
-                .position(|(a, b)| a.unit != "rad" && (a.value - b.value).abs() > 0.0);
-            // sine and cosine share one amplitude, which knows no sign
-            let opposite = (coefficient.lower < 0.0).then(|| told.realised(-typical));
-            let signed = |k: usize| match &opposite {
-                Some(Some(below)) => (below[k].value - large[k].value).abs() > 0.0,
-                _ => true,
-            };
-            if let Some(k) = moved.filter(|k| signed(*k)) {
-                told.name.clone_from(&large[k].name);
-                told.unit = large[k].unit.to_owned();
-                told.parameter = Some(k);
-            }
-        }
-        told
-    }
-
-    fn realised(&self, value: f64) -> Option<Vec<effects::Parameter>> {
-        let mut values = vec![0.0; self.candidate.coefficients().len()];
-        values[self.j] = value;
-        let effect = self.candidate.realise(&values, self.surroundings).ok()?;
-        Some(effect.parameters())
-    }
-
-    /// A value of the coefficient as the parameter; below its physical range it is 0.
-    pub(crate) fn size(&self, value: f64) -> f64 {
-        let value = value.max(self.candidate.coefficients()[self.j].lower);
-        let told = self
-            .parameter
-            .and_then(|k| Some(self.realised(value)?.get(k)?.value));
-        told.unwrap_or(value)
-    }
-}
-
 /// Three digits, the way a sentence wants them.
 pub(crate) fn short(value: f64) -> String {
     let size = value.abs();
@@ -417,7 +362,20 @@ fn with_unit(value: f64, unit: &str) -> String {
     format!("{}{between}{unit}", short(value))
 }
 
-fn of_size(size: &RefusedSize) -> String {
+/// Why an effect whose believed sizes are lost in the noise does not show.
+fn unseen(size: &HypothesisSize) -> String {
+    let told = |value: Option<f64>| with_unit(value.unwrap_or(f64::NAN), &size.unit);
+    format!(
+        "in this data only {} = {} would show at 5 sigma, and no more than {} is believed",
+        size.parameter,
+        told(size.detectable),
+        told(size.believed_to)
+    )
+}
+
+/// Why an effect was refused by its size.
+#[must_use]
+pub fn of_size(size: &RefusedSize) -> String {
     let [least, most] = size.believed;
     format!(
         "of a size that nature does not make, {} = {}, believed from {} to {}",
@@ -438,8 +396,9 @@ pub fn p_is(p: f64) -> String {
     }
 }
 
-/// The answer in a sentence or three. `against`: what speaks against it; `others`: something was added.
-fn finding(h: &Hypothesis, against: Option<&str>, others: bool) -> String {
+/// The answer in a sentence or three. `against`: what speaks against it; `others`: something was added; `rest`: why it
+/// has nothing to explain, where it has not.
+fn finding(h: &Hypothesis, against: Option<&str>, others: bool, rest: &str) -> String {
     if let Some(reason) = &h.reason {
         return format!("not observable: {reason}");
     }
@@ -477,9 +436,12 @@ fn finding(h: &Hypothesis, against: Option<&str>, others: bool) -> String {
     if let Some(size) = told {
         said.extend(told_size(h, size));
     }
+    if !h.added && h.sizes.iter().all(|size| size.needed.is_none()) {
+        said.push(rest.to_owned());
+    }
     if let Some(most) = h.variance_share_at_most {
         said.push(format!(
-            "it accounts for at most {} % of the squared residual in units of the noise",
+            "beside what the declared unknowns imitate it accounts for at most {} % of the squared residual",
             short(100.0 * most)
         ));
     }
@@ -502,38 +464,38 @@ fn told_size(h: &Hypothesis, size: &HypothesisSize) -> Vec<String> {
             with_unit(d, unit)
         ));
     }
-    let plausible = size.plausible.map_or_else(String::new, |p| {
-        let judged = match size.needed_is_plausible {
-            Some(true) => "plausible beside",
-            Some(false) => "not plausible beside",
-            None => "beside",
-        };
-        format!(
-            ", {judged} {} (1 sigma of what nature makes)",
-            with_unit(p, unit)
-        )
-    });
+    let plausible = match (size.needed_is_plausible, size.believed_to) {
+        (Some(true), Some(most)) => {
+            format!(", plausible: up to {} is believed", with_unit(most, unit))
+        }
+        (Some(false), Some(most)) => {
+            format!(
+                ", not plausible: no more than {} is believed",
+                with_unit(most, unit)
+            )
+        }
+        _ => String::new(),
+    };
     match (size.needed, size.needed_alone) {
         (Some(n), _) => {
             said.push(format!(
-                "to explain what is left beyond the noise by itself it would have to be {}{plausible}",
+                "to explain what is left by itself it would have to be {}{plausible}",
                 with_unit(n, unit)
             ));
-            said.push(match size.detectable {
+            // what showed in another way is no question of size
+            let showed = h.significant || h.refused.is_some();
+            let so = match size.detectable {
                 Some(d) if n > d => {
                     "so it is not the cause of what is left: at that size it would have shown"
-                        .to_owned()
                 }
-                _ => "so it could be the cause: this data would not have shown that size".to_owned(),
-            });
+                _ => "so it could be the cause: this data would not have shown that size",
+            };
+            said.extend((!showed).then(|| so.to_owned()));
         }
         (None, Some(n)) if h.added => said.push(format!(
-            "to explain by itself all that the declared model leaves beyond the noise it would have to be {}{plausible}",
+            "to explain by itself all that the declared model leaves it would have to be {}{plausible}",
             with_unit(n, unit)
         )),
-        (None, _) if !h.added => {
-            said.push("nothing is left beyond the noise that it could explain".to_owned());
-        }
         _ => {}
     }
     said
@@ -553,10 +515,10 @@ mod tests {
             ..Hypothesis::default()
         };
         let beside = "beside what was added";
-        assert!(finding(&of(true), None, true).contains(beside));
-        assert!(!finding(&of(true), None, false).contains(beside));
+        assert!(finding(&of(true), None, true, "").contains(beside));
+        assert!(!finding(&of(true), None, false, "").contains(beside));
         for (significant, others) in [(true, false), (true, true), (false, false), (false, true)] {
-            let said = finding(&of(significant), Some("the stars wander"), others);
+            let said = finding(&of(significant), Some("the stars wander"), others, "");
             assert!(said.contains("the stars wander"), "{said}");
             assert!(!said.contains(beside), "{said}");
         }
@@ -572,7 +534,34 @@ mod tests {
             p_value: Some(p),
             ..Hypothesis::default()
         };
-        assert!(finding(&of(0.0), None, false).contains("(p < 1e-300)"));
-        assert!(finding(&of(2.4e-9), None, false).contains("(p = 2.4e-9)"));
+        assert!(finding(&of(0.0), None, false, "").contains("(p < 1e-300)"));
+        assert!(finding(&of(2.4e-9), None, false, "").contains("(p = 2.4e-9)"));
+    }
+
+    /// What the search would name is plausible, and what it would refuse is not.
+    #[test]
+    fn plausible_is_what_is_believed() {
+        let said = |needed: f64| {
+            let size = HypothesisSize {
+                parameter: "offset_s".to_owned(),
+                unit: "s".to_owned(),
+                needed_alone: Some(needed),
+                plausible: Some(0.05),
+                believed_to: Some(1.0),
+                needed_is_plausible: Some(needed <= 1.0),
+                ..HypothesisSize::default()
+            };
+            let h = Hypothesis {
+                added: true,
+                observable: true,
+                p_value: Some(1e-9),
+                sizes: vec![size],
+                ..Hypothesis::default()
+            };
+            finding(&h, None, true, "nothing is left")
+        };
+        assert!(said(0.3).contains("0.3 s, plausible: up to 1 s is believed"));
+        assert!(said(1.4).contains("1.4 s, not plausible: no more than 1 s is believed"));
+        assert!(!said(0.3).contains("nothing is left"));
     }
 }

@@ -38,7 +38,7 @@ use crate::evidence::Evidence;
 use crate::questions::hypothesis::short;
 
 /// Sigmas that are wanted.
-const WANTED: f64 = 5.0;
+pub const NEEDED_SIGMA: f64 = 5.0;
 /// Peak rates of slews, deg/s, and constant rates of drifts, arcsec/s.
 const RATES_DEG_S: [f64; 8] = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0];
 const DRIFTS_ARCSEC_S: [f64; 4] = [1.0, 3.0, 10.0, 30.0];
@@ -348,7 +348,8 @@ pub(crate) fn recommend(
         .collect();
     let mut best: Vec<Option<(Flown, f64)>> = vec![None; pairs.len()];
     for batch in library.chunks(BATCH) {
-        let open = |best: &[Option<(Flown, f64)>], k: usize| best[k].is_none_or(|b| b.1 < WANTED);
+        let open =
+            |best: &[Option<(Flown, f64)>], k: usize| best[k].is_none_or(|b| b.1 < NEEDED_SIGMA);
         if (0..pairs.len()).all(|k| !open(&best, k)) {
             break;
         }
@@ -372,7 +373,7 @@ pub(crate) fn recommend(
             let (manoeuvre, sigma) = best?;
             let [a, b] = &pair.names;
             let words = manoeuvre.words();
-            let text = if sigma >= WANTED {
+            let text = if sigma >= NEEDED_SIGMA {
                 format!("{words} separates {a} from {b} at {} sigma", short(sigma))
             } else {
                 let most = short((10.0 * sigma).round() / 10.0);

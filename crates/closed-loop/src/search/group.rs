@@ -42,6 +42,13 @@ impl Group {
         })
     }
 
+    /// Whether a size that is believed could show in data that tell its columns, parameters from `first` on, so well: one
+    /// that is no sigma for any of them is lost in the noise.
+    pub(crate) fn could_show(&self, estimate: &Estimate, first: usize) -> bool {
+        let mut each = self.bounds.iter().zip(first..);
+        each.any(|(bounds, i)| estimate.sigma(i) <= largest(*bounds))
+    }
+
     /// Whether not both are chosen: forms of one cause, of which two pixels that no star is near at once are none.
     pub(crate) fn excludes(&self, other: &Self) -> bool {
         let apart = self.reach.zip(other.reach).is_some_and(|((a, r), (b, s))| {
@@ -50,6 +57,11 @@ impl Group {
         });
         self.family == other.family && !apart
     }
+}
+
+/// The largest believed size, whatever its sign.
+pub(crate) fn largest([low, high]: [f64; 2]) -> f64 {
+    low.abs().max(high.abs())
 }
 
 /// Sigmas by which an estimate may lie beyond what is credible: the size itself may be as large.
@@ -116,6 +128,20 @@ mod tests {
                 "{columns:?} {sizes:?}"
             );
         }
+    }
+
+    /// A sigma as large as the largest believed size shows none of them.
+    #[test]
+    fn what_no_believed_size_would_show_cannot_show() {
+        let known = |sigma: f64| Estimate {
+            value: DVector::zeros(2),
+            covariance: DMatrix::identity(2, 2) * sigma * sigma,
+            white: DMatrix::identity(2, 2) * sigma * sigma,
+            blocks: 60.0,
+        };
+        // bounds of 1 and 2
+        assert!(group("", None).could_show(&known(1.9), 0));
+        assert!(!group("", None).could_show(&known(2.1), 0));
     }
 
     /// Pixels on two sides of a star are forms of one pull; those that no star is near at once are two.

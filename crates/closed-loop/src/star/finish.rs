@@ -18,10 +18,12 @@ use crate::evidence::Residuals;
 use crate::figures;
 use crate::image_level::{self, ImageLevel};
 use crate::noise_effects;
+use crate::noise_level::noise_ratio;
 use crate::outcome::Closed;
 use crate::questions::confusion;
 use crate::questions::hypothesis::{self, Grounds};
 use crate::questions::manoeuvre::stars::Sky;
+use crate::questions::needed::{self, ToExplain, length_beside};
 use crate::search::instants;
 use crate::search::orbits::{Look, images};
 use crate::search::refusal::Refused;
@@ -104,6 +106,16 @@ impl Finish<'_> {
         Some(format!("none of the {all} raw windows can be used: {why}"))
     }
 
+    /// In sigmas of `model`.
+    fn chi2_per_dof(&self, model: &Model, residual: &Residuals) -> Option<f64> {
+        let declared = self.situation.model.noise.temporal_arcsec;
+        declared.filter(|s| *s > 0.0)?;
+        let situation = self.situation.believing(model);
+        let square = noise_effects::in_declared_sigmas(&situation, self.data, residual)?;
+        // with free attitudes three of each frame's numbers are spent
+        Some(square / self.found.fitted.scalars)
+    }
+
     /// `model` is the declared one, or that with what was added.
     fn errors(
         &self,
@@ -112,23 +124,12 @@ impl Finish<'_> {
         loglik: Option<f64>,
         attitude: Option<[f64; 3]>,
     ) -> Errors {
-        let declared = self
-            .situation
-            .model
-            .noise
-            .temporal_arcsec
-            .filter(|s| *s > 0.0);
         let rms = figures::star_rms(residual, self.data);
         Errors {
             star_rms_arcsec: Some(rms),
             attitude_rms_arcsec: attitude,
             log_psd_cost: None,
-            // with free attitudes three of each frame's numbers are spent
-            chi2_per_dof: declared.and_then(|_| {
-                let situation = self.situation.believing(model);
-                let square = noise_effects::in_declared_sigmas(&situation, self.data, residual)?;
-                Some(square / self.found.fitted.scalars)
-            }),
+            chi2_per_dof: self.chi2_per_dof(model, residual),
             loglik_per_frame: loglik.map(|l| l / self.data.frames.frames() as f64),
         }
     }
@@ -285,9 +286,23 @@ pub(crate) fn finish(
         list.retain(|d| d.variable != change.variable);
         list.insert(0, change);
     }
-    let weighed = weighed_excess(f, &plain);
-    let excess_left = weighed.map_or(0.0, |(excess, _)| excess);
-    let mut considered = figures::considered(f.found, excess_left, f.refused, &surroundings);
+    let fits = &f.found.fitted.fits;
+    // of what is left, not of what there was
+    let described = unattributed.variance_fraction.unwrap_or(0.0) * whole / last;
+    let described = unattributed.present.then_some(described.min(1.0));
+    let declared = declared_variance(f);
+    let [left, alone] = needed::of_fits(
+        fits,
+        &columns_of(&f.found.fitted.groups, chosen),
+        declared,
+        described,
+    );
+    let to_explain = ToExplain {
+        left,
+        alone,
+        length: &|column, others| length_beside(fits, column, others),
+    };
+    let mut considered = figures::considered(f.found, &to_explain, f.refused, &surroundings);
     if let Some(orbit) = &f.orbit {
         orbit.tell(&mut considered);
     }
@@ -297,7 +312,12 @@ pub(crate) fn finish(
         }
     }
     considered.retain(|c| !effects.iter().any(|e| e.id == c.id));
-    let squares = excess(f, last);
+    // a noise that is as loud everywhere is the declared level's fault, and no effect's
+    let squares = if unattributed.present {
+        excess(f, last)
+    } else {
+        0.0
+    };
     noise.need(f.situation, f.data, squares)?;
     noise.tell(&mut considered);
     if let Some(mut entry) = reference_wander::consider(f.data, &plain.axes, squares) {
@@ -321,23 +341,8 @@ pub(crate) fn finish(
         }
     }
 
-    let fits = &f.found.fitted.fits;
-    let hypotheses = hypothesis::answer(
-        f.situation.questions,
-        &Grounds {
-            found: f.found,
-            surroundings,
-            information: &|c| fits.information(c),
-            alone: remarkable(f, weighed_excess(f, &f.settled.before)),
-            left: remarkable(f, weighed),
-            resolved: f.level.resolved,
-            unusable: f.unusable(),
-            effects: &effects,
-            considered: &considered,
-        },
-    );
-
-    let after = after.unwrap_or(plain);
+    let set_aside = f.data.outlier.iter().filter(|o| **o).count();
+    let used = f.data.t_s.len() - set_aside;
     let (before, before_loglik) = f.declared_at_best(&effects)?;
     let nothing_added = effects.is_empty();
     // one fit, one figure
@@ -345,8 +350,25 @@ pub(crate) fn finish(
         (before.clone(), before_loglik)
     } else {
         let set = columns_of(&f.found.fitted.groups, &added);
+        let after = after.unwrap_or(plain);
         (after, f.found.fitted.data_loglik(&set))
     };
+    let noise_ratio = noise_ratio(f.chi2_per_dof(&model, &after), used);
+    let hypotheses = hypothesis::answer(
+        f.situation.questions,
+        &Grounds {
+            found: f.found,
+            surroundings,
+            to_explain: &to_explain,
+            something_left: unattributed.present,
+            noise_ratio,
+            resolved: f.level.resolved,
+            unusable: f.unusable(),
+            effects: &effects,
+            considered: &considered,
+        },
+    );
+
     let mut attitude =
         own_attitude::residuals(f.situation, f.data, f.folds, f.settled, &before, &after);
     if let Some(attitude) = attitude.as_mut().filter(|_| nothing_added) {
@@ -355,13 +377,12 @@ pub(crate) fn finish(
     let attitude_rms = |series: &[Vec<f64>; 3], outlier: &[bool]| {
         std::array::from_fn(|a| figures::rms(&series[a], outlier).unwrap_or(f64::NAN))
     };
-    let set_aside = f.data.outlier.iter().filter(|o| **o).count();
     let report = Report {
         format: telemetry::report::REPORT_FORMAT.to_owned(),
         verdict: figures::verdict(&effects, unattributed.present),
         folds: f.folds.count,
         rows: Rows {
-            used: f.data.t_s.len() - set_aside,
+            used,
             outliers: set_aside - f.data.unplaced - f.data.unformed,
             outside_reference: f.data.outside_reference,
         },
@@ -453,35 +474,23 @@ fn tell_apart(f: &Finish<'_>, effects: &mut [FoundEffect]) {
     }
 }
 
-/// Squared residual over what the declared noise accounts for, arcsec^2; 0 where no noise is declared.
+/// Squared residual over what the declared noise accounts for, arcsec^2; 0 where it is within the scatter of that, or no
+/// noise is declared.
 fn excess(f: &Finish<'_>, power: f64) -> f64 {
     let rows = f.data.counted() as f64;
-    f.situation.model.noise.temporal_arcsec.map_or(0.0, |s| {
-        (rows * power - 0.5 * s * s * f.found.fitted.scalars).max(0.0)
-    })
+    let scalars = f.found.fitted.scalars;
+    let over = f.situation.model.noise.temporal_arcsec.and_then(|s| {
+        let variance = 0.5 * s * s;
+        needed::beyond(rows * power - variance * scalars, variance, scalars)
+    });
+    over.unwrap_or(0.0)
 }
 
-/// The same of the fit's scalars, in their unit: rows count by the noise of their stars there, as they do in the
-/// columns that it is held against. With the variance of a scalar.
-fn weighed_excess(f: &Finish<'_>, residual: &Residuals) -> Option<(f64, f64)> {
+/// The declared variance of one of the fit's scalars, in their unit: rows count by the noise of their stars there.
+fn declared_variance(f: &Finish<'_>) -> Option<f64> {
     let sigma = f.situation.model.noise.temporal_arcsec?;
-    let (mut squares, mut weights) = (0.0, 0.0);
-    for row in (0..f.data.t_s.len()).filter(|&r| !f.data.outlier[r]) {
-        let w = f.level.weight[row].powi(2);
-        let square: f64 = residual.axes.iter().map(|a| a[row] * a[row]).sum();
-        if square.is_finite() {
-            squares += w * square;
-            weights += w;
-        }
-    }
-    let unit = f.level.unit_arcsec2();
-    let variance = 0.5 * sigma * sigma * weights / (f.data.counted() as f64).max(1.0) / unit;
-    let excess = squares / unit - variance * f.found.fitted.scalars;
-    Some((excess.max(0.0), variance))
-}
-
-/// A [`weighed_excess`] where it stands out of the noise.
-fn remarkable(f: &Finish<'_>, weighed: Option<(f64, f64)>) -> Option<f64> {
-    let (excess, variance) = weighed?;
-    hypothesis::beyond(excess, variance, f.found.fitted.scalars)
+    let rows = (0..f.data.t_s.len()).filter(|&r| !f.data.outlier[r]);
+    let weights: f64 = rows.map(|r| f.level.weight[r].powi(2)).sum();
+    let rows = (f.data.counted() as f64).max(1.0);
+    Some(0.5 * sigma * sigma * weights / rows / f.level.unit_arcsec2())
 }

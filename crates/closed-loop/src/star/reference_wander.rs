@@ -70,6 +70,7 @@ pub(crate) fn consider(
     let sigma = white * ((1.0 - decay * decay) / (theta.len() as f64 * decay * decay)).sqrt();
     let rows = data.counted().max(1) as f64;
     Some(ConsideredEffect {
+        selectors: BTreeMap::new(),
         against: None,
         id: REFERENCE_ERROR.to_owned(),
         delta_loglik: None,

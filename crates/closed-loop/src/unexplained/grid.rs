@@ -88,9 +88,15 @@ mod tests {
             each.map(|t| if t < 300.0 { t } else { t + gap_s })
                 .collect()
         };
-        assert_eq!(coherent_s(&with_gap(0.0)), 599.0);
-        assert_eq!(coherent_s(&with_gap(3000.0)), 3599.0);
-        assert_eq!(coherent_s(&with_gap(1e6)), 6000.0);
-        assert_eq!(coherent_s(&[1.0]), 0.0);
+        let told = [
+            &with_gap(0.0)[..],
+            &with_gap(3000.0),
+            &with_gap(1e6),
+            &[1.0],
+        ]
+        .map(coherent_s);
+        for (told, truth) in told.iter().zip([599.0, 3599.0, 6000.0, 0.0]) {
+            assert!((told - truth).abs() < 1e-9, "{told} for {truth}");
+        }
     }
 }

@@ -89,8 +89,8 @@ pub(super) fn hypotheses(page: &mut Page, report: &Report) {
         }
         if !rows.is_empty() {
             page.table(
-                "Each beside the other effects added. Would show: at 5σ. Needed: to explain by itself what is left, or all that the declared model leaves, beyond the noise. Natural: 1σ of the sizes that nature makes. At most: share of the squared residual, with 95 %.",
-                &["effect", "size in", "fitted", "± 1σ", "would show", "needed: left", "needed: all", "natural", "at most, %"],
+                "Each beside the other effects added. Would show: at 5σ. Needed: to explain by itself what is left, or all that the declared model leaves. Natural: 1σ of the sizes that nature makes; believed: up to which the effect is named. At most: share of the squared residual beside what the declared unknowns imitate, with 95 %.",
+                &["effect", "size in", "fitted", "± 1σ", "would show", "needed: left", "needed: all", "natural", "believed to", "at most, %"],
                 rows,
             );
         }
@@ -116,6 +116,7 @@ fn row(k: usize, i: usize, h: &Hypothesis, size: &HypothesisSize) -> Vec<Cell> {
         Cell::maybe(&of("needed"), size.needed),
         Cell::maybe(&of("needed_alone"), size.needed_alone),
         Cell::maybe(&of("plausible"), size.plausible),
+        Cell::maybe(&of("believed_to"), size.believed_to),
         most,
     ]
 }

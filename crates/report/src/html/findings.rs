@@ -1,16 +1,17 @@
 //! The report in tables: errors, effects, rivals, what was not added, what is left.
 
-use closed_loop::Closed;
+use closed_loop::{CONFUSABLE, Closed};
 use telemetry::report::{ConsideredEffect, Dependence, Errors, Estimate, FoundEffect, Report};
 
 use super::Page;
 use super::write::{Cell, datum, escaped, step};
 use crate::number::{change, hertz, p_is, percent, probability, short, short_to, with_sigma};
 use crate::order::by_number;
-use crate::text::{is_certain, of_size, selectors};
+use crate::text::{is_certain, selectors};
+use crate::why_not::why_not;
 
-/// Chance below which an effect counts as seen.
-const SIGNIFICANT: f64 = 0.01;
+/// Variables that are told where nothing follows any.
+const NEAREST: usize = 5;
 
 /// Each effect with its size.
 pub(super) fn in_a_line_each(page: &mut Page, report: &Report) {
@@ -105,6 +106,12 @@ pub(super) fn numbers(page: &mut Page, report: &Report) {
         b.log_psd_cost,
         a.log_psd_cost,
     );
+    // its best is 1, not 0
+    if let (Some(_), Some(_)) = (b.log_psd_cost, a.log_psd_cost) {
+        for row in rows.iter_mut().rev().take(3) {
+            row[3] = Cell::number("");
+        }
+    }
     type Get = fn(&Errors) -> Option<f64>;
     let single: [(&str, &str, Get); 2] = [
         ("chi-squared per degree of freedom", "chi2_per_dof", |e| {
@@ -191,15 +198,19 @@ fn row_of(k: usize, effect: &FoundEffect) -> Vec<Cell> {
             )
         })
         .collect();
-    let alike: Vec<String> = effect
-        .confusable_with
-        .iter()
-        .enumerate()
+    let likeness = effect.confusable_with.iter().enumerate();
+    let alike: Vec<String> = likeness
         .map(|(i, c)| {
+            // asked about, and none that it could be taken for
+            let unlike = if c.correlation.abs() < CONFUSABLE {
+                "unlike "
+            } else {
+                ""
+            };
             let shown = format!("{:+.2}", c.correlation).replace('-', "−");
             let key = format!("/effects/{k}/confusable_with/{i}/correlation");
             format!(
-                "{}{} ({})",
+                "{unlike}{}{} ({})",
                 escaped(&c.id),
                 escaped(&selectors(&c.selectors)),
                 datum(&key, c.correlation, &shown)
@@ -349,8 +360,9 @@ fn considered_row(k: usize, c: &ConsideredEffect, report: &Report) -> Vec<Cell> 
     };
     vec![
         Cell::words(format!(
-            "{}<br/><small>{}</small>",
+            "{}{}<br/><small>{}</small>",
             escaped(&c.id),
+            escaped(&selectors(&c.selectors)),
             escaped(meaning(&c.id))
         )),
         Cell::text(&size),
@@ -360,34 +372,6 @@ fn considered_row(k: usize, c: &ConsideredEffect, report: &Report) -> Vec<Cell> 
         p,
         Cell::text(&why_not(c, report)),
     ]
-}
-
-fn why_not(c: &ConsideredEffect, report: &Report) -> String {
-    if let Some(size) = &c.refused {
-        return format!("significant, but {}", of_size(size));
-    }
-    let gains = c.delta_loglik.is_some_and(|gain| gain > 0.0);
-    if let Some(why) = &c.against {
-        return format!("found, but not named: {why}");
-    }
-    if gains && c.p_value.is_some_and(|p| p < SIGNIFICANT) {
-        let why = if report.effects.is_empty() {
-            "without less error"
-        } else {
-            "not worth its parameters beside what was added"
-        };
-        return format!("visible alone, but {why}");
-    }
-    match (c.detectable, c.needed) {
-        (Some(d), Some(n)) if report.unattributed.present && n > d => format!(
-            "not significant; not the cause of what is left: that would show at {}σ",
-            short(5.0 * n / d)
-        ),
-        (Some(_), Some(_)) if report.unattributed.present => {
-            "not significant; still possible: the size needed is below what shows".to_owned()
-        }
-        _ => "not significant".to_owned(),
-    }
 }
 
 /// Rows of a list of variables, which stands under `list`.
@@ -424,7 +408,18 @@ pub(super) fn leftover(page: &mut Page, report: &Report) {
         if left.depends_on.is_empty() {
             page.paragraph("No variable was there to be tried.");
         } else {
-            let rows = dependences("depends_on", &left.depends_on);
+            let told = if left.present {
+                &left.depends_on[..]
+            } else {
+                &left.depends_on[..NEAREST.min(left.depends_on.len())]
+            };
+            let rows = dependences("depends_on", told);
+            if told.len() < left.depends_on.len() {
+                page.raw(&format!(
+                    "<p>Of {} variables that were tried, those that come nearest:</p>",
+                    left.depends_on.len()
+                ));
+            }
             page.table(
                 "Smooth functions of one variable, judged out of fold beside what was added. A share below zero predicts worse than nothing.",
                 &["follows", "share of what is left, %", "p"],
@@ -456,4 +451,55 @@ pub(super) fn leftover(page: &mut Page, report: &Report) {
             list("jumps_s", &left.jumps_s, |t| format!("{} s", short(t)))
         ));
     });
+}
+
+#[cfg(test)]
+mod tests {
+    use telemetry::report::Verdict;
+
+    use super::*;
+    use crate::bare;
+
+    fn written(report: &Report, section: fn(&mut Page, &Report)) -> String {
+        let mut page = Page::new("", "");
+        section(&mut page, report);
+        page.finish()
+    }
+
+    /// Of many variables that nothing follows the nearest are shown; where something is left all are.
+    #[test]
+    fn where_nothing_is_left_few_variables_are_told() {
+        let mut report = bare::report(Verdict::Consistent);
+        let variable = |k: i32| Dependence {
+            variable: format!("channel_{k}"),
+            variance_explained: 0.0,
+            p_value: 1.0,
+        };
+        report.unattributed.depends_on = (0..67).map(variable).collect();
+        let page = written(&report, leftover);
+        assert!(page.contains("Of 67 variables"), "{page}");
+        assert!(
+            page.contains("channel_4<") && !page.contains("channel_5<"),
+            "{page}"
+        );
+        report.unattributed.present = true;
+        assert!(written(&report, leftover).contains("channel_66<"));
+    }
+
+    /// A cost whose best is 1 has no change in percent; an error has.
+    #[test]
+    fn a_cost_has_no_change_in_percent() {
+        let mut report = bare::report(Verdict::Explained);
+        for (errors, cost) in [(&mut report.before, 4.0), (&mut report.after, 2.0)] {
+            errors.log_psd_cost = Some([cost; 3]);
+        }
+        let page = written(&report, numbers);
+        assert!(
+            page.contains("log-PSD cost") && !page.contains(" %<"),
+            "{page}"
+        );
+        (report.before.star_rms_arcsec, report.after.star_rms_arcsec) =
+            (Some([2.0; 2]), Some([1.0; 2]));
+        assert!(written(&report, numbers).contains("−50.0 %<"));
+    }
 }
