@@ -391,8 +391,10 @@ pub fn of_size(size: &RefusedSize) -> String {
 pub fn p_is(p: f64) -> String {
     if p < NEXT_TO_NEVER {
         format!("p < {NEXT_TO_NEVER:e}")
-    } else {
+    } else if p < 0.01 {
         format!("p = {p:.1e}")
+    } else {
+        format!("p = {p:.2}")
     }
 }
 
