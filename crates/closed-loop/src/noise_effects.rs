@@ -37,6 +37,7 @@ use telemetry::{EffectEntry, EffectValue, Model};
 use crate::declared;
 use crate::error::CloseError;
 use crate::evidence::{Amplitudes, Evidence, Residuals};
+use crate::questions::hypothesis::SEEN;
 use crate::search::Found;
 use crate::search::selection::{FAMILY_ALPHA, columns_of};
 use crate::situation::Situation;
@@ -58,8 +59,6 @@ const SLOPE_OF_NONE: f64 = 0.01;
 /// and read noise together follow a power of the flux only roughly, and their slope changes by this within
 /// half a magnitude.
 const SLOPE_OF_LIGHT: f64 = 0.1;
-/// Sigmas that a size takes to be seen.
-const SEEN: f64 = 5.0;
 /// Size of the spikes, in sigmas of the noise, for which their share is given.
 const SPIKE: f64 = 10.0;
 /// Slopes beyond this are none.

@@ -254,7 +254,7 @@ fn starless<'a>(t_s: &'a [f64], first_row: &'a [usize]) -> Rows<'a> {
     }
 }
 
-/// Sets what a measured series would have masked to the median: values beyond 8 robust sigma, and
+/// Sets what a measured series would have masked to the median: values beyond 8 robust sigma where nothing lasts, and
 /// frames without an attitude.
 pub(crate) fn without_outliers(theta: &mut [f64]) {
     let mut out = vec![false; theta.len()];

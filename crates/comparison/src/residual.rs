@@ -62,7 +62,7 @@ impl Residual {
     /// # Errors
     ///
     /// No reference, neither attitude nor stars with a camera, a star without direction, or fewer
-    /// than 16 frames, or most of them outliers.
+    /// than 16 frames.
     pub fn of(bundle: &Bundle) -> Result<Self, ComparisonError> {
         let reference = Self::reference(bundle)?;
         let (t_s, q, unsolved, measured_by) = match (&bundle.attitude, &bundle.stars) {

@@ -19,7 +19,7 @@ use star_tracker::StarView;
 
 use crate::lens::{Bend, TERMS};
 use crate::parameters::Reader;
-use crate::shift::{Shift, ShiftCandidate, Shifted};
+use crate::shift::{Shift, ShiftCandidate, Shifted, linear_px};
 use crate::{
     ActsOn, Candidate, Coefficient, Effect, EffectError, EffectKind, Nonlinear, Parameter,
     Parameters, Scene, Surroundings,
@@ -227,43 +227,34 @@ impl Shift for Brown {
             ..self.clone()
         })
     }
-    fn refined(&self, values: &[f64]) -> Option<Self> {
-        let all = self.all(values);
-        let [half_x, half_y] = self.camera.half_size_px();
+    fn shift_px(&self, star: &StarView, values: &[f64]) -> [f64; 2] {
+        let [x, y] = self.bend(star.at, &self.all(values)).shift;
         let [fx, fy] = self.camera.focal_length_px();
-        let mut terms = [[0.0; 2]; TERMS.len()];
-        let off = [
-            (half_x, half_y),
-            (-half_x, half_y),
-            (half_x, -half_y),
-            (-half_x, -half_y),
-        ]
-        .into_iter()
-        .map(|(x, y)| {
-            let star = StarView {
+        [fx * x, fy * y]
+    }
+    fn refined(&self, values: &[f64]) -> Option<Self> {
+        let [half_x, half_y] = self.camera.half_size_px();
+        let corners = [(1.0, 1.0), (-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)];
+        let misses = corners.into_iter().any(|(x, y)| {
+            let corner = StarView {
                 t_s: 0.0,
                 slot: 0,
                 star_id: 0,
                 mag: f64::NAN,
                 bv: f64::NAN,
-                at: Pixel { x, y },
+                at: Pixel {
+                    x: x * half_x,
+                    y: y * half_y,
+                },
             };
-            self.terms(&star, &mut terms[..values.len()]);
-            let exact = self.bend(star.at, &all).shift;
-            let sum = |axis: usize| {
-                terms
-                    .iter()
-                    .zip(values)
-                    .map(|(t, v)| t[axis] * v)
-                    .sum::<f64>()
-            };
-            f64::max(
-                (sum(0) - fx * exact[0]).abs(),
-                (sum(1) - fy * exact[1]).abs(),
-            )
+            let linear = linear_px(self, &corner, values);
+            let exact = self.shift_px(&corner, values);
+            (0..2).any(|axis| (linear[axis] - exact[axis]).abs() > LINEAR_PX)
+        });
+        misses.then(|| Self {
+            about: self.all(values),
+            ..self.clone()
         })
-        .fold(0.0, f64::max);
-        (off > LINEAR_PX).then(|| self.clone().exactly(values))
     }
     fn linear_about(&self) -> Vec<(&'static str, f64)> {
         let own = self.terms.iter().map(|&k| (TERMS[k], self.about[k]));
@@ -275,16 +266,10 @@ impl Shift for Brown {
             let value = values.iter().find(|(name, _)| *name == TERMS[k]);
             about[k] = value.map_or(0.0, |v| v.1);
         }
-        (!values.is_empty()).then(|| Self {
+        Some(Self {
             about,
             ..self.clone()
         })
-    }
-    fn exactly(self, values: &[f64]) -> Self {
-        Self {
-            about: self.all(values),
-            ..self
-        }
     }
     fn stands_for(&self) -> f64 {
         self.stands_for

@@ -82,10 +82,9 @@ pub(crate) trait Shift: Clone + Debug + Send + Sync + 'static {
         let _ = values;
         None
     }
-    /// The same with terms of which `terms x values` is the exact shift at these `values`, where that differs.
-    fn exactly(self, values: &[f64]) -> Self {
-        let _ = values;
-        self
+    /// Shift of these `values`, px, for those whose [`terms`](Self::terms) are linear only about some.
+    fn shift_px(&self, star: &StarView, values: &[f64]) -> [f64; 2] {
+        linear_px(self, star, values)
     }
     /// See [`Candidate::choices`].
     fn choices(&self) -> usize {
@@ -117,6 +116,18 @@ pub(crate) fn sizes(coefficients: Vec<Coefficient>, values: &[f64]) -> Vec<Param
         .collect()
 }
 
+/// Sum of the terms, each times its value, px.
+pub(crate) fn linear_px<S: Shift>(shift: &S, star: &StarView, values: &[f64]) -> [f64; 2] {
+    let mut terms = [[0.0; 2]; MAX_TERMS];
+    shift.terms(star, &mut terms[..values.len()]);
+    let mut sum = [0.0; 2];
+    for (term, value) in terms.iter().zip(values) {
+        sum[0] += value * term[0];
+        sum[1] += value * term[1];
+    }
+    sum
+}
+
 /// A shift with its values.
 #[derive(Clone, Debug)]
 pub(crate) struct Shifted<S> {
@@ -127,21 +138,7 @@ pub(crate) struct Shifted<S> {
 impl<S: Shift> Shifted<S> {
     pub(crate) fn new(shift: S, values: Vec<f64>) -> Self {
         assert!(values.len() <= MAX_TERMS, "at most {MAX_TERMS} terms");
-        Self {
-            shift: shift.exactly(&values),
-            values,
-        }
-    }
-
-    fn total(&self, star: &StarView) -> [f64; 2] {
-        let mut terms = [[0.0; 2]; MAX_TERMS];
-        self.shift.terms(star, &mut terms[..self.values.len()]);
-        let mut sum = [0.0; 2];
-        for (term, value) in terms.iter().zip(&self.values) {
-            sum[0] += value * term[0];
-            sum[1] += value * term[1];
-        }
-        sum
+        Self { shift, values }
     }
 }
 
@@ -150,10 +147,10 @@ impl<S: Shift> Disturbance for Shifted<S> {
         self.shift.stages()
     }
     fn image_shift_px(&self, star: &StarView) -> [f64; 2] {
-        self.total(star)
+        self.shift.shift_px(star, &self.values)
     }
     fn centroid_shift_px(&self, star: &StarView) -> [f64; 2] {
-        self.total(star)
+        self.shift.shift_px(star, &self.values)
     }
 }
 

@@ -28,7 +28,7 @@ use crate::outcome::{Closed, Rival};
 use crate::questions::confusion;
 use crate::questions::hypothesis::{self, Grounds};
 use crate::questions::manoeuvre::attitudes::fly;
-use crate::questions::needed::{ToExplain, beyond};
+use crate::questions::needed::{ToExplain, remarkable};
 use crate::search::catalogue;
 use crate::search::empirical::{Empirical, Variable, range};
 use crate::search::instants;
@@ -425,7 +425,7 @@ fn beyond_white(data: &AttitudeData, residual: &Residuals) -> Option<f64> {
         let rows: f64 = data.count[axis].iter().sum();
         let white = noise[axis].white * noise[axis].white;
         let square = figures::rms(&residual.axes[axis], &data.outlier[axis])?.powi(2);
-        if let Some(excess) = beyond(rows * (square - white), white, rows) {
+        if let Some(excess) = remarkable(rows * (square - white), white, rows) {
             *whole.get_or_insert(0.0) += excess;
         }
     }

@@ -219,7 +219,7 @@ impl Grounds<'_> {
                     at,
                     bounds,
                     &estimate,
-                    (!chosen).then_some(&beside),
+                    (!chosen).then_some(beside.as_slice()),
                 )
             })
             .collect();
@@ -238,7 +238,7 @@ impl Grounds<'_> {
         (column, j, at): (usize, usize, usize),
         bounds: [f64; 2],
         estimate: &Estimate,
-        beside: Option<&Vec<usize>>,
+        beside: Option<&[usize]>,
     ) -> HypothesisSize {
         let coefficient = &candidate.coefficients()[j];
         let told = Told::of(candidate, j, &self.surroundings);

@@ -53,9 +53,9 @@ fn amplitude(excess: f64, length: f64) -> Option<f64> {
     (excess > 0.0 && length > 0.0).then(|| (excess / length).sqrt())
 }
 
-/// Whether a squared residual stands out of noise with `scalars` numbers of `variance` each: by 5
+/// An excess of squared residual where it stands out of noise with `scalars` numbers of `variance` each: by 5
 /// sigma of the sum of their squares.
-pub(crate) fn beyond(excess: f64, variance: f64, scalars: f64) -> Option<f64> {
+pub(crate) fn remarkable(excess: f64, variance: f64, scalars: f64) -> Option<f64> {
     (excess > SEEN * variance * (2.0 * scalars).sqrt()).then_some(excess)
 }
 
@@ -77,7 +77,7 @@ pub(crate) fn of_fits(
     };
     let freedom = rest / variance;
     let left = described.and_then(|share| {
-        let over = declared.and_then(|v| beyond(rest - v * freedom, v, freedom));
+        let over = declared.and_then(|v| remarkable(rest - v * freedom, v, freedom));
         let most = over.unwrap_or(0.0).max(share * rest);
         (most > 0.0).then_some(most)
     });

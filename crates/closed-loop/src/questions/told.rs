@@ -5,6 +5,8 @@
 
 use effects::{Candidate, Surroundings};
 
+use crate::search::group::largest;
+
 /// The parameter by which a coefficient is told.
 pub(crate) struct Told<'a> {
     candidate: &'a dyn Candidate,
@@ -86,8 +88,10 @@ impl<'a> Told<'a> {
     /// other sign.
     pub(crate) fn beyond(&self, value: f64, [low, high]: [f64; 2]) -> (f64, [f64; 2]) {
         if self.knows_no_sign() {
-            let most = low.abs().max(high.abs());
-            return (self.size(value.abs()), [0.0, self.size(most)]);
+            return (
+                self.size(value.abs()),
+                [0.0, self.size(largest([low, high]))],
+            );
         }
         let lower = self.candidate.coefficients()[self.j].lower;
         let told = if value < lower {

@@ -481,7 +481,7 @@ fn excess(f: &Finish<'_>, power: f64) -> f64 {
     let scalars = f.found.fitted.scalars;
     let over = f.situation.model.noise.temporal_arcsec.and_then(|s| {
         let variance = 0.5 * s * s;
-        needed::beyond(rows * power - variance * scalars, variance, scalars)
+        needed::remarkable(rows * power - variance * scalars, variance, scalars)
     });
     over.unwrap_or(0.0)
 }

@@ -26,6 +26,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 use telemetry::report::{ConsideredEffect, Estimate, FoundEffect};
 use telemetry::{EffectEntry, EffectValue};
 
+use crate::questions::hypothesis::SEEN;
 use crate::search::selection::WIDENING;
 use crate::star::data::StarData;
 use crate::star::frame_rotation::rotation_of;
@@ -41,7 +42,6 @@ const NAMES: [[&str; 2]; 3] = [
 
 /// Correlation time for which a size that would have shown is given, s.
 const TYPICAL_TAU_S: f64 = 20.0;
-const SEEN: f64 = 5.0;
 
 /// What this data would have shown of a wander that was not claimed: `left` is the residual, `excess`
 /// its square beyond the noise. `None` without a reference, or with too few attitudes.
