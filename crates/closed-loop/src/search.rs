@@ -253,6 +253,7 @@ fn grouped(fits: &Fits, candidates: &[&dyn Candidate]) -> Vec<Group> {
             reach: candidate.reach_px(),
             kind: candidate.id(),
             stands_for: candidate.stands_for(),
+            credit: candidate.credit(),
         });
         column += p;
     }

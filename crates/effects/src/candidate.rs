@@ -229,6 +229,11 @@ pub trait Candidate: Debug + Send + Sync {
     fn stands_for(&self) -> f64 {
         1.0
     }
+    /// How likely such a form is beside the others of its effect, of 1: a less likely one pays more for having been
+    /// looked at, and the others pay less (weighted Bonferroni, Genovese, Roeder & Wasserman 2006).
+    fn credit(&self) -> f64 {
+        1.0
+    }
     /// Middle and half-width, px, of the square of the detector outside which it does nothing, where stars pass by it;
     /// `None`: it acts everywhere, or on the same stars all the time.
     fn reach_px(&self) -> Option<([f64; 2], f64)> {

@@ -22,6 +22,8 @@ use crate::{
 
 const ID: &str = "hot_pixel";
 pub(crate) const HALF_WIDTH_PX: f64 = 1.5;
+/// Credit of a pixel that no star was in: there are more of them, and all else pays for them.
+const BESIDE: f64 = 0.1;
 
 /// The kind.
 #[derive(Debug)]
@@ -69,6 +71,7 @@ impl EffectKind for Kind {
                 at,
                 half_width_px,
                 passed: true,
+                beside: false,
                 stands_for: 1.0,
             },
             vec![strength],
@@ -78,7 +81,6 @@ impl EffectKind for Kind {
         let Some(warm) = scene.warm.filter(|_| scene.has_stars) else {
             return Vec::new();
         };
-        let stands_for = warm.looked_at as f64 / warm.proposed.len().max(1) as f64;
         let proposed = warm.proposed.iter();
         proposed
             .map(|pixel| {
@@ -86,7 +88,8 @@ impl EffectKind for Kind {
                     at: pixel.middle,
                     half_width_px: HALF_WIDTH_PX,
                     passed: pixel.passed,
-                    stands_for,
+                    beside: pixel.beside,
+                    stands_for: warm.stand_for[usize::from(pixel.beside)],
                 })
             })
             .collect()
@@ -99,6 +102,7 @@ pub fn hot_pixel_at(at: Pixel) -> Box<dyn Candidate> {
         at,
         half_width_px: HALF_WIDTH_PX,
         passed: true,
+        beside: false,
         stands_for: 1.0,
     })
 }
@@ -122,6 +126,8 @@ struct HotPixel {
     half_width_px: f64,
     /// Whether stars pass by.
     passed: bool,
+    /// Whether no star was in it.
+    beside: bool,
     /// How many that were looked at it is proposed for.
     stands_for: f64,
 }
@@ -157,6 +163,9 @@ impl Shift for HotPixel {
     }
     fn stands_for(&self) -> f64 {
         self.stands_for
+    }
+    fn credit(&self) -> f64 {
+        if self.beside { BESIDE } else { 1.0 }
     }
     fn reach_px(&self) -> Option<([f64; 2], f64)> {
         self.passed

@@ -94,6 +94,10 @@ pub(crate) trait Shift: Clone + Debug + Send + Sync + 'static {
     fn stands_for(&self) -> f64 {
         1.0
     }
+    /// See [`Candidate::credit`].
+    fn credit(&self) -> f64 {
+        1.0
+    }
     /// See [`Candidate::reach_px`].
     fn reach_px(&self) -> Option<([f64; 2], f64)> {
         None
@@ -213,6 +217,9 @@ impl<S: Shift> Candidate for ShiftCandidate<S> {
     }
     fn stands_for(&self) -> f64 {
         self.shift.stands_for()
+    }
+    fn credit(&self) -> f64 {
+        self.shift.credit()
     }
     fn reach_px(&self) -> Option<([f64; 2], f64)> {
         self.shift.reach_px()

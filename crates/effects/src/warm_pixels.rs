@@ -19,11 +19,14 @@ use rayon::prelude::*;
 use crate::StarRows;
 use crate::hot_pixel::{HALF_WIDTH_PX, middle_of, pixel_of};
 
-/// Pixels that are proposed.
-const MOST_PIXELS: usize = 48;
+/// Pixels that are proposed, of those that a star was in and of those that stars only passed by.
+const MOST_PIXELS: [usize; 2] = [48, 16];
 /// Rows within half-width of a pixel with which it is worth looking at: with fewer, the pixels of a slew are
 /// so many that all effects pay for them.
 const LEAST_ROWS: u32 = 8;
+/// Share of the squared pull that changes while stars pass by a pixel that none is in: 0.25 of a star that moves along
+/// the edge of its reach.
+const SWEPT: f64 = 0.2;
 /// Pixels within whose half-width a star may be: its own and those around.
 const NEAR: [[i64; 2]; 9] = [
     [-1, -1],
@@ -42,8 +45,8 @@ const NEAR: [[i64; 2]; 9] = [
 pub struct WarmPixels {
     /// Those that are proposed.
     pub(crate) proposed: Vec<WarmPixel>,
-    /// How many were looked at.
-    pub(crate) looked_at: usize,
+    /// How many were looked at for each, whether stars were in them or beside them.
+    pub(crate) stand_for: [f64; 2],
 }
 
 /// A pixel that may be warm.
@@ -53,6 +56,8 @@ pub(crate) struct WarmPixel {
     /// Whether stars pass by it: for half of what is seen near it by stars that are elsewhere for half of their time.
     /// What pulls at a star that rests is a constant of that star's own.
     pub(crate) passed: bool,
+    /// Whether stars were beside it, and none was in it.
+    pub(crate) beside: bool,
 }
 
 /// Weighted sums over the rows of one star near one pixel.
@@ -107,9 +112,15 @@ impl WarmPixels {
             let of = |[i, j]: &[i64; 2]| visits.get(&[x + i, y + j]).copied();
             NEAR.iter().filter_map(of).sum()
         };
-        let mut pixels: Vec<([i64; 2], u32)> = visits.iter().map(|(p, n)| (*p, *n)).collect();
-        pixels.retain(|(pixel, _)| near(*pixel) >= LEAST_ROWS);
+        let around = |[x, y]: &[i64; 2]| NEAR.map(|[i, j]| [x + i, y + j]);
+        let mut pixels: Vec<[i64; 2]> = visits.keys().flat_map(around).collect();
         pixels.sort_unstable();
+        pixels.dedup();
+        let pixels: Vec<([i64; 2], u32)> = pixels
+            .into_iter()
+            .filter(|pixel| near(*pixel) >= LEAST_ROWS)
+            .map(|pixel| (pixel, visits.get(&pixel).copied().unwrap_or(0)))
+            .collect();
         let index: HashMap<[i64; 2], usize> =
             pixels.iter().enumerate().map(|(k, p)| (p.0, k)).collect();
         let sums: Vec<_> = each
@@ -143,17 +154,26 @@ impl WarmPixels {
             let longer = visits(b.1).cmp(&visits(a.1));
             b.0.total_cmp(&a.0).then(longer).then(a.1.cmp(&b.1))
         });
-        Self {
-            proposed: ranked
-                .iter()
-                .take(MOST_PIXELS)
-                .map(|(_, k)| WarmPixel {
-                    middle: middle_of(camera, pixels[*k].0),
-                    passed: seen[*k][1] >= 0.5 * seen[*k][0],
-                })
-                .collect(),
-            looked_at: pixels.len(),
+        let passed = |k: usize| seen[k][1] >= 0.5 * seen[k][0];
+        // what pulls from beside at a star that rests is a constant of it for a while
+        let sweeps = |k: usize| passed(k) && whole[k][1].cc >= SWEPT * whole[k][0].cc;
+        let [within, beside]: [Vec<usize>; 2] = [false, true].map(|beside| {
+            let all = ranked.iter().map(|(_, k)| *k);
+            all.filter(|k| (pixels[*k].1 == 0) == beside && (!beside || sweeps(*k)))
+                .collect()
+        });
+        let pixel = |&k: &usize| WarmPixel {
+            middle: middle_of(camera, pixels[k].0),
+            passed: passed(k),
+            beside: pixels[k].1 == 0,
+        };
+        let mut out = Self::default();
+        for (class, looked_at) in [within, beside].iter().enumerate() {
+            let proposed = &looked_at[..looked_at.len().min(MOST_PIXELS[class])];
+            out.proposed.extend(proposed.iter().map(pixel));
+            out.stand_for[class] = looked_at.len() as f64 / proposed.len().max(1) as f64;
         }
+        out
     }
 }
 
@@ -257,10 +277,28 @@ mod tests {
     use super::*;
 
     const WARM: Pixel = Pixel { x: 30.5, y: 21.5 };
+    /// The star that passes by the warm one comes no nearer than 0.6 px.
+    const BESIDE: Pixel = Pixel { x: 30.5, y: 22.5 };
 
-    /// Twelve stars that drift over some 240 pixels, by `pace` px a frame, under noise of 0.02 px, with a warm
-    /// pixel of this `strength`; and the same where it pushes.
-    fn looked(pace: f64, strength: f64) -> [WarmPixels; 2] {
+    /// Twelve stars that drift over some 240 pixels, by `pace` px a frame.
+    fn drifting(pace: f64) -> Vec<(i64, [f64; 2])> {
+        let frames = (0..).take_while(|k| f64::from(*k) * pace < 120.0);
+        let each = frames.flat_map(|k| {
+            let t = f64::from(k) * pace;
+            (0..12_i64).map(move |s| {
+                let at = [
+                    10.2 + t + 0.3 * (s as f64),
+                    20.7 + 0.05 * t - 40.0 * (s as f64),
+                ];
+                (s, at)
+            })
+        });
+        each.collect()
+    }
+
+    /// Stars at these places under noise of 0.02 px, with a `warm` pixel of this `strength`; and the same where it
+    /// pushes.
+    fn looked(warm: Pixel, places: &[(i64, [f64; 2])], strength: f64) -> [WarmPixels; 2] {
         let camera = Camera::from_fov_deg([1024, 1024], [20.0, 20.0]).unwrap();
         let mut state = 9_u64;
         let mut noise = || {
@@ -275,23 +313,16 @@ mod tests {
             0.02 * (sum - 6.0)
         };
         let (mut x, mut y, mut left, mut star) = (vec![], vec![], [vec![], vec![]], vec![]);
-        for k in (0..).take_while(|k| f64::from(*k) * pace < 120.0) {
-            for s in 0..12_i64 {
-                let t = f64::from(k) * pace;
-                let at = [
-                    10.2 + t + 0.3 * (s as f64),
-                    20.7 + 0.05 * t - 40.0 * (s as f64),
-                ];
-                let c = [WARM.x - at[0], WARM.y - at[1]];
-                let near = c.iter().all(|c| c.abs() <= 1.5);
-                for axis in 0..2 {
-                    let pull = if near { strength * c[axis] } else { 0.0 };
-                    left[axis].push(pull + noise());
-                }
-                x.push(at[0]);
-                y.push(at[1]);
-                star.push(s);
+        for (s, at) in places {
+            let c = [warm.x - at[0], warm.y - at[1]];
+            let near = c.iter().all(|c| c.abs() <= 1.5);
+            for axis in 0..2 {
+                let pull = if near { strength * c[axis] } else { 0.0 };
+                left[axis].push(pull + noise());
             }
+            x.push(at[0]);
+            y.push(at[1]);
+            star.push(*s);
         }
         let n = x.len();
         let (none, slot) = (vec![0.0; n], vec![0; n]);
@@ -324,9 +355,10 @@ mod tests {
     /// its own that is as large.
     #[test]
     fn a_warm_pixel_is_looked_at_first_however_short_its_visit() {
-        let [found, pushed] = looked(0.05, 0.02);
-        assert!(found.looked_at > 1000, "{}", found.looked_at);
-        assert_eq!(found.proposed.len(), MOST_PIXELS);
+        let [found, pushed] = looked(WARM, &drifting(0.05), 0.02);
+        let [within, _] = found.stand_for;
+        assert!(within * MOST_PIXELS[0] as f64 > 1000.0, "{within}");
+        assert_eq!(found.proposed.len(), MOST_PIXELS[0] + MOST_PIXELS[1]);
         let first = found.proposed[0];
         assert_eq!(first.middle, WARM, "{:?}", &found.proposed[..4]);
         assert!(first.passed, "stars drift by");
@@ -339,7 +371,43 @@ mod tests {
     /// nine sigma.
     #[test]
     fn rows_around_a_pixel_count_not_those_in_it() {
-        let [found, _] = looked(0.25, 0.06);
+        let [found, _] = looked(WARM, &drifting(0.25), 0.06);
         assert_eq!(found.proposed[0].middle, WARM, "{:?}", &found.proposed[..4]);
+    }
+
+    /// Each star drifts along a row of pixels and has another on either side, in which it is not. A warm one of these
+    /// is the first of them, and pays for them alone.
+    #[test]
+    fn pixels_that_stars_only_pass_by_are_looked_at() {
+        let [found, _] = looked(BESIDE, &drifting(0.05), 0.04);
+        let beside: Vec<&WarmPixel> = found.proposed.iter().filter(|p| p.beside).collect();
+        assert_eq!(beside.len(), MOST_PIXELS[1]);
+        assert_eq!(beside[0].middle, BESIDE, "{:?}", &beside[..4]);
+        let [within, outside] = found.stand_for;
+        let looked_at = [
+            within * MOST_PIXELS[0] as f64,
+            outside * MOST_PIXELS[1] as f64,
+        ];
+        assert!(
+            looked_at[1] > 1.5 * looked_at[0] && looked_at[1] < 2.5 * looked_at[0],
+            "{looked_at:?}"
+        );
+        let own = found.proposed.iter().find(|p| p.middle == WARM);
+        assert!(own.is_none_or(|p| !p.beside), "a star is in it");
+    }
+
+    /// A star that rests beside a pixel for a while, and then elsewhere, is off by a constant for that while.
+    #[test]
+    fn a_star_that_rests_beside_a_pixel_does_not_pass_by() {
+        let rests = |place: [f64; 2]| (0..200).map(move |_| (3, place));
+        let places: Vec<_> = rests([30.5, 21.7]).chain(rests([60.5, 61.5])).collect();
+        let [found, _] = looked(BESIDE, &places, 0.1);
+        let own = |p: &&WarmPixel| p.middle == WARM;
+        assert!(found.proposed.iter().find(own).is_some_and(|p| p.passed));
+        assert!(
+            !found.proposed.iter().any(|p| p.beside),
+            "{:?}",
+            found.proposed
+        );
     }
 }

@@ -31,6 +31,8 @@ pub(crate) struct Group {
     pub(crate) kind: &'static str,
     /// How many of its kind were looked at for each that is tried.
     pub(crate) stands_for: f64,
+    /// How likely it is beside the others of its kind, of 1.
+    pub(crate) credit: f64,
 }
 
 impl Group {
@@ -98,6 +100,7 @@ mod tests {
             reach,
             kind: "hot_pixel",
             stands_for: 1.0,
+            credit: 1.0,
         }
     }
 

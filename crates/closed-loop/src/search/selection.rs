@@ -119,15 +119,20 @@ pub(crate) fn columns_of(groups: &[Group], chosen: &[usize]) -> Vec<usize> {
         .collect()
 }
 
-/// What the p-value of each group is multiplied by where those that `may` be chosen are tried.
+/// What the p-value of each group is multiplied by where those that `may` be chosen are tried: of n groups of its kind
+/// and credit c, sqrt(n)/c times the sum of c sqrt(n) over all kinds. The inverses add up to 1.
 pub(crate) fn costs(groups: &[Group], may: &[bool]) -> Vec<f64> {
-    let mut of_kind: BTreeMap<&str, f64> = BTreeMap::new();
+    let kind = |g: &Group| (g.kind, g.credit.to_bits());
+    let mut of_kind: BTreeMap<(&str, u64), f64> = BTreeMap::new();
     let tried = groups.iter().zip(may);
     for (group, _) in tried.filter(|(g, may)| **may && !g.columns.is_empty()) {
-        *of_kind.entry(group.kind).or_default() += group.stands_for;
+        *of_kind.entry(kind(group)).or_default() += group.stands_for;
     }
-    let all: f64 = of_kind.values().map(|n| n.sqrt()).sum();
-    let root = |g: &Group| of_kind.get(g.kind).map_or(1.0, |n| n.sqrt());
+    let all: f64 = of_kind
+        .iter()
+        .map(|((_, credit), n)| f64::from_bits(*credit) * n.sqrt())
+        .sum();
+    let root = |g: &Group| of_kind.get(&kind(g)).map_or(1.0, |n| n.sqrt() / g.credit);
     groups.iter().map(|g| root(g) * all.max(1.0)).collect()
 }
 

@@ -18,6 +18,7 @@ fn group(kind: &'static str, columns: usize) -> Group {
         reach: None,
         kind,
         stands_for: 1.0,
+        credit: 1.0,
     }
 }
 
@@ -82,6 +83,22 @@ fn what_the_search_costs_adds_up() {
     let picked = costs(&groups, &may);
     let each = 20.0 * (1.0 + 20.0 + 14.0_f64.sqrt());
     assert!((picked[3] - each).abs() < 1e-9 && (picked[4] - each).abs() < 1e-9);
+    // with a tenth of the credit a hundred more cost the others one sqrt(100) / 10, and pay ten times as much
+    let beside = (0..100).map(|_| Group {
+        credit: 0.1,
+        ..group("pixel", 1)
+    });
+    groups.extend(beside);
+    let may = vec![true; groups.len()];
+    let shared = costs(&groups, &may);
+    let all = 1.0 + 1.0 + 20.0 + 14.0_f64.sqrt() + 1.0;
+    assert!(
+        (shared[3] - 20.0 * all).abs() < 1e-9,
+        "{} {}",
+        shared[3],
+        20.0 * all
+    );
+    assert!((shared[groups.len() - 1] - 100.0 * all).abs() < 1e-9);
 }
 
 /// Two columns that act in the same eight of fifty blocks, of which one changes its sign from block to block.
