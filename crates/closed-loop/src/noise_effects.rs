@@ -19,12 +19,13 @@ mod follows;
 mod judge;
 mod levels;
 mod quick;
+mod rate_by_star;
+mod rivals;
 mod rows;
 mod squares;
 #[cfg(test)]
 mod tests;
 mod variance;
-mod within_stars;
 
 use std::collections::BTreeMap;
 
@@ -233,6 +234,7 @@ pub(crate) fn claim(
     let make = |belief: &dyn Fn(&Row) -> [f64; 2]| source.rows(belief);
     let follows_light =
         situation.model.effects.iter().any(|e| e.id == MAGNITUDE) || situation.windows.is_some();
+    let rivals = rivals::rivals(situation, data);
     let known = Known {
         moving: level.resolved,
         least_slope: if follows_light {
@@ -242,6 +244,7 @@ pub(crate) fn claim(
         },
         most_rate: most_rate(situation, data),
         outliers: declared_outliers(situation)?,
+        rivals: &rivals,
     };
     let Some(mut verdicts) = judge(&make, folds, known) else {
         return Ok(NoiseEffects::default());
@@ -256,6 +259,11 @@ pub(crate) fn claim(
             ..source
         };
         let make = |belief: &dyn Fn(&Row) -> [f64; 2]| source.rows(belief);
+        // what follows another variable does so in differences, too
+        let known = Known {
+            rivals: &[],
+            ..known
+        };
         if let Some(fast) = judge(&make, folds, known) {
             verdicts.magnitude = verdicts.magnitude.beside(&fast.magnitude);
             verdicts.rate = verdicts.rate.beside(&fast.rate);

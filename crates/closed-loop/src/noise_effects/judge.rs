@@ -8,7 +8,7 @@
 //!     c: how much wider than chi2_2 the squares scatter
 //!     L_without: at no rate, no spikes, and for the slope next to none: nearer is as declared
 //!     var: over blocks of time; for the slope also over stars, which may differ for no reason at all
-//! for the rate, that each star's noise follows it where every star has its own level (`within_stars.rs`)
+//! for the rate, that each star's noise follows it where every star has its own level (`rate_by_star.rs`)
 //! gain = sum over the folds of Z(all) - Z(others) - the same without,   Z = max ln L - ln(I + I_all/N) / 2
 //! ```
 //!
@@ -28,13 +28,14 @@ use std::cell::OnceCell;
 use block_regression::{Folds, beyond};
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
 
+use super::rate_by_star;
+use super::rivals::Rival;
 use super::rows::Row;
 use super::squares::{MIN_ROWS, levels_shown};
 use super::variance::{
     Covariance, Fit, LEVEL, MAGNITUDE, MOST_SHARE, Model, PARAMETERS, RATE, SHARE, SIZE, Vector,
     Without, information, logit, sigmoid,
 };
-use super::within_stars;
 use crate::search::selection::FAMILY_ALPHA;
 
 /// Effects that are tried.
@@ -143,6 +144,7 @@ struct Bench<'a> {
     stars: usize,
     least_slope: f64,
     most_rate: f64,
+    rivals: &'a [Rival],
 }
 
 /// A fit, how well its parameters are known, and what its folds tell where that is asked for.
@@ -161,7 +163,7 @@ enum Gain {
 
 /// What is known before the residuals are looked at.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Known {
+pub(super) struct Known<'a> {
     /// Whether rates are.
     pub(super) moving: bool,
     /// A slope that passes for nothing.
@@ -170,10 +172,12 @@ pub(super) struct Known {
     pub(super) most_rate: f64,
     /// Declared share and size.
     pub(super) outliers: Option<[f64; 2]>,
+    /// What the noise may follow in place of the rate.
+    pub(super) rivals: &'a [Rival],
 }
 
 /// Judges. `make` gives the rows under a belief of variance and soundness.
-pub(super) fn judge(make: &Make<'_>, folds: &Folds, known: Known) -> Option<Verdicts> {
+pub(super) fn judge(make: &Make<'_>, folds: &Folds, known: Known<'_>) -> Option<Verdicts> {
     let mut rows = make(&|row: &Row| [row.declared, 1.0]);
     let mut free = [false; PARAMETERS];
     let mut model = Model::new(&rows, known.outliers);
@@ -201,6 +205,7 @@ pub(super) fn judge(make: &Make<'_>, folds: &Folds, known: Known) -> Option<Verd
         stars,
         least_slope: known.least_slope,
         most_rate: known.most_rate,
+        rivals: known.rivals,
     };
     let full = up(hill, &bench.model, &bench.rows, free)?;
     let outliers = bench.spikes(&full);
@@ -303,23 +308,38 @@ impl Bench<'_> {
         self.model.fit(&self.rows, &at, free, &|_| true)
     }
 
-    /// Noise that changes with the time in place of what follows a rate in `full`: the slope of magnitudes, of which
-    /// that of `full` is taken out, serves for it.
-    fn changing(&self, full: &Fit) -> Fit {
-        let last = self.rows.iter().map(|r| r.block).max().unwrap_or(0).max(1);
-        let rows: Vec<Row> = self
-            .rows
-            .iter()
-            .map(|row| Row {
-                declared: row.declared * grown(full, row),
-                mag: 2.0 * row.block as f64 / last as f64 - 1.0,
-                ..*row
-            })
-            .collect();
-        let (mut at, mut free) = (full.at, full.free);
-        (at[MAGNITUDE], free[MAGNITUDE]) = (0.0, true);
-        (at[RATE], free[RATE]) = (0.0, false);
-        self.model.fit(&rows, &at, free, &|_| true)
+    /// The rows, whose declared variance has the slope of `fit`.
+    fn flattened(&self, fit: &Fit) -> Vec<Row> {
+        let row = |row: &Row| Row {
+            declared: row.declared * grown(fit, row),
+            ..*row
+        };
+        self.rows.iter().map(row).collect()
+    }
+
+    /// What speaks for another cause than the rate in `full`: noise that changes with the time as much, or with another
+    /// variable more. What is no square serves as a slope in magnitude, of which that of `full` is taken out.
+    fn against_rate(&self, full: &Fit) -> Option<&'static str> {
+        let rows = self.flattened(full);
+        let other = |changed: &dyn Fn(&Row) -> Row, adds: bool| {
+            let rows: Vec<Row> = rows.iter().map(changed).collect();
+            let (mut at, mut free) = (full.at, full.free);
+            (at[MAGNITUDE], at[RATE]) = (0.0, 0.0);
+            (free[MAGNITUDE], free[RATE]) = (!adds, adds);
+            self.model.fit(&rows, &at, free, &|_| true).loglik
+        };
+        let last = rows.iter().map(|r| r.block).max().unwrap_or(0).max(1);
+        let in_time = |row: &Row| Row {
+            mag: 2.0 * row.block as f64 / last as f64 - 1.0,
+            ..*row
+        };
+        if other(&in_time, false) >= full.loglik {
+            return Some("noise that changes with time explains as much");
+        }
+        self.rivals.iter().find_map(|rival| {
+            let own = other(&|row| rival.in_place(row), rival.adds());
+            Rival::against(own, full.loglik)
+        })
     }
 
     /// `fit`, with how well its parameters are known: by blocks, by stars and by both.
@@ -394,7 +414,8 @@ impl Bench<'_> {
         if k == RATE {
             let belief = self.model.belief(&full.at);
             let sound = |row: &Row| belief(row)[1];
-            p = p.max(within_stars::chance(&self.rows, self.stars, sound, widened));
+            let rows = self.flattened(full);
+            p = p.max(rate_by_star::chance(&rows, self.stars, sound, widened));
         }
         let p_value = (TRIED * p).min(1.0);
         let gain = if wanted == Gain::Told || p_value < FAMILY_ALPHA {
@@ -422,8 +443,8 @@ impl Bench<'_> {
         let significant = gain > 0.0 && p_value < FAMILY_ALPHA;
         let against = if !credible {
             Some("it would be larger than nature makes it")
-        } else if k == RATE && significant && self.changing(full).loglik >= full.loglik {
-            Some("noise that changes with time explains as much")
+        } else if k == RATE && significant {
+            self.against_rate(full)
         } else {
             None
         };

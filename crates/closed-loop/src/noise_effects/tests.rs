@@ -4,6 +4,7 @@ use rand_distr::{Distribution, StandardNormal, StudentT, Uniform};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::judge::{Judged, Known, Verdicts, judge};
+use super::rivals::Rival;
 use super::rows::Row;
 use super::variance::{Fit, LEVEL, Model, PARAMETERS, SHARE, SIZE};
 
@@ -24,11 +25,12 @@ struct Truth {
 
 const STARS: usize = 14;
 /// Rates are known, and nothing is declared.
-const KNOWN: Known = Known {
+const KNOWN: Known<'_> = Known {
     moving: true,
     least_slope: super::SLOPE_OF_NONE,
     most_rate: 300.0,
     outliers: None,
+    rivals: &[],
 };
 
 /// 14 stars of magnitude 3 to 5.5 through slews of up to 0.3 deg/s; sigma 2.5 arcsec, declared as 1.
@@ -434,6 +436,37 @@ fn so_many_rows_are_no_spikes() {
     is_refused(&often, "so many rows");
 }
 
+/// The tracker speeds up over ten frames of fifty and slows down again; noise of 1.5 arcsec/(deg/s^2) of the
+/// acceleration, which is 1 deg/s^2 there, is a rate's in the eyes of one who knows of no other cause, and that of
+/// a rate is the rate's beside it.
+#[test]
+fn noise_that_follows_the_acceleration_is_no_rate_s() {
+    let rate = |k: usize| match k % 50 {
+        up @ 0..10 => 0.1 * up as f64,
+        down @ 10..20 => 0.1 * (20 - down) as f64,
+        _ => 0.0,
+    };
+    let speeding = |k: usize| f64::from(u8::from(k % 50 < 20));
+    let folds = Folds::cut(500);
+    let acceleration = [Rival::of_squares((0..7000).map(|row| speeding(row / 14)))];
+    let told = |more: &dyn Fn(usize) -> f64, rivals: &[Rival]| {
+        let variance = |frame: usize| 2.5_f64.hypot(more(frame)).powi(2);
+        let rows = moving_rows(3, &folds, 14, rate, variance);
+        let known = Known { rivals, ..KNOWN };
+        judge(&|_| rows.clone(), &folds, known)
+            .expect("enough rows")
+            .rate
+    };
+    let of_acceleration = |k| 1.5 * speeding(k);
+    assert!(
+        told(&of_acceleration, &[]).stands,
+        "no other cause is known"
+    );
+    is_refused(&told(&of_acceleration, &acceleration), "another variable");
+    let of_rate = |k| 3.0 * rate(k);
+    assert!(told(&of_rate, &acceleration).stands, "it is the rate's");
+}
+
 /// 14 stars in 500 frames at this rate, deg/s, with noise of 2.5 arcsec and of `more` beside it.
 fn moving(seed: u64, rate: impl Fn(usize) -> f64, more: impl Fn(usize) -> f64) -> Verdicts {
     let folds = Folds::cut(500);
@@ -459,7 +492,7 @@ fn moving_rows(
         {
             let mut one = || -> f64 { StandardNormal.sample(&mut rng) };
             rows.push(Row {
-                at: 0,
+                at: rows.len(),
                 square: variance(frame) * (one().powi(2) + one().powi(2)),
                 shows: 1.0,
                 alike: 0.0,
