@@ -105,6 +105,59 @@ fn results_are_whole_and_the_model_can_be_used_again() -> Done {
     Ok(())
 }
 
+/// Six stars at rest, each misplaced by up to four pixels: `mag` describes them, and some term of the place gains, but its
+/// parameters are not told beside the misalignment. What does not stand as an effect has to is not added.
+#[test]
+fn a_term_that_does_not_stand_is_not_added() -> Done {
+    let dir = tempfile::tempdir()?;
+    let write = |name: &str, text: String| fs::write(dir.path().join(name), text);
+    let focal_px = 2900.0_f64;
+    // where each star is, and where its centroid is
+    let stars: [[f64; 4]; 6] = [
+        [-374.5, 466.2, -375.7, 466.1],
+        [242.2, -421.4, 243.0, -417.5],
+        [-461.0, 338.9, -464.9, 339.3],
+        [68.9, 80.0, 66.8, 77.0],
+        [-302.4, -275.8, -304.1, -277.8],
+        [-169.3, -135.7, -172.8, -132.6],
+    ];
+    let mut catalogue = "star_id,ra_deg,dec_deg,mag,bv\n".to_owned();
+    for (k, [x, y, ..]) in stars.iter().enumerate() {
+        let (ra, dec) = (y.atan2(*x), focal_px.atan2(x.hypot(*y)));
+        let (ra, dec) = (ra.to_degrees().rem_euclid(360.0), dec.to_degrees());
+        catalogue += &format!("{k},{ra},{dec},4.{k},0.5\n");
+    }
+    let mut reference = "t_s,qx,qy,qz,qw\n".to_owned();
+    let mut rows = "t_s,slot,star_id,x_px,y_px\n".to_owned();
+    for t in 0..30_i32 {
+        reference += &format!("{t},0,0,0,1\n");
+        for (k, [.., x, y]) in (0..).zip(stars) {
+            // noise enough: no two rows are alike
+            let noise = |n: i32| 0.02 * (f64::from((7 * t + 11 * k + n) % 13) / 6.0 - 1.0);
+            rows += &format!("{t},{k},{k},{},{}\n", x + noise(0), y + noise(5));
+        }
+    }
+    let tracker =
+        format!("pixels = [1024, 1024]\nfocal_length_px = {focal_px}\npixel_centre = 0.5\n");
+    write(
+        "bundle.toml",
+        format!("format = \"boresight-bundle/1\"\n[tracker]\n{tracker}"),
+    )?;
+    write("catalog.csv", catalogue)?;
+    write("reference.csv", reference)?;
+    write("stars.csv", rows)?;
+    let noise = "temporal_arcsec = 5.0\ncentroid_arcsec = 0.0\n";
+    let model = format!("format = \"boresight-model/1\"\nkind = \"pbm\"\n[noise]\n{noise}");
+    write("model.toml", model)?;
+    let mut close = boresight();
+    close.args(["close", "--add-empirical"]);
+    let report = answer(close.arg(dir.path().join("model.toml")).arg(dir.path()))?;
+    assert_eq!(report["verdict"], "unexplained");
+    assert_eq!(report["unattributed"]["depends_on"][0]["variable"], "star");
+    assert_eq!(report["effects"], Value::Array(Vec::new()));
+    Ok(())
+}
+
 /// The page of a real run, with ensembles of both models, says what its `report.json` says.
 fn the_page_is_true_to_the_report(out: &Path) -> Done {
     let page = fs::read_to_string(out.join("report.html"))?;

@@ -506,7 +506,8 @@ pub(crate) fn largest(list: &[Dependence]) -> f64 {
     shares.fold(0.0, f64::max)
 }
 
-/// The empirical term that explains most of what is left, if one that a model can declare does.
+/// The empirical term that explains most of what is left, if one that a model can declare does, and stands as an effect
+/// has to.
 pub(crate) fn best_empirical(
     found: &Found,
     unattributed: &Unattributed,
@@ -516,7 +517,8 @@ pub(crate) fn best_empirical(
     certain.filter_map(|d| term_of(found, d)).find(|&g| {
         let candidate = found.candidates[g].as_ref();
         let one = vec![1.0; candidate.coefficients().len()];
-        candidate.realise(&one, surroundings).is_ok()
+        found.selection.judged[g].stands_but_for_size()
+            && candidate.realise(&one, surroundings).is_ok()
     })
 }
 
