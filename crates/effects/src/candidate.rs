@@ -54,6 +54,8 @@ pub struct StarRows<'a> {
     pub bv: &'a [f64],
     /// Usual fluxes of the stars as their logarithms to base 10; NaN unknown.
     pub log_flux: &'a [f64],
+    /// Measured fluxes over the usual ones of their stars, as logarithms to base 10; NaN unknown.
+    pub log_flux_change: &'a [f64],
     /// Middle of the star's window, x then y, px; NaN unknown, empty where there are no windows.
     pub window_px: [&'a [f64]; 2],
     /// Slots.

@@ -267,6 +267,7 @@ impl Bench {
             mag: &self.mag,
             bv: &self.bv,
             log_flux: &unknown,
+            log_flux_change: &unknown,
             window_px: [&unknown, &unknown],
             slot: &self.slot,
             star_id: &self.star_id,

@@ -339,6 +339,7 @@ mod tests {
             mag: &none,
             bv: &none,
             log_flux: &none,
+            log_flux_change: &none,
             window_px: [&none, &none],
             slot: &slot,
             star_id: &star,

@@ -47,6 +47,9 @@ const STEADY: f64 = 0.25;
 const YIELDS_S2: f64 = 1.0;
 /// Sizes show from so many of their sigmas.
 const SHOWS: f64 = 5.0;
+/// Half of the logarithms of the flux to base 10 are off by more than this where stars change their brightness: 3.4 %,
+/// as those of 400 photons.
+const LEAST_CHANGE_OF_FLUX: f64 = 0.0146;
 /// Channels beyond which none is paired with another variable: all pairs are paid for.
 const MOST_CHANNELS: usize = 6;
 
@@ -362,7 +365,18 @@ pub(crate) fn of_noise(situation: &Situation<'_>, data: &StarData) -> Vec<(Varia
         list.push((Variable::Acceleration, size));
     }
     list.extend((0..2).map(|axis| (Variable::Phase(axis), [0.0, 1.0])));
+    list.extend(brightening(data));
     list
+}
+
+/// By how much stars are brighter than usual, where most change by more than the noise of photons ([`LEAST_CHANGE_OF_FLUX`]):
+/// that of a flux is its centroid's, too, and few that are brighter may be hits.
+fn brightening(data: &StarData) -> Option<(Variable, [f64; 2])> {
+    let known = || data.log_flux_change.iter().filter(|c| c.is_finite());
+    let mut sizes: Vec<f64> = known().map(|change| change.abs()).collect();
+    let usual = spectra::robust::median(&mut sizes)?;
+    let changes = usual > LEAST_CHANGE_OF_FLUX;
+    changes.then(|| (Variable::Brightening, about_mean(known().copied())))
 }
 
 /// Every variable that the bundle gives values of, and the pairs that matter; without `acceleration` where
@@ -449,6 +463,7 @@ pub(crate) fn terms(
     } else {
         terms.extend(one(&flux));
     }
+    terms.extend(brightening(data).as_ref().and_then(one));
     terms.extend(one(&(Variable::Window, range(&off))));
     terms.extend(channels.iter().filter_map(one));
     let few = !data.free_directions && data.stars.len() <= MOST_STARS;

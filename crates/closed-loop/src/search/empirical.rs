@@ -335,6 +335,7 @@ impl Empirical {
                     | Variable::Magnitude
                     | Variable::Colour
                     | Variable::Flux
+                    | Variable::Brightening
                     | Variable::Brightness
                     | Variable::Housekeeping(..)
             );

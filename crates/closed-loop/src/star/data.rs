@@ -99,6 +99,8 @@ pub(crate) struct StarData {
     /// Usual flux of the star, a row, as a logarithm to base 10; NaN where unknown. That of
     /// the row shares its noise with the centroid.
     pub(crate) log_flux: Vec<f64>,
+    /// The row's own over that: of photons alone, noise.
+    pub(crate) log_flux_change: Vec<f64>,
     /// Middle of the window, a row, px; NaN where unknown, empty without windows.
     pub(crate) window_px: [Vec<f64>; 2],
     /// Misalignment between reference and camera that the attitudes hold already, arcsec
@@ -190,7 +192,7 @@ impl StarData {
         data.place(motion.map(|m| m as &dyn AttitudeSource), inputs.effects);
         let modelled = std::mem::take(&mut data.modelled);
         data.fall_at(modelled, None, inputs.phase);
-        data.log_flux = data.fluxes();
+        [data.log_flux, data.log_flux_change] = data.fluxes();
         data.frames.flux = None;
         data
     }
@@ -226,23 +228,26 @@ impl StarData {
         (same as f64) < SAME_SHARE * all as f64
     }
 
-    /// Measured fluxes, see [`log_flux`](Self::log_flux).
-    fn fluxes(&self) -> Vec<f64> {
+    /// Measured fluxes, see [`log_flux`](Self::log_flux), and by how much each is more.
+    fn fluxes(&self) -> [Vec<f64>; 2] {
+        let unknown = || vec![f64::NAN; self.t_s.len()];
         let Some(flux) = &self.frames.flux else {
-            return vec![f64::NAN; self.t_s.len()];
+            return [unknown(), unknown()];
         };
+        let known = |flux: &f64| Some(flux.log10()).filter(|f| f.is_finite());
         let mut of_star = vec![Vec::new(); self.stars.len()];
         for (&star, flux) in self.star.iter().zip(flux) {
-            of_star[star].push(flux.log10());
+            of_star[star].extend(known(flux));
         }
         let usual: Vec<f64> = of_star
             .iter_mut()
-            .map(|own| {
-                own.retain(|f| f.is_finite());
-                robust::median(own).unwrap_or(f64::NAN)
-            })
+            .map(|own| robust::median(own).unwrap_or(f64::NAN))
             .collect();
-        self.star.iter().map(|&star| usual[star]).collect()
+        let usual: Vec<f64> = self.star.iter().map(|&star| usual[star]).collect();
+        let change = flux.iter().zip(&usual);
+        let change = change.map(|(flux, usual)| known(flux).map_or(f64::NAN, |own| own - usual));
+        let change = change.collect();
+        [usual, change]
     }
 
     /// Takes the middles of the windows from their table.
@@ -319,6 +324,7 @@ impl StarData {
             mag: star.iter().map(|&s| stars[s].mag).collect(),
             bv: star.iter().map(|&s| stars[s].bv).collect(),
             log_flux: vec![f64::NAN; n],
+            log_flux_change: vec![f64::NAN; n],
             window_px: [Vec::new(), Vec::new()],
             outside_reference: from.rows() - n,
             unplaced: 0,
@@ -369,6 +375,7 @@ impl StarData {
             mag: pick(&self.mag),
             bv: pick(&self.bv),
             log_flux: pick(&self.log_flux),
+            log_flux_change: pick(&self.log_flux_change),
             window_px: self.window_px.each_ref().map(seen),
             attitude: which.iter().map(|&k| self.attitude[k]).collect(),
             turned_back: self.turned_back.clone(),
@@ -467,6 +474,7 @@ impl StarData {
             mag: &self.mag[rows.clone()],
             bv: &self.bv[rows.clone()],
             log_flux: &self.log_flux[rows.clone()],
+            log_flux_change: &self.log_flux_change[rows.clone()],
             window_px: (self.window_px.each_ref()).map(|w| w.get(rows.clone()).unwrap_or_default()),
             slot: &self.frames.slot[rows.clone()],
             star_id: &self.frames.star_id[rows],

@@ -28,6 +28,7 @@ fn columns(term: &Empirical) -> [Vec<f64>; 2] {
         mag: &[3.0, f64::NAN],
         bv: &nan,
         log_flux: &nan,
+        log_flux_change: &nan,
         window_px: [&[-100.0, 200.0], &[51.0, -300.0]],
         slot: &[0, 1],
         star_id: &[7, 9],

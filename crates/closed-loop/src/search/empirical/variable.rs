@@ -52,6 +52,8 @@ pub(crate) enum Variable {
     Colour,
     /// Measured flux, logarithm.
     Flux,
+    /// Measured flux over the usual one of its star, logarithm.
+    Brightening,
     /// The flux of the catalogue's magnitude: charge acts in proportion.
     Brightness,
     /// One constant shift a star.
@@ -79,7 +81,7 @@ impl Variable {
             Self::Acceleration => "acceleration".into(),
             Self::Magnitude => "mag".into(),
             Self::Colour => "colour".into(),
-            Self::Flux | Self::Brightness => "flux".into(),
+            Self::Flux | Self::Brightening | Self::Brightness => "flux".into(),
             Self::Star(_) => "star".into(),
             Self::Slot(_) => "slot".into(),
             Self::Window => "window".into(),
@@ -129,7 +131,7 @@ impl Variable {
             Self::Acceleration => 6,
             Self::Magnitude => 7,
             Self::Colour => 8,
-            Self::Flux | Self::Brightness => 9,
+            Self::Flux | Self::Brightening | Self::Brightness => 9,
             Self::Star(_) => 10,
             Self::Slot(_) => 11,
             Self::Window => 12,
@@ -150,6 +152,7 @@ impl Variable {
             Self::Magnitude => rows.mag[i],
             Self::Colour => rows.bv[i],
             Self::Flux => rows.log_flux[i],
+            Self::Brightening => rows.log_flux_change[i],
             Self::Brightness => flux_of(rows.mag[i]),
             Self::Rate => rows.vx_px_s[i].hypot(rows.vy_px_s[i]),
             Self::Acceleration => rows.ax_px_s2[i].hypot(rows.ay_px_s2[i]),
