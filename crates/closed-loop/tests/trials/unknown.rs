@@ -85,14 +85,14 @@ fn brightened(seed: u64, share: f64) -> Report {
 /// by 1 % tells of photons, whose noise is that of the centroid, too: that is no cause.
 #[test]
 fn what_moves_stars_with_their_measured_flux_is_told() {
-    for seed in 360..363 {
+    for seed in 370..373 {
         let report = brightened(seed, 0.2);
         assert!(report.effects.is_empty(), "{seed}: {:?}", report.effects);
         let first = report.unattributed.depends_on.first();
         let first = first.map(|d| d.variable.as_str());
         assert_eq!(first, Some("flux"), "{seed}: {:?}", report.unattributed);
     }
-    let verdict = brightened(363, 0.01).verdict;
+    let verdict = brightened(373, 0.01).verdict;
     assert_eq!(verdict, Verdict::Consistent);
 }
 
