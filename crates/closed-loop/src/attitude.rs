@@ -1,11 +1,14 @@
 //! Attitudes as the measurement: the tracker's own against a better one.
 //!
 //! ```text
-//! run             the order of the steps, from bundle to report
+//! run, finish     the order of the steps, from bundle to what is found, and to the report
 //! data            the rotation between both, axis by axis, as evidence for the search
 //! mixing          noise that the axes share
 //! motion_terms    what it may follow of the motion
+//! quest           the search, and another one with what the first leaves
 //! search          every hypothesis with its own noise
+//! noise           that of each axis
+//! fitted          what a fit leaves
 //! declared_effects  what the declared effects turn it by
 //! spatial_errors  what the declared model itself makes of crossing and changing stars
 //! imagined        the same from drawn skies and fields, and its lines
@@ -18,12 +21,16 @@
 
 pub(crate) mod data;
 mod declared_effects;
+mod finish;
+mod fitted;
 mod imagined;
 mod left;
 mod likeness;
 mod line_level;
 pub(crate) mod mixing;
 mod motion_terms;
+mod noise;
+mod quest;
 mod run;
 mod search;
 pub(crate) mod spatial_errors;

@@ -1,7 +1,7 @@
 //! Stars as the measurement: centroids against catalogue and reference, or against themselves.
 //!
 //! ```text
-//! run, finish     the order of the steps, from bundle to what is found, and to the report
+//! run, explain, finish    the order of the steps, from bundle to rows, to what is found, and to the report
 //! data            centroids beside what the declared model says of them
 //! directions      directions and attitudes from the centroids alone, where nothing else tells them
 //! misalignment    the rotation between camera and reference, taken exactly
@@ -34,6 +34,7 @@ pub(crate) mod columns;
 pub(crate) mod data;
 pub(crate) mod directions;
 pub(crate) mod evidence;
+mod explain;
 mod finish;
 pub(crate) mod frame_rotation;
 #[cfg(test)]

@@ -16,7 +16,7 @@ use crate::search::selection::columns_of;
 const HEATER: &str = "thermal_misalignment";
 
 /// Terms for every fit from now on, and what bends as well.
-fn whole(described: &Described, parts: Vec<Part>) -> Vec<Arc<dyn Candidate>> {
+pub(super) fn whole(described: &Described, parts: Vec<Part>) -> Vec<Arc<dyn Candidate>> {
     let mut kept: Vec<Arc<dyn Candidate>> = Vec::new();
     for (term, part) in parts {
         let term = &described.terms[term].term;
@@ -24,17 +24,6 @@ fn whole(described: &Described, parts: Vec<Part>) -> Vec<Arc<dyn Candidate>> {
         kept.push(Arc::new(Kept::new(Arc::new(term.clone()), columns)));
     }
     kept
-}
-
-/// Keeps these parts as terms for every fit from now on; those that were looked for are not `found` beside themselves.
-pub(super) fn keep_whole(
-    kept: &mut Vec<Arc<dyn Candidate>>,
-    found: &mut Vec<Empirical>,
-    described: &Described,
-    parts: Vec<Part>,
-) {
-    found.extend(looked_for(described, &parts));
-    kept.extend(whole(described, parts));
 }
 
 impl Described {

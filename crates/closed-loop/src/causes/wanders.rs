@@ -13,8 +13,7 @@
 //!
 //! Source: Schwarz 1978 for the price of a parameter.
 
-use crate::causes::Part;
-use crate::causes::description::{Described, turning};
+use crate::causes::description::{Described, Part, turning};
 use crate::causes::places::stretch;
 use crate::causes::stand_ins::{BY_FAR, describe_with};
 use crate::search::empirical::{Empirical, range};

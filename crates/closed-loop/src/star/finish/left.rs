@@ -1,0 +1,156 @@
+//! What is left beside the effects that were added, and what its squares follow.
+//!
+//! Not physics: the order of the report.
+
+use telemetry::report::Unattributed;
+
+use crate::causes::commonness::Slow;
+use crate::causes::description;
+use crate::causes::slow_left;
+use crate::causes::star_constants::Constants;
+use crate::error::CloseError;
+use crate::figures;
+use crate::image_level::ImageLevel;
+use crate::noise_effects::{self, NoiseEffects, NoiseFollows};
+use crate::star::finish::Finish;
+use crate::star::finish::added::Power;
+use crate::unexplained::leftover::{self, Leftover, Series};
+use crate::unexplained::pattern::{self, Pattern, Turned};
+use crate::unexplained::star_series::{self, OwnSeries};
+
+/// What is left, looked at in every way.
+pub(super) struct Left {
+    /// Lines and jumps of all stars.
+    shared: Leftover,
+    /// Those of single stars.
+    own: OwnSeries,
+    pattern: Option<Pattern>,
+    slow: Option<Slow>,
+    noise: NoiseFollows,
+}
+
+/// Looks at the `residual`, of which the `series` may be known; first are effects on the noise level.
+pub(super) fn look(
+    f: &Finish<'_>,
+    residual: &[Vec<f64>],
+    series: Option<Series>,
+) -> Result<(NoiseEffects, Left), CloseError> {
+    let weight = &f.level.weight;
+    let series =
+        series.unwrap_or_else(|| Series::of(&leftover::star_tracks(f.data, residual, weight)));
+    let turned = Turned::of(f.data, [&residual[0], &residual[1]], weight);
+    let order = f.situation.model.noise.distortion_order;
+    let learned = f.level.learned();
+    let (noise, ((shared, own), pattern)) = rayon::join(
+        || noise_and_slow(f, residual),
+        || {
+            rayon::join(
+                || (series.describe(), own_series(f, residual, &turned)),
+                || pattern::search(f.data, residual, &turned, weight, f.folds, order, learned),
+            )
+        },
+    );
+    drop(turned);
+    let (mut effects, slow) = noise?;
+    if f.image.is_some_and(ImageLevel::new_noise) {
+        effects = effects.without_magnitude();
+    }
+    let mut noise = NoiseFollows::default();
+    if f.formed.is_none() && !f.data.frames_are_unrelated() {
+        let of = description::of_noise(f.situation, f.data);
+        noise =
+            noise_effects::noise_follows(f.situation, f.level, residual, f.folds, &effects, &of)?;
+    }
+    let left = Left {
+        shared,
+        own,
+        pattern,
+        slow,
+        noise,
+    };
+    Ok((effects, left))
+}
+
+/// Effects on the noise level, and slow noise of the stars.
+fn noise_and_slow(
+    f: &Finish<'_>,
+    residual: &[Vec<f64>],
+) -> Result<(NoiseEffects, Option<Slow>), CloseError> {
+    // what is described is no noise
+    let beside = beside_description(f)?;
+    let slow = match &beside {
+        Some(beside) => slow_left(f.level, Some(beside)),
+        None => f.slow,
+    };
+    let residual = beside.as_deref().unwrap_or(residual);
+    let noise = noise_effects::claim(f.situation, f.level, residual, f.folds)?;
+    Ok((noise, slow))
+}
+
+/// What the chosen effects leave in sample beside the description of it, where there is one, arcsec.
+fn beside_description(f: &Finish<'_>) -> Result<Option<Vec<Vec<f64>>>, CloseError> {
+    let terms = f.described.terms_left();
+    if terms.is_empty() || f.level.learned() {
+        return Ok(None);
+    }
+    let beside = f.level.keeping(&terms);
+    let found = f.found.refitted(&beside, f.folds)?;
+    Ok(noise_effects::in_sample(&beside, &found))
+}
+
+/// Lines and jumps that single stars have; `turned` is the residual less its frames' rotations.
+fn own_series(f: &Finish<'_>, residual: &[Vec<f64>], turned: &Turned<'_>) -> OwnSeries {
+    // a learned spot errs by where the star lies, and so slowly
+    if f.level.learned() {
+        return OwnSeries::default();
+    }
+    // frames whose attitudes are free have turned already
+    let free = f.data.free_attitude;
+    let own = if free { residual } else { &turned.known };
+    let alone = || match residual {
+        [x, y] if free => [x.clone(), y.clone()],
+        _ => turned.whole(),
+    };
+    star_series::search(f.data, own, alone, &f.level.weight)
+}
+
+impl Left {
+    /// Adds all of it to what the residual is described by; `inside` is the residual in sample, where that is known,
+    /// arcsec.
+    pub(super) fn tell(
+        self,
+        f: &Finish<'_>,
+        inside: Option<&[Vec<f64>]>,
+        power: &Power,
+        unattributed: &mut Unattributed,
+    ) {
+        let share = power.share_left();
+        self.shared.tell(unattributed);
+        if let Some(pattern) = self.pattern {
+            pattern.tell(unattributed, share);
+        }
+        if let Some(slow) = self.slow {
+            slow.tell(unattributed, share);
+        }
+        self.own.tell(unattributed, share);
+        if let Some(constants) = Constants::of(f.level, f.found, inside) {
+            constants.tell(f.described, share, unattributed);
+        }
+        self.noise.tell(unattributed);
+        tell_change(f, power, unattributed);
+    }
+}
+
+/// What no variable predicts may be an effect that changes with one.
+fn tell_change(f: &Finish<'_>, power: &Power, unattributed: &mut Unattributed) {
+    if !unattributed.present
+        && let Some(change) = figures::changing(f.found, f.refused)
+    {
+        unattributed.present = true;
+        unattributed.variance_fraction =
+            Some(change.variance_explained * power.left / power.before);
+        let list = &mut unattributed.depends_on;
+        list.retain(|d| d.variable != change.variable);
+        list.insert(0, change);
+    }
+}
