@@ -47,9 +47,9 @@ const STEADY: f64 = 0.25;
 const YIELDS_S2: f64 = 1.0;
 /// Sizes show from so many of their sigmas.
 const SHOWS: f64 = 5.0;
-/// Half of the logarithms of the flux to base 10 are off by more than this where stars change their brightness: 3.4 %,
-/// as those of 400 photons.
-const LEAST_CHANGE_OF_FLUX: f64 = 0.0146;
+/// Half of the logarithms of the flux to base 10 are off by more than this where stars change their brightness: 7 %, as
+/// those of 95 photons are.
+const LEAST_CHANGE_OF_FLUX: f64 = 0.03;
 /// Channels beyond which none is paired with another variable: all pairs are paid for.
 const MOST_CHANNELS: usize = 6;
 
