@@ -8,8 +8,7 @@
 //! measurement -> before residual -> outliers -> candidates -> search -> after residual -> leftover
 //! ```
 //!
-//! Source: formats.md of the design notes (`close` writes) for what *before*,
-//! *after*, the folds and the figures mean.
+//! Source: docs/formats/report.md for what *before*, *after*, the folds and the figures mean.
 
 use telemetry::{Bundle, Model};
 

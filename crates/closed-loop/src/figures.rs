@@ -7,7 +7,7 @@
 //! needed               amplitude that explains what is left by itself (questions/needed.rs)
 //! ```
 //!
-//! Source: formats.md of the design notes (report.json).
+//! Source: docs/formats/report.md.
 
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -11,7 +11,7 @@
 //! What the model declares of these effects is in `sigma_declared`: a finding is what
 //! comes on top, and is written as an entry of its own behind it.
 //!
-//! Source: effects.md of the design notes (`magnitude_noise`, `rate_noise`, `outliers`).
+//! Source: docs/effects.md (`magnitude_noise`, `rate_noise`, `outliers`).
 
 mod bursts;
 mod density;

@@ -10,7 +10,7 @@
 //! -1/2 ln det F_k - 1/2 ln det N_k - (2 m_k - 3) ln sigma,    F_k: covariance of the innovation
 //! ```
 //!
-//! Source: Brown & Hwang 2012, ch. 5 (Kalman filter); statistics.md of the design notes, point 9.
+//! Source: Brown & Hwang 2012, ch. 5 (Kalman filter).
 
 use std::ops::Range;
 

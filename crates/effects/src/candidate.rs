@@ -15,8 +15,7 @@
 //! What enters non-linearly is either searched ([`Candidate::nonlinear`]: an instant, a frequency, a
 //! lag) or re-linearised ([`Candidate::refined`]: an exposure).
 //!
-//! Source: effects.md of this project's design notes; the first-order terms are derived in the file of
-//! each effect.
+//! Source: the catalogue of docs/effects.md; the first-order terms are derived in the file of each effect.
 
 use core::fmt::Debug;
 use std::collections::BTreeMap;

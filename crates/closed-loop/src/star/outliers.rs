@@ -4,7 +4,7 @@
 //! |r - median| > 8 (1.4826 MAD)      of its star, or of all stars that have few rows
 //! ```
 //!
-//! Source: formats.md of the design notes (outliers); [`spectra::robust`].
+//! Source: docs/formats/report.md (outliers); [`spectra::robust`].
 
 use rayon::prelude::*;
 use spectra::robust;

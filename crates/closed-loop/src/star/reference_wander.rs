@@ -17,7 +17,7 @@
 //! A slow error whose time may be as short as a step (the lower end of its interval) is noise like any other white
 //! noise, and is not named.
 //!
-//! Source: Akaike 1974; effects.md of the design notes (`reference_error`).
+//! Source: Akaike 1974; docs/effects.md (`reference_error`).
 
 use std::collections::BTreeMap;
 
