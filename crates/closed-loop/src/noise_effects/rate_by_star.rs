@@ -255,6 +255,24 @@ mod tests {
         assert!(chance(&rows, 6, |_| 1.0, 1.0) >= 1.0);
     }
 
+    /// Of 1 known to 1/2 and 3 known to 1/sqrt 12 the mean is (4 + 36) / 16, and three quarters of its variance are of
+    /// six degrees of freedom: 6 / (3/4)^2.
+    #[test]
+    fn two_estimates_are_joined_by_how_well_they_are_known() {
+        let slope = |value, precision, freedom| Slope {
+            value,
+            precision,
+            freedom,
+        };
+        let both = slope(1.0, 4.0, KNOWN).with(slope(3.0, 12.0, 6.0));
+        assert!((both.value - 2.5).abs() < 1e-12 && (both.precision - 16.0).abs() < 1e-12);
+        assert!((both.freedom - 10.667).abs() < 1e-2, "{}", both.freedom);
+        // Student's t of 10.667 at 1 sigma, and the normal law
+        assert!((slope(0.25, 16.0, 10.667).chance() - 0.1697).abs() < 1e-3);
+        assert!((slope(0.25, 16.0, KNOWN).chance() - 0.1587).abs() < 1e-4);
+        assert!((slope(-0.25, 16.0, 10.667).chance() - 0.8303).abs() < 1e-3);
+    }
+
     /// Eight stars of 300 rows in a steady spin, at rates that no magnitude tells; variances of 1, `noise` times the
     /// squared rate, and what each star is `off` by for no reason.
     fn spinning(noise: f64, off: f64, seed: u64) -> f64 {
@@ -268,7 +286,8 @@ mod tests {
         let rows: Vec<Row> = (0..2400)
             .map(|k| {
                 let star = k % 8;
-                let rate = [0.2, 1.4, 0.6, 1.0, 0.3, 1.8, 0.1, 0.7][star];
+                // hardly different within a star
+                let rate = [0.2, 1.4, 0.6, 1.0, 0.3, 1.8, 0.1, 0.7][star] * [1.01, 0.99][k / 8 % 2];
                 let half: f64 = Exp1.sample(&mut rng);
                 Row {
                     square: 2.0 * half * level[star] * (1.0 + noise * rate),
