@@ -35,6 +35,7 @@ use spectra::robust::median_step;
 use telemetry::report::{ConsideredEffect, Estimate, FoundEffect};
 use telemetry::{EffectEntry, EffectValue, Model};
 
+use crate::causes::description;
 use crate::declared;
 use crate::error::CloseError;
 use crate::evidence::{Amplitudes, Evidence, Residuals};
@@ -234,7 +235,9 @@ pub(crate) fn claim(
     let make = |belief: &dyn Fn(&Row) -> [f64; 2]| source.rows(belief);
     let follows_light =
         situation.model.effects.iter().any(|e| e.id == MAGNITUDE) || situation.windows.is_some();
-    let rivals = rivals::rivals(situation, data);
+    let rows = data.rows(0..data.t_s.len(), None, None);
+    let variables = description::of_noise(situation, data);
+    let rivals = rivals::rivals(&rows, &variables);
     let known = Known {
         moving: level.resolved,
         least_slope: if follows_light {

@@ -20,7 +20,7 @@ use crate::StarRows;
 use crate::hot_pixel::{HALF_WIDTH_PX, middle_of, pixel_of};
 
 /// Pixels that are proposed, of those that a star was in and of those that stars only passed by.
-const MOST_PIXELS: [usize; 2] = [48, 16];
+const MOST_PIXELS: [usize; 2] = [40, 8];
 /// Rows within half-width of a pixel with which it is worth looking at: with fewer, the pixels of a slew are
 /// so many that all effects pay for them.
 const LEAST_ROWS: u32 = 8;

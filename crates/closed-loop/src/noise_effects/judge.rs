@@ -144,7 +144,7 @@ struct Bench<'a> {
     stars: usize,
     least_slope: f64,
     most_rate: f64,
-    rivals: &'a [Rival],
+    rivals: &'a [Rival<'a>],
 }
 
 /// A fit, how well its parameters are known, and what its folds tell where that is asked for.
@@ -162,7 +162,7 @@ enum Gain {
 }
 
 /// What is known before the residuals are looked at.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 pub(super) struct Known<'a> {
     /// Whether rates are.
     pub(super) moving: bool,
@@ -173,7 +173,7 @@ pub(super) struct Known<'a> {
     /// Declared share and size.
     pub(super) outliers: Option<[f64; 2]>,
     /// What the noise may follow in place of the rate.
-    pub(super) rivals: &'a [Rival],
+    pub(super) rivals: &'a [Rival<'a>],
 }
 
 /// Judges. `make` gives the rows under a belief of variance and soundness.

@@ -12,10 +12,9 @@
 //!
 //! Not physics: which variables are tried.
 
-use crate::causes::description;
+use effects::StarRows;
+
 use crate::search::empirical::Variable;
-use crate::situation::Situation;
-use crate::star::data::StarData;
 
 use super::rows::Row;
 
@@ -23,25 +22,32 @@ use super::rows::Row;
 const MORE: f64 = 4.0;
 
 /// A variable in the place of the rate.
-#[derive(Clone, Debug)]
-pub(super) struct Rival {
-    /// Its values at all rows of the data; squares where it adds.
-    values: Vec<f64>,
+pub(super) struct Rival<'a> {
+    /// Its value at a row of the data; squares where it adds.
+    value: Box<dyn Fn(usize) -> f64 + Send + Sync + 'a>,
     adds: bool,
 }
 
-impl Rival {
-    /// Noise that grows with these squares of every row.
-    pub(super) fn of_squares(values: impl Iterator<Item = f64>) -> Self {
+impl<'a> Rival<'a> {
+    /// Noise that grows with these squares.
+    pub(super) fn of_squares(value: impl Fn(usize) -> f64 + Send + Sync + 'a) -> Self {
         Self {
-            values: values.collect(),
+            value: Box::new(value),
             adds: true,
+        }
+    }
+
+    /// Noise that is steeper or less steep with this, -1 to 1.
+    fn of_slope(value: impl Fn(usize) -> f64 + Send + Sync + 'a) -> Self {
+        Self {
+            value: Box::new(value),
+            adds: false,
         }
     }
 
     /// `row` with the rival in the place of the rate, where that adds, or of the magnitude.
     pub(super) fn in_place(&self, row: &Row) -> Row {
-        let value = self.values[row.at];
+        let value = (self.value)(row.at);
         let value = if value.is_finite() { value } else { 0.0 };
         if self.adds {
             Row {
@@ -63,44 +69,36 @@ impl Rival {
     }
 }
 
-/// The acceleration across the detector, the place on it and the distance from the middle of where stars are, and every
-/// channel.
-pub(super) fn rivals(situation: &Situation<'_>, data: &StarData) -> Vec<Rival> {
-    let rows = data.rows(0..data.t_s.len(), None, None);
-    let each = description::of_noise(situation, data);
+/// Of `variables` with their ranges: the acceleration across the detector, the place on it and the distance from the
+/// middle of where stars are, and every channel.
+pub(super) fn rivals<'a>(
+    rows: &'a StarRows<'a>,
+    variables: &'a [(Variable, [f64; 2])],
+) -> Vec<Rival<'a>> {
     // -1 to 1
-    let scaled = |variable: &Variable, [low, high]: [f64; 2]| -> Vec<f64> {
-        let values = (0..data.t_s.len()).map(|r| variable.value(&rows, r));
-        values
-            .map(|v| (2.0 * v - low - high) / (high - low))
-            .collect()
+    let scaled = move |variable: &'a Variable, [low, high]: [f64; 2]| {
+        move |row: usize| (2.0 * variable.value(rows, row) - low - high) / (high - low)
     };
     let mut out = Vec::new();
-    let mut out_of_the_middle = vec![0.0; data.t_s.len()];
-    for (variable, range) in &each {
+    let mut places = Vec::new();
+    for (variable, range) in variables {
         match variable {
             Variable::Acceleration => {
-                let sizes = scaled(variable, [-range[1], range[1]]);
-                out.push(Rival::of_squares(sizes.iter().map(|a| a * a)));
+                let size = scaled(variable, [-range[1], range[1]]);
+                out.push(Rival::of_squares(move |row| size(row).powi(2)));
             }
-            Variable::Housekeeping(..) => out.push(Rival {
-                values: scaled(variable, *range),
-                adds: false,
-            }),
+            Variable::Housekeeping(..) => out.push(Rival::of_slope(scaled(variable, *range))),
             Variable::Position(_) => {
                 let place = scaled(variable, *range);
-                for (sum, z) in out_of_the_middle.iter_mut().zip(&place) {
-                    *sum += z * z;
-                }
-                out.push(Rival::of_squares(place.iter().map(|z| z * z)));
-                out.push(Rival {
-                    values: place,
-                    adds: false,
-                });
+                places.push(place);
+                out.push(Rival::of_squares(move |row| place(row).powi(2)));
+                out.push(Rival::of_slope(place));
             }
             _ => {}
         }
     }
-    out.push(Rival::of_squares(out_of_the_middle.into_iter()));
+    out.push(Rival::of_squares(move |row| {
+        places.iter().map(|place| place(row).powi(2)).sum()
+    }));
     out
 }

@@ -448,8 +448,8 @@ fn noise_that_follows_the_acceleration_is_no_rate_s() {
     };
     let speeding = |k: usize| f64::from(u8::from(k % 50 < 20));
     let folds = Folds::cut(500);
-    let acceleration = [Rival::of_squares((0..7000).map(|row| speeding(row / 14)))];
-    let told = |more: &dyn Fn(usize) -> f64, rivals: &[Rival]| {
+    let acceleration = [Rival::of_squares(move |row| speeding(row / 14))];
+    let told = |more: &dyn Fn(usize) -> f64, rivals: &[Rival<'_>]| {
         let variance = |frame: usize| 2.5_f64.hypot(more(frame)).powi(2);
         let rows = moving_rows(3, &folds, 14, rate, variance);
         let known = Known { rivals, ..KNOWN };
