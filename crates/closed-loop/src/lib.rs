@@ -42,6 +42,7 @@ mod motion;
 mod noise_effects;
 mod noise_level;
 mod outcome;
+mod power;
 mod questions;
 mod search;
 mod situation;

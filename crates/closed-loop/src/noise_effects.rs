@@ -35,12 +35,12 @@ use spectra::robust::median_step;
 use telemetry::report::{ConsideredEffect, Estimate, FoundEffect};
 use telemetry::{EffectEntry, EffectValue, Model};
 
-use crate::causes::description;
 use crate::declared;
 use crate::error::CloseError;
 use crate::evidence::{Amplitudes, Evidence, Residuals};
 use crate::questions::hypothesis::SEEN;
 use crate::search::Found;
+use crate::search::empirical::Variable;
 use crate::search::selection::{FAMILY_ALPHA, columns_of};
 use crate::situation::Situation;
 use crate::star::data::StarData;
@@ -215,12 +215,14 @@ fn most_rate(situation: &Situation<'_>, data: &StarData) -> f64 {
     3600.0 * longest_s / 12.0_f64.sqrt()
 }
 
-/// Looks for effects on the noise in the `residual` that the stars leave at `level`.
+/// Looks for effects on the noise in the `residual` that the stars leave at `level`; `variables` with their ranges may
+/// be what it follows.
 pub(crate) fn claim(
     situation: &Situation<'_>,
     level: &StarEvidence<'_>,
     residual: &[Vec<f64>],
     folds: &Folds,
+    variables: &[(Variable, [f64; 2])],
 ) -> Result<NoiseEffects, CloseError> {
     let data = level.data;
     let declared = declared_variance(situation, data)?;
@@ -236,8 +238,7 @@ pub(crate) fn claim(
     let follows_light =
         situation.model.effects.iter().any(|e| e.id == MAGNITUDE) || situation.windows.is_some();
     let rows = data.rows(0..data.t_s.len(), None, None);
-    let variables = description::of_noise(situation, data);
-    let rivals = rivals::rivals(&rows, &variables);
+    let rivals = rivals::rivals(&rows, variables);
     let known = Known {
         moving: level.resolved,
         least_slope: if follows_light {

@@ -28,7 +28,7 @@ use crate::search::orbits::Look;
 use crate::search::refusal::Refused;
 use crate::situation::Situation;
 use crate::unexplained::leftover::Series;
-use added::{Added, Power};
+use added::{Added, power};
 
 mod added;
 mod to_explain;
@@ -86,7 +86,7 @@ pub(super) fn finish(
     rivals: Vec<Rival>,
 ) -> Result<Closed, CloseError> {
     let (situation, data, found) = (f.situation, f.data(), f.found);
-    let power = Power::of(f)?;
+    let power = power(f)?;
     let share = power.share_left();
     // what is left is judged before a term without a cause is added
     let mut unattributed = figures::unattributed(found, share, |c| !motion_terms::is_of_motion(c));

@@ -21,7 +21,7 @@ use super::squares::{Columns, Judged, MIN_ROWS, Table, both};
 use super::{NoiseEffects, declared_variance};
 use crate::error::CloseError;
 use crate::figures::first_of_each;
-use crate::search::empirical::Variable;
+use crate::search::empirical::{Scale, Variable};
 use crate::situation::Situation;
 use crate::star::data::StarData;
 use crate::star::evidence::StarEvidence;
@@ -125,15 +125,15 @@ pub(crate) fn noise_follows(
         return Ok(NoiseFollows::default());
     };
     let rows = data.rows(0..data.t_s.len(), None, None);
-    let each = |(variable, [low, high]): &(Variable, [f64; 2])| -> Vec<Judged> {
+    let each = |(variable, range): &(Variable, [f64; 2])| -> Vec<Judged> {
+        let scale = Scale::new(*range);
         let column = |row: &Row| -> [f64; 2] {
             if let Variable::Phase(axis) = variable {
                 let at = data.landed()[*axis][row.at];
                 let (s, c) = data.camera.phase_rad(at).sin_cos();
                 return [s, c];
             }
-            let z = (2.0 * variable.value(&rows, row.at) - low - high) / (high - low);
-            let z = if z.is_finite() { z } else { 0.0 };
+            let z = scale.of(variable.value(&rows, row.at));
             [z, 1.5 * z * z - 0.5]
         };
         let columns = [all, fast].map(|t| Columns::of(t, column));
@@ -149,7 +149,7 @@ pub(crate) fn noise_follows(
             judged.extend(among);
         }
         if matches!(variable, Variable::Time) {
-            judged.push(burst([all, fast], |row| data.t_s[row.at], [*low, *high]));
+            judged.push(burst([all, fast], |row| data.t_s[row.at], *range));
         }
         judged.into_iter().flatten().collect()
     };

@@ -14,7 +14,7 @@
 
 use effects::StarRows;
 
-use crate::search::empirical::Variable;
+use crate::search::empirical::{Scale, Variable};
 
 use super::rows::Row;
 
@@ -48,7 +48,6 @@ impl<'a> Rival<'a> {
     /// `row` with the rival in the place of the rate, where that adds, or of the magnitude.
     pub(super) fn in_place(&self, row: &Row) -> Row {
         let value = (self.value)(row.at);
-        let value = if value.is_finite() { value } else { 0.0 };
         if self.adds {
             Row {
                 rate: value,
@@ -76,8 +75,9 @@ pub(super) fn rivals<'a>(
     variables: &'a [(Variable, [f64; 2])],
 ) -> Vec<Rival<'a>> {
     // -1 to 1
-    let scaled = move |variable: &'a Variable, [low, high]: [f64; 2]| {
-        move |row: usize| (2.0 * variable.value(rows, row) - low - high) / (high - low)
+    let scaled = move |variable: &'a Variable, range: [f64; 2]| {
+        let scale = Scale::new(range);
+        move |row: usize| scale.of(variable.value(rows, row))
     };
     let mut out = Vec::new();
     let mut places = Vec::new();

@@ -36,8 +36,8 @@ use effects::{
 use focal_plane::{Camera, PointsMut, Series, VectorsMut};
 
 use crate::search::LEADING;
-use variable::{Scale, orders};
-pub(crate) use variable::{Variable, about_mean, flux_of, range};
+use variable::orders;
+pub(crate) use variable::{Scale, Variable, about_mean, flux_of, range};
 
 mod variable;
 

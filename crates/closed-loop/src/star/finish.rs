@@ -36,7 +36,7 @@ use crate::star::reference_wander::REFERENCE_ERROR;
 use crate::star::search::Wander;
 use crate::star::settling::Settled;
 use crate::unexplained::leftover::Series;
-use added::{Added, Power};
+use added::{Added, power};
 
 mod added;
 mod considered;
@@ -157,7 +157,7 @@ pub(crate) fn finish(
     plain: Residuals,
     inside: Option<(Vec<Vec<f64>>, Series)>,
 ) -> Result<Closed, CloseError> {
-    let power = Power::of(f, &plain)?;
+    let power = power(f, &plain)?;
     // what is left is judged before a term without a cause is added
     let mut unattributed = f.described.follows(power.share_left());
     let Added {

@@ -12,41 +12,18 @@ use crate::attitude::finish::Finish;
 use crate::error::CloseError;
 use crate::evidence::Residuals;
 use crate::figures;
+use crate::power::Power;
 use crate::questions::confusion;
 use crate::questions::manoeuvre::attitudes::fly;
 use crate::search::{instants, orbits};
 
-/// Mean squares of the residual out of fold, all axes, arcsec^2.
-pub(super) struct Power {
-    /// Of the declared model.
-    before: f64,
-    /// With all that was chosen.
-    left: f64,
-    /// Share of the first that each of the chosen takes, in their order.
-    explained: Vec<f64>,
-}
-
-impl Power {
-    pub(super) fn of(f: &Finish<'_>) -> Result<Self, CloseError> {
-        let chosen = f.chosen();
-        let before = of_residual(f, f.before);
-        let mut explained = Vec::new();
-        let mut left = before;
-        for k in 0..chosen.len() {
-            let now = of_residual(f, &f.residuals(&chosen[..=k])?);
-            explained.push((left - now) / before);
-            left = now;
-        }
-        Ok(Self {
-            before,
-            left,
-            explained,
-        })
-    }
-
-    pub(super) fn share_left(&self) -> f64 {
-        self.left / self.before
-    }
+/// Mean squares over all axes.
+pub(super) fn power(f: &Finish<'_>) -> Result<Power, CloseError> {
+    let chosen = f.chosen();
+    let before = of_residual(f, f.before);
+    Power::of(before, before, chosen.len(), |first| {
+        Ok(of_residual(f, &f.residuals(&chosen[..first])?))
+    })
 }
 
 fn of_residual(f: &Finish<'_>, residual: &Residuals) -> f64 {
@@ -74,7 +51,7 @@ impl Added {
     ) -> Result<Self, CloseError> {
         let (surroundings, questions) = (f.situation.surroundings(), f.situation.questions);
         let (data, found) = (f.data(), f.found);
-        let mut explained = power.explained.clone();
+        let mut with_term = None;
         let mut groups = f.chosen().to_vec();
         let mut after = plain.clone();
         if questions.empirical
@@ -82,8 +59,9 @@ impl Added {
         {
             groups.push(g);
             after = f.residuals(&groups)?;
-            explained.push((power.left - of_residual(f, &after)) / power.before);
+            with_term = Some(of_residual(f, &after));
         }
+        let explained = power.explained(with_term);
         let (mut effects, entries) =
             figures::effects_found(found, &groups, &explained, &surroundings, questions)?;
         if effects.is_empty() {

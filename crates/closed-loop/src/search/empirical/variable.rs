@@ -93,13 +93,13 @@ impl Variable {
 /// Middle and half range of a variable: scale it to -1..1. Of a motion the mean of its size where that is steady,
 /// and its largest component.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Scale {
+pub(crate) struct Scale {
     pub(super) middle: f64,
     pub(super) half: f64,
 }
 
 impl Scale {
-    pub(super) fn new(range: [f64; 2]) -> Self {
+    pub(crate) fn new(range: [f64; 2]) -> Self {
         Self {
             middle: 0.5 * (range[0] + range[1]),
             half: 0.5 * (range[1] - range[0]),
@@ -112,7 +112,7 @@ impl Scale {
     }
 
     /// 0 where the value is not known.
-    pub(super) fn of(self, value: f64) -> f64 {
+    pub(crate) fn of(self, value: f64) -> f64 {
         let z = (value - self.middle) / self.half;
         if z.is_finite() { z } else { 0.0 }
     }

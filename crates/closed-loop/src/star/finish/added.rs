@@ -10,6 +10,7 @@ use crate::error::CloseError;
 use crate::evidence::Residuals;
 use crate::figures;
 use crate::image_level;
+use crate::power::Power;
 use crate::questions::confusion;
 use crate::questions::manoeuvre::stars::Sky;
 use crate::search::instants;
@@ -18,44 +19,17 @@ use crate::search::selection::columns_of;
 use crate::star::finish::Finish;
 use crate::star::reference_wander::{self, Finding, REFERENCE_ERROR};
 
-/// Mean squares of the residual out of fold, arcsec^2.
-pub(super) struct Power {
-    /// Of the declared model.
-    pub(super) before: f64,
-    /// With all that was chosen.
-    pub(super) left: f64,
-    /// Share of the first that each of the chosen takes, in their order.
-    explained: Vec<f64>,
-}
-
-impl Power {
-    /// `plain`: what all that were chosen leave.
-    pub(super) fn of(f: &Finish<'_>, plain: &Residuals) -> Result<Self, CloseError> {
-        let chosen = &f.found.selection.chosen;
-        let before = of_residual(f, &f.settled.before);
-        let of_first = |first: usize| -> Result<f64, CloseError> {
-            if first == chosen.len() {
-                return Ok(of_residual(f, plain));
-            }
-            Ok(of_residual(f, &f.residuals(&chosen[..first])?))
-        };
-        let mut explained = Vec::new();
-        let mut left = of_first(0)?;
-        for k in 1..=chosen.len() {
-            let now = of_first(k)?;
-            explained.push((left - now) / before);
-            left = now;
+/// Mean squares; `plain`: what all that were chosen leave.
+pub(super) fn power(f: &Finish<'_>, plain: &Residuals) -> Result<Power, CloseError> {
+    let chosen = &f.found.selection.chosen;
+    let of_first = |first: usize| -> Result<f64, CloseError> {
+        if first == chosen.len() {
+            return Ok(of_residual(f, plain));
         }
-        Ok(Self {
-            before,
-            left,
-            explained,
-        })
-    }
-
-    pub(super) fn share_left(&self) -> f64 {
-        self.left / self.before
-    }
+        Ok(of_residual(f, &f.residuals(&chosen[..first])?))
+    };
+    let before = of_residual(f, &f.settled.before);
+    Power::of(before, of_first(0)?, chosen.len(), of_first)
 }
 
 fn of_residual(f: &Finish<'_>, residual: &Residuals) -> f64 {
@@ -83,7 +57,6 @@ impl Added {
     ) -> Result<Self, CloseError> {
         let surroundings = f.situation.surroundings();
         let questions = f.situation.questions;
-        let mut explained = power.explained.clone();
         let mut groups = f.found.selection.chosen.clone();
         let mut with_term = None;
         if questions.empirical
@@ -91,9 +64,9 @@ impl Added {
         {
             groups.push(g);
             let left = f.residuals(&groups)?;
-            explained.push((power.left - of_residual(f, &left)) / power.before);
             with_term = Some(left);
         }
+        let explained = power.explained(with_term.as_ref().map(|left| of_residual(f, left)));
         let (mut effects, entries) =
             figures::effects_found(f.found, &groups, &explained, &surroundings, questions)?;
         tell_apart(f, &mut effects);

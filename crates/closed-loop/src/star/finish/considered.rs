@@ -6,10 +6,10 @@ use telemetry::report::{ConsideredEffect, FoundEffect, Unattributed};
 
 use crate::figures;
 use crate::image_level;
+use crate::power::Power;
 use crate::questions::needed::{self, ToExplain};
 use crate::search::selection::columns_of;
 use crate::star::finish::Finish;
-use crate::star::finish::added::Power;
 use crate::star::reference_wander;
 
 /// What one effect would have to explain of the squares of the fit: what is left, and what there was.

@@ -12,8 +12,9 @@ use crate::error::CloseError;
 use crate::figures;
 use crate::image_level::ImageLevel;
 use crate::noise_effects::{self, NoiseEffects, NoiseFollows};
+use crate::power::Power;
+use crate::search::empirical::Variable;
 use crate::star::finish::Finish;
-use crate::star::finish::added::Power;
 use crate::unexplained::leftover::{self, Leftover, Series};
 use crate::unexplained::pattern::{self, Pattern, Turned};
 use crate::unexplained::star_series::{self, OwnSeries};
@@ -41,8 +42,9 @@ pub(super) fn look(
     let turned = Turned::of(f.data, [&residual[0], &residual[1]], weight);
     let order = f.situation.model.noise.distortion_order;
     let learned = f.level.learned();
+    let variables = description::of_noise(f.situation, f.data);
     let (noise, ((shared, own), pattern)) = rayon::join(
-        || noise_and_slow(f, residual),
+        || noise_and_slow(f, residual, &variables),
         || {
             rayon::join(
                 || (series.describe(), own_series(f, residual, &turned)),
@@ -57,9 +59,14 @@ pub(super) fn look(
     }
     let mut noise = NoiseFollows::default();
     if f.formed.is_none() && !f.data.frames_are_unrelated() {
-        let of = description::of_noise(f.situation, f.data);
-        noise =
-            noise_effects::noise_follows(f.situation, f.level, residual, f.folds, &effects, &of)?;
+        noise = noise_effects::noise_follows(
+            f.situation,
+            f.level,
+            residual,
+            f.folds,
+            &effects,
+            &variables,
+        )?;
     }
     let left = Left {
         shared,
@@ -75,6 +82,7 @@ pub(super) fn look(
 fn noise_and_slow(
     f: &Finish<'_>,
     residual: &[Vec<f64>],
+    variables: &[(Variable, [f64; 2])],
 ) -> Result<(NoiseEffects, Option<Slow>), CloseError> {
     // what is described is no noise
     let beside = beside_description(f)?;
@@ -83,7 +91,7 @@ fn noise_and_slow(
         None => f.slow,
     };
     let residual = beside.as_deref().unwrap_or(residual);
-    let noise = noise_effects::claim(f.situation, f.level, residual, f.folds)?;
+    let noise = noise_effects::claim(f.situation, f.level, residual, f.folds, variables)?;
     Ok((noise, slow))
 }
 
