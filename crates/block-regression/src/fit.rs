@@ -118,6 +118,12 @@ impl Layout {
             .collect()
     }
 
+    /// What a `gram` has of the nuisance.
+    fn nuisance(&self, gram: &DMatrix<f64>) -> DMatrix<f64> {
+        let n = self.nuisance_precision.nrows();
+        gram.view((0, 0), (n, n)).into_owned()
+    }
+
     /// Squared length of each candidate column.
     fn raw(&self, gram: &DMatrix<f64>) -> Vec<f64> {
         let n = self.nuisance_precision.nrows();
@@ -173,6 +179,8 @@ pub struct Fits {
     inner: Vec<DMatrix<f64>>,
     /// The same of each part by source.
     inner_by_source: Vec<DMatrix<f64>>,
+    /// That of the nuisance columns, all data.
+    nuisance_gram: DMatrix<f64>,
     /// Squared length of each candidate column before the nuisance is out.
     raw: Vec<f64>,
     /// Noise variance that is held for least.
@@ -286,6 +294,7 @@ impl Fits {
             fold_of_block: folds.fold_of_block.clone(),
             inner,
             inner_by_source,
+            nuisance_gram: layout.nuisance(&sums.all.0),
             raw: layout.raw(&sums.all.0),
             least: out_of_fold::least_variance(layout.residual_variance(&sums.all)),
             prior: folds.prior_blocks,
@@ -334,6 +343,7 @@ impl Fits {
             fold_of_block: Vec::new(),
             inner: Vec::new(),
             inner_by_source: Vec::new(),
+            nuisance_gram: layout.nuisance(&total.0),
             raw: layout.raw(&total.0),
             least: out_of_fold::least_variance(layout.residual_variance(&total)),
             prior: 0.0,
@@ -465,12 +475,8 @@ impl Fits {
     }
 
     /// Gram matrix of the nuisance columns of all data, without their priors.
-    pub fn nuisance_gram(&self) -> DMatrix<f64> {
-        let n = self.layout.nuisance_precision.nrows();
-        let blocks = self.grams.gram.iter();
-        let mut sum = DMatrix::zeros(n, n);
-        blocks.for_each(|block| sum += block.leading(n));
-        sum
+    pub fn nuisance_gram(&self) -> &DMatrix<f64> {
+        &self.nuisance_gram
     }
 
     /// Joint estimate of `set` on all data; `None` if its columns cannot be told apart.

@@ -80,12 +80,6 @@ impl Gram {
         self.weight * self.shared[(i, j)] + self.rows.column(i).dot(&self.rows.column(j))
     }
 
-    /// That of the first `n` columns.
-    pub(crate) fn leading(&self, n: usize) -> DMatrix<f64> {
-        let first = self.rows.columns(0, n);
-        self.shared.view((0, 0), (n, n)) * self.weight + first.tr_mul(&first)
-    }
-
     /// Products of each of `columns` with column `last` less `beta` times the columns.
     pub(crate) fn less(
         &self,

@@ -18,14 +18,34 @@
 pub(crate) const TERMS: [&str; 10] = ["k0", "k1", "k2", "k3", "p1", "p2", "b1", "b2", "t1", "t2"];
 const COUNT: usize = TERMS.len();
 
-/// Displacement of an image and its slopes by the coefficients.
+/// Displacement of an image, and what its slopes by the coefficients are made of.
 pub(crate) struct Bend {
     pub(crate) shift: [f64; 2],
-    pub(crate) slopes: [[f64; 2]; COUNT],
+    /// v, and its slopes: by k1 to p2, by t1 and t2.
+    bent: [f64; 2],
+    lens: [[f64; 2]; 5],
+    tilt: [[f64; 2]; 2],
+    pixels: Pixels,
+}
+
+/// What pixels make of v.
+#[derive(Clone, Copy)]
+struct Pixels {
+    k0: f64,
+    b1: f64,
+    b2: f64,
+}
+
+impl Pixels {
+    fn read(self, [x, y]: [f64; 2]) -> [f64; 2] {
+        let Self { k0, b1, b2 } = self;
+        [x * (1.0 + k0 + b1) + b2 * y, y * (1.0 + k0)]
+    }
 }
 
 impl Bend {
     /// At `u`, with the coefficients `values` and the centre `c`, all of focal length 1.
+    #[inline]
     pub(crate) fn at(values: &[f64; COUNT], c: [f64; 2], u: [f64; 2]) -> Self {
         let [k0, k1, k2, k3, p1, p2, b1, b2, t1, t2] = *values;
         let [x, y] = about(c, u);
@@ -48,18 +68,27 @@ impl Bend {
             v[0] += k * term[0];
             v[1] += k * term[1];
         }
-        let read = |d: [f64; 2]| [d[0] * (1.0 + k0 + b1) + b2 * d[1], d[1] * (1.0 + k0)];
-        let end = read(v);
-        let slope = |k: usize| match k {
-            0 => v,
-            6 => [v[0], 0.0],
-            7 => [v[1], 0.0],
-            8 | 9 => read(tilt[k - 8]),
-            _ => read(lens[k - 1]),
-        };
+        let pixels = Pixels { k0, b1, b2 };
+        let end = pixels.read(v);
         Self {
             shift: [end[0] - u[0], end[1] - u[1]],
-            slopes: core::array::from_fn(slope),
+            bent: v,
+            lens,
+            tilt,
+            pixels,
+        }
+    }
+
+    /// Slope by the coefficient [`TERMS`]`[k]`.
+    #[inline]
+    pub(crate) fn slope(&self, k: usize) -> [f64; 2] {
+        let [x, y] = self.bent;
+        match k {
+            0 => [x, y],
+            6 => [x, 0.0],
+            7 => [y, 0.0],
+            8 | 9 => self.pixels.read(self.tilt[k - 8]),
+            _ => self.pixels.read(self.lens[k - 1]),
         }
     }
 }
@@ -103,7 +132,7 @@ mod tests {
                 let (over, under) = (off(1e-4), off(-1e-4));
                 for axis in 0..2 {
                     let slope = (over[axis] - under[axis]) / 2e-4;
-                    let error = slope - bend.slopes[k][axis];
+                    let error = slope - bend.slope(k)[axis];
                     assert!(error.abs() < 2e-8, "{} at {u:?}: {error}", TERMS[k]);
                 }
             }

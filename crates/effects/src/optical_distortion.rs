@@ -278,9 +278,10 @@ impl Shift for Brown {
         let bend = self.bend(star.at, &self.about);
         let mut left = bend.shift;
         let mut square = 0.0;
-        for &k in &self.terms {
+        for (out, &k) in out.iter_mut().zip(&self.terms) {
+            *out = bend.slope(k);
             for axis in 0..2 {
-                left[axis] -= self.about[k] * bend.slopes[k][axis];
+                left[axis] -= self.about[k] * out[axis];
             }
             square += self.about[k].powi(2);
         }
@@ -292,7 +293,7 @@ impl Shift for Brown {
             } else {
                 0.0
             };
-            *out = [0, 1].map(|axis| focal[axis] * (bend.slopes[k][axis] + share * left[axis]));
+            *out = [0, 1].map(|axis| focal[axis] * (out[axis] + share * left[axis]));
         }
     }
     fn parameters(&self, values: &[f64]) -> Vec<Parameter> {

@@ -117,7 +117,7 @@ impl WarmPixels {
         pixels.sort_unstable();
         pixels.dedup();
         let pixels: Vec<([i64; 2], u32)> = pixels
-            .into_iter()
+            .into_par_iter()
             .filter(|pixel| near(*pixel) >= LEAST_ROWS)
             .map(|pixel| (pixel, visits.get(&pixel).copied().unwrap_or(0)))
             .collect();

@@ -79,6 +79,8 @@ pub(crate) struct Described {
     pub(crate) changes: Vec<Vec<(Way, Vec<usize>)>>,
     /// Ids of the chosen effects.
     pub(crate) names: Vec<&'static str>,
+    /// The channel that each goes with.
+    pub(crate) channels: Vec<Option<String>>,
     /// Whether each turns whole frames.
     pub(crate) turns: Vec<bool>,
     /// What having looked for each chosen effect costs, nats ([`costs`]).
@@ -120,6 +122,9 @@ impl Described {
         let own: Vec<usize> = (0..n).collect();
         let fitted = fit_beside(evidence, folds, &all, &own)?;
         let names = only.candidates.iter().map(|c| c.id()).collect();
+        let channels = only.candidates.iter();
+        let channels = channels.map(|c| c.selectors().get("channel").cloned());
+        let channels = channels.collect();
         let turns = only.candidates.iter().map(|c| c.acts_on_attitude());
         let turns = turns.collect();
         let groups = &found.fitted.groups;
@@ -170,6 +175,7 @@ impl Described {
             terms,
             changes,
             names,
+            channels,
             turns,
             paid,
             rest: OnceLock::new(),

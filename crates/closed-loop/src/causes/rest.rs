@@ -60,8 +60,7 @@ impl Described {
     /// reference.
     pub(super) fn is_of_heaters(&self, parts: &[Part], refused: &Refused) -> bool {
         let heater = |(k, _): &Part| {
-            let name = self.terms[*k].term.name();
-            let channel = name.strip_prefix("housekeeping:");
+            let channel = self.terms[*k].term.channel_name();
             let family = channel.map(|channel| format!("{HEATER}/{channel}"));
             family.is_some_and(|family| refused.get(&family) == Some(&Refusal::Wander))
         };

@@ -24,6 +24,9 @@
 //! alone, it is no part of what is described, and the two are held against the description of all:
 //! of an effect of 10 sigma beside a cause of 30 that no effect explains the terms describe the cause.
 //!
+//! What a channel bends and stretches is two effects, and one term of that channel: for what it spares by that it is
+//! not likelier.
+//!
 //! A star or a pixel is not named where a slope in what the catalogue says of stars explains the same, whatever each was
 //! looked for among: there are as many stars as places on a slope. Where that slope is nearly that star
 //! ([`super::one_star`]) it has to be worth far more.
@@ -125,7 +128,7 @@ pub(crate) fn stand_ins(
         } else if free && own_shape(&parts) {
             -OWN_SHAPE
         } else {
-            BY_FAR
+            BY_FAR + spared(described, &set, &parts) as f64 * looked
         };
         let beyond = worth - parts.len() as f64 * looked - own - least;
         if beyond <= 0.0 {
@@ -139,6 +142,21 @@ pub(crate) fn stand_ins(
         }
     }
     most
+}
+
+/// How often a description pays for having been looked for where those of `set` pay once more: it has one term for all
+/// that goes with a channel.
+fn spared(described: &Described, set: &[usize], parts: &[Part]) -> usize {
+    let of_one = |(k, _): &Part| {
+        let Some(channel) = described.terms[*k].term.channel_name() else {
+            return 0;
+        };
+        let own = set.iter().map(|&k| described.channels[k].as_deref());
+        own.filter(|c| *c == Some(channel))
+            .count()
+            .saturating_sub(1)
+    };
+    parts.iter().map(of_one).sum()
 }
 
 /// What a description of what `set` leaves adds to its worth, where the set is something else: of what it gained

@@ -247,7 +247,15 @@ impl Empirical {
 
     /// Whether it is a housekeeping channel alone.
     pub(crate) fn is_of_channel(&self) -> bool {
-        matches!(self.variable, Variable::Housekeeping(..)) && self.by.is_none()
+        self.channel_name().is_some()
+    }
+
+    /// The name of the channel that it is of alone.
+    pub(crate) fn channel_name(&self) -> Option<&str> {
+        match (&self.variable, &self.by) {
+            (Variable::Housekeeping(name, _), None) => Some(name),
+            _ => None,
+        }
     }
 
     /// The channel that it is of alone, and the values of it that are -1 and 1.

@@ -41,8 +41,9 @@ const SHORTEST_S: f64 = 2500.0;
 /// What is less than two turns in the span may be told from nothing else: the bound for that, s.
 const SHORTEST_TURN_S: f64 = 300.0;
 const FEW_TURNS: f64 = 2.0;
-/// Fits about the circle.
+/// Fits about the circle at most, and the change in nats from one to the next below which there are no more.
 const ROUNDS: usize = 4;
+const SETTLED: f64 = 0.1;
 /// Nats of white noise below which an orbit is not worth a search.
 const WORTH_A_SEARCH: f64 = 12.0;
 /// Nats by which an orbit, which takes the shape in time that suits it, must be worth more than channels that
@@ -326,7 +327,7 @@ impl Beside<'_> {
             let without = columns(1..first);
             let error = |set: &[usize]| fitted.fits.error(set).unwrap_or(f64::INFINITY);
             let gain = |set: &[usize]| fitted.nats(error(&without), error(set));
-            nats = gain(&with);
+            let before = std::mem::replace(&mut nats, gain(&with));
             let others = gain(&columns(1..all.len()));
             let rivals = others.max(self.slow.unwrap_or(0.0));
             if nats < WORTH_A_SEARCH || nats < RIVAL * rivals {
@@ -350,6 +351,9 @@ impl Beside<'_> {
                 break;
             };
             orbit = better.into();
+            if (nats - before).abs() < SETTLED {
+                break;
+            }
         }
         Ok(Some(Likely { orbit, nats }))
     }

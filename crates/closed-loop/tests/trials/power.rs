@@ -413,3 +413,22 @@ fn a_heater_is_no_slow_error_that_goes_with_its_channel() {
         assert!(!report.unattributed.present, "seed {seed}");
     }
 }
+
+/// Optics that one channel bends and stretches, of 15 to 45 nats each: either stands by itself, and the channel as one term
+/// pays once for what these pay for twice. (So it had refused 6 of 100 draws.)
+#[test]
+fn what_a_channel_bends_and_stretches_is_two_effects() {
+    let bend = "channel = \"optics_c\"\nx_arcsec_per_unit = 0.0\ny_arcsec_per_unit = 0.65\nz_arcsec_per_unit = 0.0";
+    let stretch = "channel = \"optics_c\"\nppm_per_c = 18.0";
+    for seed in [7375, 7384, 7385] {
+        let mut case = Case::new(Path::Drift, seed);
+        case.duration_s = 500.0;
+        let case = case.with("thermal_misalignment", bend);
+        let report = case.with("focal_length_drift", stretch).close().report;
+        let mut effects = named(&report);
+        effects.sort_unstable();
+        let both = ["focal_length_drift", "thermal_misalignment"];
+        assert_eq!(effects, both, "seed {seed}");
+        assert!(!report.unattributed.present, "seed {seed}");
+    }
+}
