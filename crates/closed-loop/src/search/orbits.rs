@@ -251,6 +251,7 @@ pub(crate) fn propose(
     let beside = Beside {
         evidence,
         folds,
+        surroundings,
         not_turn,
         turn,
         slow,
@@ -271,9 +272,8 @@ pub(crate) fn propose(
     let fastest_s = SHORTEST_S.min(surroundings.length_s() / FEW_TURNS);
     let period_s = period_s(orbit.as_ref(), surroundings).unwrap_or(f64::INFINITY);
     let is_fast = period_s < fastest_s;
-    // where nature has none, a slow error makes one as well as it makes anything
-    let slow_makes_it = period_s < SHORTEST_S && nats < slow.unwrap_or(0.0) + OWN_SHAPE;
-    Ok((nats >= WORTH_A_SEARCH && !is_fast && !slow_makes_it).then_some(orbit))
+    let stands = nats >= WORTH_A_SEARCH && !is_fast && !beside.slow_makes(orbit.as_ref(), nats);
+    Ok(stands.then_some(orbit))
 }
 
 /// The six coefficients of candidate `k` of those fitted in `set`, a [`free_orbit`] with none but such before it, and
@@ -305,12 +305,18 @@ struct Likely {
 struct Beside<'a> {
     evidence: &'a dyn Evidence,
     folds: &'a Folds,
+    surroundings: &'a Surroundings<'a>,
     not_turn: Vec<&'a dyn Candidate>,
     turn: Vec<&'a dyn Candidate>,
     slow: Option<f64>,
 }
 
 impl Beside<'_> {
+    /// Whether it is an orbit that nature does not have, and a slow error makes it as well as it makes anything.
+    fn slow_makes(&self, orbit: &dyn Candidate, nats: f64) -> bool {
+        is_too_fast(orbit, self.surroundings) && nats < self.slow.unwrap_or(0.0) + OWN_SHAPE
+    }
+
     /// `orbit` after fits about itself; `None` where it is not worth a search, or others explain as much.
     fn at_its_best(&self, mut orbit: Arc<dyn Candidate>) -> Result<Option<Likely>, CloseError> {
         let mut nats = 0.0;
@@ -341,6 +347,9 @@ impl Beside<'_> {
                 if nats < best - OWN_SHAPE && more < WORTH_A_SEARCH {
                     return Ok(None);
                 }
+            }
+            if self.slow_makes(orbit.as_ref(), nats) {
+                break;
             }
             let Some(estimate) = fitted.fits.estimate(&with) else {
                 break;
