@@ -56,6 +56,7 @@ mod run;
 pub(crate) mod search;
 mod seen_directions;
 mod settling;
+pub(crate) mod slow_price;
 mod steadied;
 pub(crate) mod weights;
 mod windows;

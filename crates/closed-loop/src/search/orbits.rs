@@ -18,7 +18,9 @@ use core::f64::consts::TAU;
 use std::sync::Arc;
 
 use block_regression::{Estimate, Folds};
-use effects::{Candidate, Surroundings, free_orbit, nearest_circles, orbit_could_show};
+use effects::{
+    Candidate, SHORTEST_ORBIT_S, Surroundings, free_orbit, nearest_circles, orbit_could_show,
+};
 use focal_plane::{ARCSEC_PER_RAD, AttitudeSource, SPEED_OF_LIGHT_M_S};
 use nalgebra::{Matrix6, SMatrix, SVector, Vector3, Vector6};
 use telemetry::report::ConsideredEffect;
@@ -36,8 +38,6 @@ pub(crate) mod images;
 const ABERRATION: &str = "velocity_aberration";
 /// Cycles in the span of the periods that are tried: nearly constant, and by quarters to where there are lines.
 const CYCLES: [f64; 8] = [0.05, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 1.75];
-/// Beside the surface of solid osmium an orbit takes sqrt(3 pi / G rho) = 42 minutes, s: a faster line is none.
-const SHORTEST_S: f64 = 2500.0;
 /// What is less than two turns in the span may be told from nothing else: the bound for that, s.
 const SHORTEST_TURN_S: f64 = 300.0;
 const FEW_TURNS: f64 = 2.0;
@@ -225,7 +225,7 @@ pub(crate) fn propose(
     let span_s = surroundings.span_s;
     let lines = turn.iter().flat_map(|c| c.nonlinear());
     let lines = lines.filter(|n| n.unit == "Hz").map(|n| n.value.recip());
-    let lines = lines.filter(|p| *p > SHORTEST_S);
+    let lines = lines.filter(|p| *p > SHORTEST_ORBIT_S);
     let periods: Vec<f64> = usual_periods(surroundings).chain(lines).collect();
     let free: Vec<Box<dyn Candidate>> = periods.iter().map(|&p| free_orbit(p, span_s)).collect();
     let mut all: Vec<&dyn Candidate> = free.iter().map(AsRef::as_ref).collect();
@@ -269,7 +269,7 @@ pub(crate) fn propose(
         return Ok(None);
     };
     // a fit may end at more turns than it was tried at
-    let fastest_s = SHORTEST_S.min(surroundings.length_s() / FEW_TURNS);
+    let fastest_s = SHORTEST_ORBIT_S.min(surroundings.length_s() / FEW_TURNS);
     let period_s = period_s(orbit.as_ref(), surroundings).unwrap_or(f64::INFINITY);
     let is_fast = period_s < fastest_s;
     let stands = nats >= WORTH_A_SEARCH && !is_fast && !beside.slow_makes(orbit.as_ref(), nats);
@@ -378,7 +378,7 @@ pub(crate) fn has_no_speed(orbit: &dyn Candidate, estimate: &Estimate, first: us
 
 /// Whether it is an orbit that turns faster than nature has any.
 pub(crate) fn is_too_fast(orbit: &dyn Candidate, surroundings: &Surroundings<'_>) -> bool {
-    period_s(orbit, surroundings).is_some_and(|period_s| period_s < SHORTEST_S)
+    period_s(orbit, surroundings).is_some_and(|period_s| period_s < SHORTEST_ORBIT_S)
 }
 
 /// The period of an orbit as it stands, at whatever speed.

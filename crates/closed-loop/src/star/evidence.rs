@@ -30,6 +30,7 @@ use crate::star::layout::Filled;
 use crate::star::moments::{Keep, MOST_BINS, MOST_RESTLESS_BINS, StarMoments};
 use crate::star::nuisance::StarNuisance;
 use crate::star::reference_noise;
+use crate::star::slow_price::SlowPrice;
 use crate::star::weights;
 
 /// Rows of a long run, whose products take long and much room.
@@ -57,8 +58,10 @@ pub(crate) struct StarEvidence<'a> {
     pub(crate) noise: Option<CommonNoise>,
     /// Weight of each row.
     pub(crate) weight: Arc<Vec<f64>>,
-    /// Where the reference has white noise: [`reference_noise::precision`].
+    /// Where the reference has white noise: [`reference_noise::White`].
     pub(crate) drawn: Option<[f64; 3]>,
+    /// What a slow error of the reference pays.
+    pub(crate) slow_price: SlowPrice,
     /// What is in every fit, described but not named: nuisance without a prior.
     pub(crate) kept: Vec<Arc<dyn Candidate>>,
 }
@@ -73,13 +76,13 @@ impl<'a> StarEvidence<'a> {
     ) -> Self {
         let temporal = situation.model.noise.temporal_arcsec.filter(|s| *s > 0.0);
         // where windows are sent, centroids are formed anew, with another noise
-        let (weight, drawn) = if situation.windows.is_some() {
+        let (weight, white) = if situation.windows.is_some() {
             (vec![1.0; data.t_s.len()], None)
         } else {
             let changes = changes::of(data);
             let weight = weights::of(data, &changes);
-            let drawn = reference_noise::precision(data, &changes, &weight);
-            (weight, drawn)
+            let white = reference_noise::white(data, &changes, &weight);
+            (weight, white)
         };
         Self {
             data,
@@ -92,7 +95,8 @@ impl<'a> StarEvidence<'a> {
             sigma_guess_arcsec: temporal.map_or(1.0, |s| s / std::f64::consts::SQRT_2),
             noise: None,
             weight: Arc::new(weight),
-            drawn,
+            drawn: white.and_then(|white| white.precision),
+            slow_price: SlowPrice::of(situation, white.as_ref()),
             kept: Vec::new(),
         }
     }

@@ -25,13 +25,18 @@ const BEYOND_CHANCE: f64 = 4.0;
 /// An axis on which the reference has no noise, in units of the stars' information.
 const NONE: f64 = 1e6;
 
-/// P of the module's header per axis, for rows that change by `changes` ([`crate::star::changes`]) and count by
-/// their `weight`; `None` where the reference is as good as exact, or there is none.
-pub(crate) fn precision(
-    data: &StarData,
-    changes: &[Vec<f64>; 2],
-    weight: &[f64],
-) -> Option<[f64; 3]> {
+/// What changes from frame to frame tells of the reference.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct White {
+    /// P of the module's header per axis; `None` where the reference is as good as exact.
+    pub(crate) precision: Option<[f64; 3]>,
+    /// Variance of the white part of its error about each axis, and how well that is known, arcsec^2.
+    pub(crate) variance: [[f64; 2]; 3],
+}
+
+/// Of rows that change by `changes` ([`crate::star::changes`]) and count by their `weight`; `None` where there is no
+/// reference, or nothing is known of it.
+pub(crate) fn white(data: &StarData, changes: &[Vec<f64>; 2], weight: &[f64]) -> Option<White> {
     if data.free_attitude || data.frames_are_unrelated() {
         return None;
     }
@@ -42,16 +47,23 @@ pub(crate) fn precision(
         return None;
     }
     // a mean of n squares of neighbouring differences, of which each has a half of the next
-    let chance = BEYOND_CHANCE * (3.0 / n).sqrt();
-    let mut out = [0.0; 3];
+    let error = (3.0 / n).sqrt();
+    let mut precision = [0.0; 3];
+    let mut variance = [[0.0; 2]; 3];
     let mut matters = false;
-    for (axis, out) in out.iter_mut().enumerate() {
+    for axis in 0..3 {
         let information = known.iter().map(|t| t.variance[axis].recip()).sum::<f64>() / n;
-        let share = turns.reference[axis] / turns.noise * information;
-        matters |= share > LEAST.max(chance);
-        *out = information * f64::min(share.recip(), NONE);
+        let own = turns.reference[axis];
+        let share = own / turns.noise * information;
+        matters |= share > LEAST.max(BEYOND_CHANCE * error);
+        precision[axis] = information * f64::min(share.recip(), NONE);
+        // changes have twice the variance
+        variance[axis] = [0.5 * own, 0.5 * (own + turns.noise / information) * error];
     }
-    matters.then_some(out)
+    Some(White {
+        precision: matters.then_some(precision),
+        variance,
+    })
 }
 
 #[cfg(test)]
@@ -71,7 +83,7 @@ mod tests {
 
     /// Information of six stars on a rotation per axis, and the precision that is found where the reference
     /// has white noise `white` per axis, arcsec, and a slow error of 30 arcsec.
-    fn found(white: [f64; 3]) -> ([f64; 3], Option<[f64; 3]>) {
+    fn found(white: [f64; 3]) -> ([f64; 3], White) {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(3);
         let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
         let camera = Camera::from_fov_deg([1024, 1024], [20.0, 20.0]).unwrap();
@@ -98,7 +110,10 @@ mod tests {
         let turns = Turns::of(&data, residual, &weight);
         let first = turns.frames[0].as_ref().unwrap();
         let information = std::array::from_fn(|a| first.variance[a].recip());
-        (information, precision(&data, &changes::of(&data), &weight))
+        (
+            information,
+            super::white(&data, &changes::of(&data), &weight).unwrap(),
+        )
     }
 
     /// Six stars know X and Y to 4/sqrt(6) = 1.6 arcsec, Z ten times worse; the reference has 3 and 0.8 arcsec
@@ -109,22 +124,35 @@ mod tests {
     fn what_changes_from_frame_to_frame_is_the_white_part() {
         let white = [3.0, 0.8, 40.0];
         let (_, found) = found(white);
-        let found = found.unwrap();
+        let precision = found.precision.unwrap();
         for (axis, sigma) in [(0, 0.06), (1, 0.24), (2, 0.06)] {
             let truth = (NOISE / white[axis]).powi(2);
-            let off = (found[axis] / truth).ln();
-            assert!(off.abs() < 5.0 * sigma, "{axis}: {} {truth}", found[axis]);
+            let off = (precision[axis] / truth).ln();
+            assert!(
+                off.abs() < 5.0 * sigma,
+                "{axis}: {} {truth}",
+                precision[axis]
+            );
+            let [variance, error] = found.variance[axis];
+            assert!(
+                (variance - white[axis].powi(2)).abs() < 4.0 * error,
+                "{axis}: {variance} {error} {white:?}"
+            );
+            assert!(
+                (error / variance / sigma).ln().abs() < 0.5,
+                "{axis}: {error}"
+            );
         }
     }
 
     /// A slow error of 30 arcsec is not white, and a reference of a tenth of the stars' noise is as good as exact.
     #[test]
     fn a_slow_error_is_none_and_a_good_reference_is_exact() {
-        assert_eq!(found([0.0; 3]).1, None);
-        assert_eq!(found([0.1; 3]).1, None);
+        assert_eq!(found([0.0; 3]).1.precision, None);
+        assert_eq!(found([0.1; 3]).1.precision, None);
         // about an axis without noise the rotation is held
         let (information, found) = found([3.0, 0.0, 0.0]);
-        let found = found.unwrap();
+        let found = found.precision.unwrap();
         assert!(found[1] > 5.0 * information[1] && found[2] > 5.0 * information[2]);
     }
 }

@@ -40,7 +40,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 use crate::declared::OnCentroids;
 use crate::error::CloseError;
 use crate::evidence::Evidence;
-use crate::search::selection::{FAMILY_ALPHA, SLOW_PRICE, Selection, WIDENING, costs, price};
+use crate::search::selection::{FAMILY_ALPHA, Selection, WIDENING, costs, price};
 use crate::search::{Choice, Fitted, Found, borrowed, fit, fit_grams, polish, search, without};
 use crate::star::evidence::StarEvidence;
 use crate::star::landing::Elsewhere;
@@ -292,6 +292,7 @@ impl Instead {
             folds,
             precision: white.precision(),
             variance: found.fitted.variance_beside(chosen).unwrap_or(1.0),
+            slow_price: white.slow_price,
             groups: &groups,
             cost: chosen.iter().map(|&g| cost[g]).collect(),
             all: None,
@@ -304,12 +305,11 @@ impl Instead {
         let scored = out.par_iter().map(|out| {
             let rest = trial.score(&without(&all, out), noise);
             let rest = rest.ok_or(CloseError::Singular)?;
-            let slow_price = if out.is_empty() {
-                f64::INFINITY
+            Ok(if out.is_empty() {
+                trial.worth_of_white(&rest)
             } else {
-                SLOW_PRICE
-            };
-            Ok(trial.worth(&rest, slow_price))
+                trial.worth(&rest)
+            })
         });
         let scored: Vec<f64> = scored.collect::<Result<_, CloseError>>()?;
         let worth = scored[0];
@@ -341,6 +341,7 @@ pub(crate) fn start(
         folds,
         precision: white.precision(),
         variance: white.variance_guess(),
+        slow_price: white.slow_price,
         groups: &[],
         cost: Vec::new(),
         all: None,
@@ -427,6 +428,7 @@ fn coloured<'a>(
             folds,
             precision: white.precision(),
             variance: plain.variance_beside(&chosen).unwrap_or(1.0),
+            slow_price: white.slow_price,
             groups: &plain.groups,
             cost: costs(&plain.groups, may),
             all: Some(&filtered.fits),
@@ -483,7 +485,7 @@ fn coloured<'a>(
             for (&g, judgement) in chosen.iter().zip(stands) {
                 judged[g] = judgement;
             }
-            let worth = trial.worth(&base, SLOW_PRICE);
+            let worth = trial.worth(&base);
             return Ok(Coloured {
                 wander: Wander::of(base.rotations, noise),
                 begun: Begun {

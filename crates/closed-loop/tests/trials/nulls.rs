@@ -228,3 +228,18 @@ fn a_change_of_stars_is_no_step() {
     let still = Case::new(Path::Still, 3).with("step_misalignment", step);
     assert_eq!(named(&without_stars(&still)), ["step_misalignment"]);
 }
+
+/// Five minutes of a reference that wanders by 0.5 arcsec over 200 s, and tells how much it errs: five draws that were a step
+/// of 23 to 29 nats or an orbit of 827 or 4652 s as long as a slow error paid for its size, and fast orbits for no more than
+/// any.
+#[test]
+fn what_a_reference_tells_of_its_errors_counts() {
+    for seed in [4, 15, 16, 23, 31] {
+        let mut case = Case::new(Path::Slews, 7600 + seed);
+        case.duration_s = 300.0;
+        let lines = format!("{WANDER}\nwander_tau_s = [200.0, 200.0, 200.0]");
+        let report = case.reference(&lines).close().report;
+        let mut others = report.effects.iter().map(|e| e.id.as_str());
+        assert!(others.all(|id| id == "reference_error"), "seed {seed}");
+    }
+}

@@ -19,6 +19,7 @@ use crate::declared::OnCentroids;
 use crate::star::data::{Inputs, Star, StarData};
 use crate::star::evidence::StarEvidence;
 use crate::star::nuisance::StarNuisance;
+use crate::star::slow_price::SlowPrice;
 
 /// Far beyond any catalogue: what tells a repeated star from its original.
 const COPY: i64 = 1_000_000_007;
@@ -142,6 +143,7 @@ impl<'a> Sky<'a> {
             noise: None,
             weight: weight.into(),
             drawn: self.drawn,
+            slow_price: SlowPrice::default(),
             kept: Vec::new(),
         };
         // nothing is predicted: only the sum over all is asked for

@@ -22,7 +22,7 @@ use super::{Wander, first_sight};
 use crate::declared::OnCentroids;
 use crate::error::CloseError;
 use crate::evidence::Evidence;
-use crate::search::selection::{SLOW_PRICE, columns_of, costs};
+use crate::search::selection::{columns_of, costs};
 use crate::search::{Choice, Fitted, Found, borrowed, fit_grams, polish, without};
 use crate::star::evidence::StarEvidence;
 use crate::star::landing::Elsewhere;
@@ -199,6 +199,7 @@ impl<'a> Alone<'a> {
                 folds,
                 precision: white.precision(),
                 variance: fitted.variance_beside(chosen).unwrap_or(1.0),
+                slow_price: white.slow_price,
                 groups: &fitted.groups,
                 cost,
                 all: None,
@@ -266,15 +267,16 @@ impl<'a> Alone<'a> {
         let rest = without(self.chosen, out);
         if !rest.is_empty() {
             let rest = self.trial.score(&rest, start)?;
-            return Some(self.trial.worth(&rest, SLOW_PRICE));
+            return Some(self.trial.worth(&rest));
         }
         let columns = self.trial.columns(&[]);
         let (noise, rotations, loglik) = self.trial.climb(&columns, start)?;
-        Some(loglik - paid_by_slow(&rotations.slow_gains(&noise), SLOW_PRICE))
+        let price = self.trial.slow_price.of_axes(&noise);
+        Some(loglik - paid_by_slow(&rotations.slow_gains(&noise), price))
     }
 
     fn is_by_far(&self, whole: &Scored, instead: Option<f64>) -> bool {
-        let white = self.trial.worth(whole, f64::INFINITY);
+        let white = self.trial.worth_of_white(whole);
         instead.is_some_and(|worth| white > worth + BY_FAR)
     }
 }

@@ -138,6 +138,7 @@ fn noise_of(
         folds,
         precision: white.precision(),
         variance: white.variance_guess(),
+        slow_price: white.slow_price,
         groups: &groups,
         cost: vec![1.0; groups.len()],
         all: None,

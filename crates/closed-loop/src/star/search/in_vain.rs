@@ -16,7 +16,7 @@ use super::alone::Begun;
 use super::trial::{Trial, taken_out_in_turn};
 use crate::error::CloseError;
 use crate::evidence::Evidence;
-use crate::search::selection::{SLOW_PRICE, costs};
+use crate::search::selection::costs;
 use crate::search::without;
 use crate::star::evidence::StarEvidence;
 
@@ -56,6 +56,7 @@ pub(crate) fn in_vain(
         folds,
         precision: white.precision(),
         variance: own.plain.variance_beside(&every).unwrap_or(1.0),
+        slow_price: white.slow_price,
         groups,
         cost: places.map(|g| cost[g]).collect(),
         all: None,
@@ -64,7 +65,7 @@ pub(crate) fn in_vain(
     let worth = |set: &[usize]| {
         let scored = trial.score(set, &wander.noise);
         let scored = scored.ok_or(CloseError::Singular)?;
-        Ok(trial.worth(&scored, SLOW_PRICE))
+        Ok(trial.worth(&scored))
     };
 
     let turns = known.iter().copied();

@@ -17,6 +17,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 use crate::search::group::Group;
 use crate::search::selection::{Judgement, WIDENING, columns_of};
 use crate::star::moments::StarMoments;
+use crate::star::slow_price::SlowPrice;
 
 /// Rounds of generalised least squares and noise fit.
 const ALTERNATIONS: usize = 2;
@@ -54,6 +55,8 @@ pub(super) struct Trial<'a> {
     pub(super) precision: DMatrix<f64>,
     /// Of a scalar of white evidence.
     pub(super) variance: f64,
+    /// What a slow error pays.
+    pub(super) slow_price: SlowPrice,
     pub(super) groups: &'a [Group],
     /// What the p-value of each group is multiplied by.
     pub(super) cost: Vec<f64>,
@@ -193,8 +196,17 @@ impl Trial<'_> {
 
     /// Log-likelihood less what the freedom of a hypothesis buys where nothing acts:
     /// for amplitudes the evidence under the spread that suits them best, for a slow
-    /// error of an axis `slow_price`, or its absence where that costs less.
-    pub(super) fn worth(&self, scored: &Scored, slow_price: f64) -> f64 {
+    /// error of an axis its price, or its absence where that costs less.
+    pub(super) fn worth(&self, scored: &Scored) -> f64 {
+        self.worth_at(scored, self.slow_price.of_axes(&scored.noise))
+    }
+
+    /// The same without a slow error.
+    pub(super) fn worth_of_white(&self, scored: &Scored) -> f64 {
+        self.worth_at(scored, [f64::INFINITY; 3])
+    }
+
+    fn worth_at(&self, scored: &Scored, slow_price: [f64; 3]) -> f64 {
         let slow = scored.rotations.slow_gains(&scored.noise);
         let without = paid_by_slow(&slow, slow_price);
         let effects: f64 = scored
@@ -247,11 +259,11 @@ pub(super) fn taken_out_in_turn(some: Vec<usize>) -> Vec<Vec<usize>> {
     out
 }
 
-/// What slow errors pay of what they gain, `price` each, or all of it where that costs less: none across the
+/// What slow errors pay of what they gain, each its `price`, or all of it where that costs less: none across the
 /// boresight, one that is the same about X and Y, or one about each that has one; and that about Z.
-pub(super) fn paid_by_slow(slow: &SlowGains, price: f64) -> f64 {
-    let paid = slow.axes.map(|gain| gain.min(price));
-    let alike = slow.across - slow.alike + price;
+pub(super) fn paid_by_slow(slow: &SlowGains, price: [f64; 3]) -> f64 {
+    let paid: [f64; 3] = std::array::from_fn(|axis| slow.axes[axis].min(price[axis]));
+    let alike = slow.across - slow.alike + price[0].max(price[1]);
     let apart = paid[0] + paid[1] + APART;
     slow.across.min(alike.max(0.0)).min(apart) + paid[2]
 }
@@ -271,7 +283,7 @@ mod tests {
                 across,
                 alike,
             };
-            paid_by_slow(&gains, SLOW_PRICE)
+            paid_by_slow(&gains, [SLOW_PRICE; 3])
         };
         assert!((of([0.0, 18.6, 0.0], 18.6, 15.0) - 4.0 - APART).abs() < 1e-12);
         assert!((of([20.0, 25.0, 0.0], 45.0, 45.0) - 4.0).abs() < 1e-12);
