@@ -179,7 +179,7 @@ pub struct Fits {
     inner: Vec<DMatrix<f64>>,
     /// The same of each part by source.
     inner_by_source: Vec<DMatrix<f64>>,
-    /// That of the nuisance columns, all data.
+    /// Gram of the nuisance columns, all data.
     nuisance_gram: DMatrix<f64>,
     /// Squared length of each candidate column before the nuisance is out.
     raw: Vec<f64>,

@@ -32,11 +32,20 @@ impl Foreknown {
     /// Logarithm of the weight of a noise, nats; 0 where it is as expected.
     pub fn log_weight(&self, noise: &Coloured) -> f64 {
         let off = [noise.slow / self.slow, noise.tau_s / self.tau_s];
-        let each = off.iter().zip(Self::SPREAD).map(|(off, spread)| {
-            let d = off.max(f64::MIN_POSITIVE).ln() / spread;
-            (d * d / Self::FREEDOM).ln_1p()
-        });
+        let each = off.into_iter().zip(Self::SPREAD);
+        let each = each.map(|(off, spread)| Self::surprise(off, spread));
         -0.5 * (Self::FREEDOM + 1.0) * each.sum::<f64>()
+    }
+
+    /// What a slow part pays that is so many times as large as is known of it, nats.
+    pub fn paid_by_size(times: f64) -> f64 {
+        0.5 * (Self::FREEDOM + 1.0) * Self::surprise(times, Self::SPREAD[0])
+    }
+
+    /// ln(1 + d^2/nu) of what is `off` by so many times.
+    fn surprise(off: f64, spread: f64) -> f64 {
+        let d = off.max(f64::MIN_POSITIVE).ln() / spread;
+        (d * d / Self::FREEDOM).ln_1p()
     }
 }
 

@@ -11,9 +11,9 @@
 //! for filters are cautious.
 //!
 //! Source: the price of a parameter that is known to a share of its range (Schwarz 1978); Bayes' theorem; Student's t as
-//! for what a model declares ([`coloured_noise::Foreknown`]).
+//! for what a model declares ([`Foreknown`]).
 
-use coloured_noise::CommonNoise;
+use coloured_noise::{CommonNoise, Foreknown};
 
 use crate::search::selection::SLOW_PRICE;
 use crate::situation::Situation;
@@ -21,9 +21,6 @@ use crate::star::reference_noise::White;
 
 /// What a correlation time pays that is known to a factor of two, nats.
 const OF_TIME: f64 = 1.5;
-/// How well sizes are told, in their logarithm, and degrees of freedom of that.
-const SPREAD: f64 = 0.25;
-const FREEDOM: f64 = 4.0;
 
 /// Errors about an axis that the reference tells of.
 #[derive(Clone, Copy, Debug, Default)]
@@ -52,8 +49,7 @@ impl Told {
         if self.sigma <= 0.0 {
             return SLOW_PRICE;
         }
-        let off = (slow / self.sigma).max(1.0).ln() / SPREAD;
-        let beyond = 0.5 * (FREEDOM + 1.0) * (off * off / FREEDOM).ln_1p();
+        let beyond = Foreknown::paid_by_size((slow / self.sigma).max(1.0));
         let told = (OF_TIME + beyond).min(SLOW_PRICE);
         -(self.slow * (-told).exp() + (1.0 - self.slow) * (-SLOW_PRICE).exp()).ln()
     }

@@ -17,7 +17,7 @@ use block_regression::Folds;
 use coloured_noise::CommonNoise;
 use effects::Candidate;
 
-use super::trial::{Scored, Trial, paid_by_slow};
+use super::trial::{Scored, Trial};
 use super::{Wander, first_sight};
 use crate::declared::OnCentroids;
 use crate::error::CloseError;
@@ -271,8 +271,7 @@ impl<'a> Alone<'a> {
         }
         let columns = self.trial.columns(&[]);
         let (noise, rotations, loglik) = self.trial.climb(&columns, start)?;
-        let price = self.trial.slow_price.of_axes(&noise);
-        Some(loglik - paid_by_slow(&rotations.slow_gains(&noise), price))
+        Some(loglik - self.trial.paid_by_slow(&rotations, &noise))
     }
 
     fn is_by_far(&self, whole: &Scored, instead: Option<f64>) -> bool {

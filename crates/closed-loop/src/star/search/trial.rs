@@ -198,17 +198,23 @@ impl Trial<'_> {
     /// for amplitudes the evidence under the spread that suits them best, for a slow
     /// error of an axis its price, or its absence where that costs less.
     pub(super) fn worth(&self, scored: &Scored) -> f64 {
-        self.worth_at(scored, self.slow_price.of_axes(&scored.noise))
+        self.worth_less(scored, self.paid_by_slow(&scored.rotations, &scored.noise))
     }
 
     /// The same without a slow error.
     pub(super) fn worth_of_white(&self, scored: &Scored) -> f64 {
-        self.worth_at(scored, [f64::INFINITY; 3])
+        let slow = scored.rotations.slow_gains(&scored.noise);
+        self.worth_less(scored, paid_by_slow(&slow, [f64::INFINITY; 3]))
     }
 
-    fn worth_at(&self, scored: &Scored, slow_price: [f64; 3]) -> f64 {
-        let slow = scored.rotations.slow_gains(&scored.noise);
-        let without = paid_by_slow(&slow, slow_price);
+    /// What slow errors of this `noise` pay, nats.
+    pub(super) fn paid_by_slow(&self, rotations: &Rotations, noise: &CommonNoise) -> f64 {
+        let price = self.slow_price.of_axes(noise);
+        paid_by_slow(&rotations.slow_gains(noise), price)
+    }
+
+    /// Log-likelihood less what the effects pay and so much.
+    fn worth_less(&self, scored: &Scored, paid_by_slow: f64) -> f64 {
         let effects: f64 = scored
             .parts
             .iter()
@@ -221,7 +227,7 @@ impl Trial<'_> {
                 part.cost.ln() + 0.5 * k * (1.0 + (square / k.max(1.0)).max(1.0).ln())
             })
             .sum();
-        scored.loglik - without - effects
+        scored.loglik - paid_by_slow - effects
     }
 
     /// What the last of the candidates of `with` adds to `without`.
@@ -261,7 +267,7 @@ pub(super) fn taken_out_in_turn(some: Vec<usize>) -> Vec<Vec<usize>> {
 
 /// What slow errors pay of what they gain, each its `price`, or all of it where that costs less: none across the
 /// boresight, one that is the same about X and Y, or one about each that has one; and that about Z.
-pub(super) fn paid_by_slow(slow: &SlowGains, price: [f64; 3]) -> f64 {
+fn paid_by_slow(slow: &SlowGains, price: [f64; 3]) -> f64 {
     let paid: [f64; 3] = std::array::from_fn(|axis| slow.axes[axis].min(price[axis]));
     let alike = slow.across - slow.alike + price[0].max(price[1]);
     let apart = paid[0] + paid[1] + APART;
