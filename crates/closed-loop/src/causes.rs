@@ -60,6 +60,7 @@ mod round;
 mod so_far;
 mod stand_ins;
 pub(crate) mod star_constants;
+pub(crate) mod terms;
 mod undescribed;
 mod wanders;
 

@@ -13,8 +13,8 @@
 
 use focal_plane::Series;
 
-use crate::causes::description::{MOST_STARS, own_slots};
 use crate::causes::places::Left;
+use crate::causes::terms::{MOST_STARS, own_slots};
 use crate::search::empirical::{Empirical, Variable};
 use crate::star::data::StarData;
 

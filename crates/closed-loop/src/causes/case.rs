@@ -6,13 +6,14 @@ use std::cell::OnceCell;
 
 use block_regression::Estimate;
 
-use crate::causes::description::{self, Described, Part};
+use crate::causes::description::{Described, Part};
 use crate::causes::invariance::{Change, changing};
 use crate::causes::one_star::is_one_star;
 use crate::causes::round::{Round, best_beside};
 use crate::causes::so_far::SoFar;
 use crate::causes::stand_ins::{Known, stand_ins};
 use crate::causes::star_constants::Constants;
+use crate::causes::terms;
 use crate::error::CloseError;
 use crate::search::empirical::Empirical;
 use crate::search::orbits::has_no_speed;
@@ -43,12 +44,10 @@ impl<'r, 'a> Case<'r, 'a> {
         // what an orbit that is too fast is held against
         let turns = so_far.found_terms.iter().any(Empirical::turns_to_and_fro);
         if !turns && (0..found.selection.chosen.len()).any(|k| round.is_too_fast(k)) {
-            so_far.found_terms.extend(description::turning(level.data));
+            so_far.found_terms.extend(terms::turning(level.data));
         }
         let usual = (quest.terms)(round.searched.wander.is_some());
-        let sought = inside.map_or_else(Vec::new, |inside| {
-            description::sought(level, inside, &usual)
-        });
+        let sought = inside.map_or_else(Vec::new, |inside| terms::sought(level, inside, &usual));
         let all = so_far.with_found(usual, &sought);
         Ok(Self {
             round,

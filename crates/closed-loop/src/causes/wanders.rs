@@ -13,9 +13,10 @@
 //!
 //! Source: Schwarz 1978 for the price of a parameter.
 
-use crate::causes::description::{Described, Part, turning};
+use crate::causes::description::{Described, Part};
 use crate::causes::places::stretch;
 use crate::causes::stand_ins::{BY_FAR, describe_with};
+use crate::causes::terms::turning;
 use crate::search::empirical::{Empirical, range};
 use crate::search::selection::columns_of;
 use crate::star::data::StarData;

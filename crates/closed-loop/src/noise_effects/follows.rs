@@ -82,16 +82,49 @@ fn of_slots(data: &StarData, [all, fast]: [&Table; 2]) -> Vec<Judged> {
     each.collect()
 }
 
-/// Looks at the squares of `residual`, which the stars leave at `level` beside `claimed`.
-pub(crate) fn noise_follows(
+/// What one variable tells: as stars move, and of what differs between them by where they are.
+fn of_variable(
+    data: &StarData,
+    [all, fast]: [&Table; 2],
+    (variable, range): &(Variable, [f64; 2]),
+) -> Vec<Judged> {
+    let rows = data.rows(0..data.t_s.len(), None, None);
+    let scale = Scale::new(*range);
+    let column = |row: &Row| -> [f64; 2] {
+        if let Variable::Phase(axis) = variable {
+            let at = data.landed()[*axis][row.at];
+            let (s, c) = data.camera.phase_rad(at).sin_cos();
+            return [s, c];
+        }
+        let z = scale.of(variable.value(&rows, row.at));
+        [z, 1.5 * z * z - 0.5]
+    };
+    let columns = [all, fast].map(|t| Columns::of(t, column));
+    let within = |k: usize| both(all.within(&columns[0], k), fast.within(&columns[1], k));
+    let mut judged = vec![within(1), within(2)];
+    if matches!(variable, Variable::Position(_) | Variable::Colour) {
+        let between = |k: usize| both(all.between(&columns[0], k), fast.between(&columns[1], k));
+        let among = [between(0), between(1)];
+        let said = |k: usize| together(judged[k]?, among[k]?);
+        let said = [said(0), said(1)];
+        judged.extend(said);
+        judged.extend(among);
+    }
+    if matches!(variable, Variable::Time) {
+        judged.push(burst([all, fast], |row| data.t_s[row.at], *range));
+    }
+    judged.into_iter().flatten().collect()
+}
+
+/// The squares of `residual`, and of what of it changes from frame to frame, over what is declared and `claimed`; `None`:
+/// there are too few.
+fn tables(
     situation: &Situation<'_>,
-    level: &StarEvidence<'_>,
+    data: &StarData,
     residual: &[Vec<f64>],
     folds: &Folds,
     claimed: &NoiseEffects,
-    variables: &[(Variable, [f64; 2])],
-) -> Result<NoiseFollows, CloseError> {
-    let data = level.data;
+) -> Result<Option<[Table; 2]>, CloseError> {
     let mut declared = declared_variance(situation, data)?;
     let rate = squared_rates(data);
     // a rate adds to the level that there is, whatever is declared
@@ -105,94 +138,88 @@ pub(crate) fn noise_follows(
     }
     let quick = Quick::of(data, residual, [&declared, &rate]);
     let [its_declared, its_rate] = &quick.squares;
-    let of = [
-        (residual, &declared, &rate),
-        (&quick.residual, its_declared, its_rate),
-    ];
-    let tables: Vec<Table> = of
-        .into_par_iter()
-        .filter_map(|(residual, declared, rate)| {
-            Table::new(&Source {
-                data,
-                residual,
-                declared,
-                rate,
-                folds,
-            })
+    let table = |residual, declared, rate| {
+        Table::new(&Source {
+            data,
+            residual,
+            declared,
+            rate,
+            folds,
         })
-        .collect();
-    let [all, fast] = tables.as_slice() else {
+    };
+    let (all, fast) = rayon::join(
+        || table(residual, &declared, &rate),
+        || table(&quick.residual, its_declared, its_rate),
+    );
+    Ok(all.zip(fast).map(|(all, fast)| [all, fast]))
+}
+
+/// Looks at the squares of `residual`, which the stars leave at `level` beside `claimed`.
+pub(crate) fn noise_follows(
+    situation: &Situation<'_>,
+    level: &StarEvidence<'_>,
+    residual: &[Vec<f64>],
+    folds: &Folds,
+    claimed: &NoiseEffects,
+    variables: &[(Variable, [f64; 2])],
+) -> Result<NoiseFollows, CloseError> {
+    let data = level.data;
+    let Some(tables) = tables(situation, data, residual, folds, claimed)? else {
         return Ok(NoiseFollows::default());
     };
-    let rows = data.rows(0..data.t_s.len(), None, None);
-    let each = |(variable, range): &(Variable, [f64; 2])| -> Vec<Judged> {
-        let scale = Scale::new(*range);
-        let column = |row: &Row| -> [f64; 2] {
-            if let Variable::Phase(axis) = variable {
-                let at = data.landed()[*axis][row.at];
-                let (s, c) = data.camera.phase_rad(at).sin_cos();
-                return [s, c];
-            }
-            let z = scale.of(variable.value(&rows, row.at));
-            [z, 1.5 * z * z - 0.5]
-        };
-        let columns = [all, fast].map(|t| Columns::of(t, column));
-        let within = |k: usize| both(all.within(&columns[0], k), fast.within(&columns[1], k));
-        let mut judged = vec![within(1), within(2)];
-        if matches!(variable, Variable::Position(_) | Variable::Colour) {
-            let between =
-                |k: usize| both(all.between(&columns[0], k), fast.between(&columns[1], k));
-            let among = [between(0), between(1)];
-            let said = |k: usize| together(judged[k]?, among[k]?);
-            let said = [said(0), said(1)];
-            judged.extend(said);
-            judged.extend(among);
-        }
-        if matches!(variable, Variable::Time) {
-            judged.push(burst([all, fast], |row| data.t_s[row.at], *range));
-        }
-        judged.into_iter().flatten().collect()
-    };
-    let judged: Vec<Vec<Judged>> = variables.par_iter().map(each).collect();
-    let names = variables.iter().map(|(variable, _)| variable.name());
-    let mut found: Vec<Dependence> = names
-        .zip(judged)
-        .flat_map(|(name, judged)| judged.into_iter().map(move |j| (name.clone(), j)))
-        .chain(both(all.odd_star(), fast.odd_star()).map(|j| ("star".to_owned(), j)))
-        .chain(
-            of_slots(data, [all, fast])
-                .into_iter()
-                .map(|j| ("slot".to_owned(), j)),
-        )
-        .map(|(variable, [p_value, share])| Dependence {
-            variable,
-            variance_explained: share,
-            p_value,
-        })
+    let tables = tables.each_ref();
+    let [all, fast] = tables;
+    let judged: Vec<Vec<Judged>> = variables
+        .par_iter()
+        .map(|variable| of_variable(data, tables, variable))
         .collect();
+    let of_variables = variables
+        .iter()
+        .zip(judged)
+        .flat_map(|((variable, _), judged)| {
+            let name = variable.name();
+            judged.into_iter().map(move |j| (name.clone(), j))
+        });
+    let of_stars = both(all.odd_star(), fast.odd_star()).map(|j| ("star".to_owned(), j));
+    let of_slots = of_slots(data, tables).into_iter();
+    let of_slots = of_slots.map(|j| ("slot".to_owned(), j));
+    let found = of_variables.chain(of_stars).chain(of_slots);
+    let found = found.map(|(variable, judged)| dependence(variable, judged));
+    // stars that differ all over
+    let differ = || both(all.scatter(), fast.scatter());
+    let found = certain(found.collect(), differ);
+    Ok(NoiseFollows(first_of_each(found, |d| &d.variable)))
+}
+
+fn dependence(variable: String, [p_value, share]: Judged) -> Dependence {
+    Dependence {
+        variable,
+        variance_explained: share,
+        p_value,
+    }
+}
+
+/// Of what was `found`, each paid for by how many were tried, what is certain, most so first; where nothing is and stars
+/// `differ`, what says by what they do.
+fn certain(mut found: Vec<Dependence>, differ: impl FnOnce() -> Option<Judged>) -> Vec<Dependence> {
     let tried = found.len();
     for d in &mut found {
         d.p_value = (d.p_value * tried as f64).min(1.0);
     }
     found.sort_by(|a, b| a.p_value.total_cmp(&b.p_value));
-    let certain = found.iter().take_while(|d| d.p_value < ALPHA).count();
-    // stars that differ all over: by what says most, if anything does
+    let below = |p: f64| found.iter().take_while(|d| d.p_value < p).count();
+    let certain = below(ALPHA);
+    let paid = |[p, share]: Judged| [p * (tried + 1) as f64, share];
     let differ = if certain == 0 {
-        both(all.scatter(), fast.scatter())
+        differ().map(paid)
     } else {
         None
     };
-    let differ = differ.filter(|[p, _]| p * ((tried + 1) as f64) < ALPHA);
-    found.truncate(match differ {
-        Some(_) => found.iter().take_while(|d| d.p_value < SAYS).count(),
-        None => certain,
-    });
-    if let Some([p, share]) = differ {
-        found.push(Dependence {
-            variable: "star".to_owned(),
-            variance_explained: share,
-            p_value: p * (tried + 1) as f64,
-        });
-    }
-    Ok(NoiseFollows(first_of_each(found, |d| &d.variable)))
+    let Some(differ) = differ.filter(|[p, _]| *p < ALPHA) else {
+        found.truncate(certain);
+        return found;
+    };
+    found.truncate(below(SAYS));
+    found.push(dependence("star".to_owned(), differ));
+    found
 }

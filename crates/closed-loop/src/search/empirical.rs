@@ -30,15 +30,17 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 use effects::{
-    AttitudeRows, Candidate, Coefficient, Effect, EffectError, LARGEST_WAVE_PX, PixelWave,
-    StarRows, Surroundings,
+    AttitudeRows, Candidate, Coefficient, Effect, EffectError, LARGEST_WAVE_PX, StarRows,
+    Surroundings,
 };
 use focal_plane::{Camera, PointsMut, Series, VectorsMut};
 
 use crate::search::LEADING;
+use fields::Columns;
 use variable::orders;
 pub(crate) use variable::{Scale, Variable, about_mean, flux_of, range};
 
+mod fields;
 mod variable;
 
 /// Id under which empirical terms are listed.
@@ -398,147 +400,49 @@ impl Candidate for Empirical {
     }
 
     fn star_columns(&self, camera: &Camera, rows: &StarRows<'_>, out: PointsMut<'_>) -> bool {
-        let n = rows.len();
-        let count = self.coefficients.len();
-        assert_eq!(out.x.len(), count * n, "one block a coefficient");
-        out.x.fill(0.0);
-        out.y.fill(0.0);
-        let per_arcsec = camera.arcsec_per_px().map(|s| 1.0 / s);
-        let half = camera.half_size_px();
+        let mut columns = Columns::new(self, camera, rows, out);
         let by = self.by.as_ref();
         let by = by.map(|(by, scale)| (by.values(rows), scale));
         let values = self.variable.values(rows);
-        let waves = match self.variable {
-            Variable::Phase(axis) => rows.pixel_waves(camera, axis),
-            Variable::PhaseProduct => rows.pixel_waves(camera, 0),
-            _ => Cow::default(),
+        let [waves, other_waves] = match self.variable {
+            Variable::Phase(axis) => [rows.pixel_waves(camera, axis), Cow::default()],
+            Variable::PhaseProduct => [0, 1].map(|axis| rows.pixel_waves(camera, axis)),
+            _ => Default::default(),
         };
-        let other_waves = match self.variable {
-            Variable::PhaseProduct => rows.pixel_waves(camera, 1),
-            _ => Cow::default(),
-        };
-        let in_pair = self.has_size();
-        for i in 0..n {
+        for i in 0..rows.len() {
             let times = by.as_ref().map_or(1.0, |(by, scale)| scale.of(by[i]));
-            let mut put = |k: usize, dx: f64, dy: f64| {
-                let k = if !in_pair || k < OF_A_PAIR {
-                    k
-                } else if (SIZE..BENT).contains(&k) {
-                    k - SIZE + OF_A_PAIR
-                } else {
-                    count
-                };
-                if k < count {
-                    out.x[k * n + i] = times * dx * per_arcsec[0];
-                    out.y[k * n + i] = times * dy * per_arcsec[1];
-                }
-            };
-            let (x, y) = (rows.x_px[i] / half[0], rows.y_px[i] / half[1]);
-            let at = [rows.x_px[i], rows.y_px[i]];
+            let row = columns.row(i, times);
             match &self.variable {
-                Variable::Position(_) => {
-                    for (k, g) in legendre(self.scale.of(values[i])).into_iter().enumerate() {
-                        put(2 * k, g, 0.0);
-                        put(2 * k + 1, 0.0, g);
-                    }
-                }
-                Variable::Phase(axis) => {
-                    let [along_x, along_y] = [1.0 - *axis as f64, *axis as f64];
-                    let orders = || waves[i].orders().enumerate();
-                    for (k, [sin, cos]) in orders().take(HARMONICS.min(count.div_ceil(2))) {
-                        put(2 * k, sin * along_x, sin * along_y);
-                        put(2 * k + 1, cos * along_x, cos * along_y);
-                    }
-                    let across = 2 * HARMONICS;
-                    for (k, [sin, cos]) in orders().take(ACROSS.min(count.saturating_sub(across))) {
-                        put(across + 2 * k, sin * along_y, sin * along_x);
-                        put(across + 2 * k + 1, cos * along_y, cos * along_x);
-                    }
-                }
-                Variable::Window => {
-                    for axis in 0..2 {
-                        let off = self.scale.of(at[axis] - rows.window_px[axis][i]);
-                        for (k, g) in legendre(off).into_iter().enumerate() {
-                            put(2 * k + axis, g * (1.0 - axis as f64), g * axis as f64);
-                        }
-                    }
-                }
+                Variable::Position(_) => row.position(self.scale.of(values[i])),
+                Variable::Phase(axis) => row.phase(*axis, &waves[i]),
+                Variable::PhaseProduct => row.phases(&waves[i], &other_waves[i]),
+                Variable::Window => row.window([
+                    self.scale.of(rows.x_px[i] - rows.window_px[0][i]),
+                    self.scale.of(rows.y_px[i] - rows.window_px[1][i]),
+                ]),
                 Variable::Rate | Variable::Acceleration => {
-                    let (a, b) = if matches!(self.variable, Variable::Rate) {
-                        (rows.vx_px_s[i], rows.vy_px_s[i])
+                    let motion = if matches!(self.variable, Variable::Rate) {
+                        [rows.vx_px_s[i], rows.vy_px_s[i]]
                     } else {
-                        (rows.ax_px_s2[i], rows.ay_px_s2[i])
+                        [rows.ax_px_s2[i], rows.ay_px_s2[i]]
                     };
-                    let (a, b) = (a / self.scale.half, b / self.scale.half);
-                    let square = a * a + b * b;
-                    put(0, a, b);
-                    put(1, -b, a);
-                    put(2, a, -b);
-                    put(3, b, a);
-                    put(4, y * a, y * b);
-                    put(5, x * a, x * b);
-                    for (k, square) in [square, a * a - b * b, a * b].into_iter().enumerate() {
-                        put(SQUARES + 2 * k, square, 0.0);
-                        put(SQUARES + 2 * k + 1, 0.0, square);
-                    }
-                    let size = square.sqrt();
-                    let more = size - self.scale.middle / self.scale.half;
-                    put(SIZE, more, 0.0);
-                    put(SIZE + 1, 0.0, more);
-                    put(BENT, size * a, size * b);
-                    put(BENT + 1, -size * b, size * a);
-                    let speed = (square + AT_REST * AT_REST).sqrt();
-                    put(DIRECTION, a / speed, b / speed);
-                    put(DIRECTION + 1, -b / speed, a / speed);
-                }
-                Variable::PhaseProduct => {
-                    let first = |waves: &[PixelWave]| waves[i].orders().next();
-                    let (Some(x), Some(y)) = (first(&waves), first(&other_waves)) else {
-                        continue;
-                    };
-                    let products = x.into_iter().flat_map(|x| y.map(|y| x * y));
-                    for (k, product) in products.enumerate() {
-                        put(k, product, 0.0);
-                        put(PRODUCTS + k, 0.0, product);
-                    }
+                    let Scale { middle, half } = self.scale;
+                    row.motion(motion.map(|v| v / half), middle / half);
                 }
                 Variable::Half(_)
                 | Variable::Quarter
                 | Variable::Beyond { .. }
                 | Variable::Patch { .. }
-                | Variable::During { .. } => {
-                    put(0, values[i], 0.0);
-                    put(1, 0.0, values[i]);
-                }
-                Variable::Since { .. } => {
-                    put(0, x * values[i], y * values[i]);
-                    put(1, x, y);
-                }
+                | Variable::During { .. } => row.whole(values[i]),
+                Variable::Since { .. } => row.scale_since(values[i]),
                 Variable::Star(ids) => {
-                    if let Some(k) = ids.iter().position(|&id| id == rows.star_id[i]) {
-                        put(2 * k, 1.0, 0.0);
-                        put(2 * k + 1, 0.0, 1.0);
-                    }
+                    row.one_of(ids.iter().position(|&id| id == rows.star_id[i]));
                 }
                 Variable::Slot(slots) => {
-                    if let Some(k) = slots.iter().position(|&slot| slot == rows.slot[i]) {
-                        put(2 * k, 1.0, 0.0);
-                        put(2 * k + 1, 0.0, 1.0);
-                    }
+                    row.one_of(slots.iter().position(|&slot| slot == rows.slot[i]));
                 }
-                _ => {
-                    // what turns whole frames to and fro is what a slow error of the reference does
-                    let is_time = matches!(self.variable, Variable::Time);
-                    let g = legendre(self.scale.of(values[i]));
-                    for (k, g) in g.into_iter().enumerate().take(count.div_ceil(FIELDS)) {
-                        if k == 0 || !is_time {
-                            put(FIELDS * k, g, 0.0);
-                            put(FIELDS * k + 1, 0.0, g);
-                            put(FIELDS * k + 2, -y * g, x * g);
-                        }
-                        put(FIELDS * k + 3, x * g, y * g);
-                    }
-                }
+                Variable::Time => row.number(self.scale.of(values[i]), true),
+                _ => row.number(self.scale.of(values[i]), false),
             }
         }
         true

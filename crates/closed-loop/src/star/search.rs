@@ -40,24 +40,22 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 use crate::declared::OnCentroids;
 use crate::error::CloseError;
 use crate::evidence::Evidence;
-use crate::search::selection::{FAMILY_ALPHA, Selection, WIDENING, costs, price};
-use crate::search::{Choice, Fitted, Found, borrowed, fit, fit_grams, polish, search, without};
+use crate::search::selection::{FAMILY_ALPHA, WIDENING, costs};
+use crate::search::{Choice, Found, borrowed, fit, search, without};
 use crate::star::evidence::StarEvidence;
 use crate::star::landing::Elsewhere;
 use alone::{Begun, Outcome};
+use beside_slow::{Coloured, beside_slow};
 pub(crate) use in_vain::in_vain;
 use trial::{Trial, taken_out_in_turn};
 
 mod alone;
+mod beside_slow;
 mod first_sight;
 mod foreknown;
 mod in_vain;
 mod trial;
 
-/// Candidates of each list that are scored.
-const SHORTLIST: usize = 3;
-/// Most effects that are added.
-const MOST: usize = 8;
 /// Parts of a long run of which one is searched before the whole is.
 const PARTS: usize = 8;
 
@@ -352,15 +350,6 @@ pub(crate) fn start(
     Ok(slow.map_or(Start::White, Start::Found))
 }
 
-/// What the search beside a slow error ends with.
-struct Coloured<'a> {
-    searched: Searched<'a>,
-    wander: Wander,
-    /// The same candidates under white noise.
-    begun: Begun,
-    worth: f64,
-}
-
 /// What a search beside a slow error comes to.
 enum Explored<'a> {
     /// There is none beside what white evidence finds.
@@ -384,140 +373,10 @@ fn explored<'a>(
             Outcome::Settled(found) => Explored::White(found),
             Outcome::Elsewhere(to) => Explored::Elsewhere(to),
             Outcome::Open(begun) => {
-                Explored::Coloured(Box::new(coloured(white, folds, *begun, may, start)?))
+                Explored::Coloured(Box::new(beside_slow(white, folds, *begun, may, start)?))
             }
         },
     )
-}
-
-fn coloured<'a>(
-    white: &StarEvidence<'a>,
-    folds: &Folds,
-    begun: Begun,
-    may: &[bool],
-    start: CommonNoise,
-) -> Result<Coloured<'a>, CloseError> {
-    let Begun {
-        mut candidates,
-        mut moments,
-        plain,
-    } = begun;
-    let mut banned = vec![false; candidates.len()];
-    let mut chosen: Vec<usize> = Vec::new();
-    let mut noise = start;
-    // fits of the same columns, those under the noise of the last choice
-    let (mut plain_fit, mut filtered_fit) = (Some(plain), None);
-    loop {
-        let under = |noise: &CommonNoise| {
-            let level = white.with_noise(noise);
-            let grams = level.under(&moments);
-            fit_grams(&level, &grams, folds, &borrowed(&candidates))
-        };
-        let beside = |fitted: Fitted| fitted.beside(folds, &borrowed(&candidates), &chosen);
-        let plain = match plain_fit.take() {
-            Some(plain) => plain,
-            None => alone::plainly(white, folds, &candidates, &moments)?,
-        };
-        let plain = beside(plain)?;
-        let filtered = match filtered_fit.take() {
-            Some(filtered) => filtered,
-            None => beside(under(&noise)?)?,
-        };
-        let trial = Trial {
-            moments: &moments,
-            folds,
-            precision: white.precision(),
-            variance: plain.variance_beside(&chosen).unwrap_or(1.0),
-            slow_price: white.slow_price,
-            groups: &plain.groups,
-            cost: costs(&plain.groups, may),
-            all: Some(&filtered.fits),
-            single: false,
-        };
-        let base = trial.score(&chosen, &noise).ok_or(CloseError::Singular)?;
-        noise = base.noise;
-        let mut stands = Vec::new();
-        let mut fallen = None;
-        for (at, &g) in chosen.iter().enumerate() {
-            let others = trial.score(&without(&chosen, &[g]), &noise);
-            let others = others.ok_or(CloseError::Singular)?;
-            let judgement = trial.judge(&base, at, &others, plain.groups[g].choices);
-            if !judgement.stands() {
-                fallen = Some(g);
-            }
-            stands.push(judgement);
-        }
-        if let Some(g) = fallen {
-            banned[g] = true;
-            chosen.retain(|&c| c != g);
-            continue;
-        }
-        let open: Vec<bool> = (0..candidates.len())
-            .map(|g| may[g] && !banned[g])
-            .collect();
-        let mut shortlist: Vec<usize> = Vec::new();
-        if chosen.len() < MOST {
-            for fitted in [&plain, &filtered] {
-                let tried = fitted.trials(&trial.cost).tried(&open, &chosen).into_iter();
-                let standing = tried.filter(|t| t.judgement.stands());
-                shortlist.extend(standing.map(|t| t.group).take(SHORTLIST));
-            }
-        }
-        shortlist.sort_unstable();
-        shortlist.dedup();
-        let best = shortlist
-            .into_par_iter()
-            .filter_map(|g| {
-                let mut with = chosen.clone();
-                with.push(g);
-                let scored = trial.score(&with, &noise)?;
-                let group = &plain.groups[g];
-                let judgement = trial.judge(&scored, chosen.len(), &base, group.choices);
-                let rank = judgement.delta_loglik - price(group, plain.scalars);
-                judgement.stands().then_some((g, rank, scored.noise))
-            })
-            .collect::<Vec<_>>()
-            .into_iter()
-            .max_by(|a, b| a.1.total_cmp(&b.1));
-        let Some((added, _, its_noise)) = best else {
-            let fitted = beside(under(&noise)?)?;
-            let mut judged = fitted.trials(&trial.cost).judged(&chosen);
-            for (&g, judgement) in chosen.iter().zip(stands) {
-                judged[g] = judgement;
-            }
-            let worth = trial.worth(&base);
-            return Ok(Coloured {
-                wander: Wander::of(base.rotations, noise),
-                begun: Begun {
-                    candidates: candidates.clone(),
-                    moments,
-                    plain,
-                },
-                searched: Searched {
-                    found: Found {
-                        candidates,
-                        fitted,
-                        selection: Selection { chosen, judged },
-                    },
-                    evidence: Some(white.with_noise(&noise)),
-                    wander: None,
-                },
-                worth,
-            });
-        };
-        chosen.push(added);
-        noise = its_noise;
-        let fitted = under(&noise)?;
-        let fitted = fitted.beside(folds, &borrowed(&candidates), &chosen)?;
-        let evidence = white.with_noise(&noise);
-        if polish(&evidence, folds, &mut candidates, &fitted, &chosen)? {
-            // there is no room for the old products beside the new
-            drop((plain, filtered, fitted, moments));
-            moments = white.moments(folds, &borrowed(&candidates));
-        } else {
-            (plain_fit, filtered_fit) = (Some(plain), Some(fitted));
-        }
-    }
 }
 
 impl Wander {

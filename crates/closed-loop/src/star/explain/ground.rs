@@ -10,6 +10,7 @@ use effects::{Candidate, Scene};
 
 use crate::causes::changing_effect::Way;
 use crate::causes::description::{self, Described};
+use crate::causes::terms;
 use crate::causes::{self, Named, Outcome, Quest};
 use crate::declared;
 use crate::error::CloseError;
@@ -64,10 +65,10 @@ impl<'g, 'a> Ground<'g, 'a> {
             begun,
             level,
             scene,
-            ways: description::ways(situation, data),
+            ways: terms::ways(situation, data),
             slow_reference: declared::reference(&declared::effects(situation)?),
             by_rates: motion.is_some_and(Around::by_rates),
-            yields: description::could_yield(situation, data, rms),
+            yields: terms::could_yield(situation, data, rms),
         })
     }
 
@@ -125,7 +126,7 @@ impl<'g, 'a> Ground<'g, 'a> {
             self.begun.folds,
             &mut searched.found,
             &described.follows(1.0),
-            description::terms(situation, self.data(), self.yields),
+            terms::terms(situation, self.data(), self.yields),
             &situation.surroundings(),
         )
     }
@@ -160,7 +161,7 @@ impl<'g, 'a> Ground<'g, 'a> {
             candidates: &candidates,
             terms: &|wander| {
                 let yields = self.yields && (!wander || self.accelerates());
-                description::terms(situation, self.data(), yields)
+                terms::terms(situation, self.data(), yields)
             },
             ways: &self.ways,
             reference: self.slow_reference,

@@ -5,9 +5,9 @@
 use telemetry::report::Unattributed;
 
 use crate::causes::commonness::Slow;
-use crate::causes::description;
 use crate::causes::slow_left;
 use crate::causes::star_constants::Constants;
+use crate::causes::terms;
 use crate::error::CloseError;
 use crate::figures;
 use crate::image_level::ImageLevel;
@@ -42,7 +42,7 @@ pub(super) fn look(
     let turned = Turned::of(f.data, [&residual[0], &residual[1]], weight);
     let order = f.situation.model.noise.distortion_order;
     let learned = f.level.learned();
-    let variables = description::of_noise(f.situation, f.data);
+    let variables = terms::of_noise(f.situation, f.data);
     let (noise, ((shared, own), pattern)) = rayon::join(
         || noise_and_slow(f, residual, &variables),
         || {
