@@ -102,7 +102,7 @@ pub(crate) struct Simulate {
     /// How tables are written
     #[arg(long, value_enum, default_value_t = Tables::CsvGz)]
     pub(crate) tables: Tables,
-    /// Folder for pictures of the run: field, centroid error, motion, tracks
+    /// Folder for pictures of the run (of a model, not of pixels): field, centroid error, motion, tracks
     #[arg(long, value_name = "DIR")]
     pub(crate) figures: Option<PathBuf>,
 }

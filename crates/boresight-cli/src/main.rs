@@ -10,6 +10,8 @@ mod commands;
 mod console;
 mod example;
 mod inputs;
+mod interrupt;
+mod results;
 mod targets;
 
 use std::process::ExitCode;
@@ -31,6 +33,7 @@ fn main() -> ExitCode {
             .num_threads(threads)
             .build_global();
     }
+    interrupt::leave_nothing();
     let done = match &arguments.command {
         Command::Assess(options) => commands::assess::run(options, &console),
         Command::Close(options) => commands::close::run(options, &console),

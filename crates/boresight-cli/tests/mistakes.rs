@@ -74,6 +74,12 @@ fn a_mistake_in_an_effect_is_shown_in_its_line() -> Done {
         ("30e-6", "30.0", 9, "line_time_s"),
         ("30e-6", "[1.0, 2.0]", 9, "a number"),
         ("line_time_s = 30e-6", "", 7, "line_time_s"),
+        (
+            "\"rolling_shutter\"\nline_time_s = 30e-6",
+            "\"optical_distortion\"\ncx_px = 3.0",
+            7,
+            "a term of the lens",
+        ),
     ] {
         let text = MODEL.replacen(from, to, 1);
         let (model, shown) = file(dir.path(), "model.toml", &text)?;
@@ -178,6 +184,32 @@ fn an_option_that_does_nothing_is_refused() -> Done {
     command.arg("assess").arg(example());
     let told = said(command.args(["--method", "reference", "--gyro-walk", "0.1"]))?;
     has(&told, &["--gyro-walk", "--method gyro"]);
+    // pixels are not drawn
+    let dir = tempfile::tempdir()?;
+    let mut command = boresight();
+    command.arg("simulate");
+    command.arg(fixtures().join("worlds/null_hold.toml"));
+    command.arg("--out").arg(dir.path().join("bundle"));
+    let told = said(command.arg("--figures").arg(dir.path().join("pictures")))?;
+    has(&told, &["--figures", "pixels"]);
+    assert_eq!(fs::read_dir(dir.path())?.count(), 0, "nothing is written");
+    Ok(())
+}
+
+/// A tracker that is none over this bundle, and attitudes of another convention, are told with the bundle.
+#[test]
+fn what_does_not_fit_the_bundle_names_it() -> Done {
+    let dir = tempfile::tempdir()?;
+    let text = "format = \"boresight-model/1\"\n[tracker]\nfov_deg = [20.0, 10.0]\n";
+    let (model, _) = file(dir.path(), "model.toml", text)?;
+    let told = said(boresight().arg("close").arg(&model).arg(example()))?;
+    let bundle = example().display().to_string();
+    has(&told, &[&bundle, "the model's tracker over the bundle's"]);
+    let text =
+        "format = \"boresight-model/1\"\n[tracker]\npixels = [512, 512]\nfov_deg = [20.0, 20.0]\n";
+    let (model, _) = file(dir.path(), "other.toml", text)?;
+    let told = said(boresight().arg("close").arg(&model).arg(example()))?;
+    has(&told, &[&bundle, "the number of pixels", "512", "1024"]);
     Ok(())
 }
 

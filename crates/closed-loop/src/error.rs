@@ -1,5 +1,6 @@
 //! What can go wrong between a bundle and its report.
 
+use focal_plane::CameraError;
 use thiserror::Error;
 
 /// Why the loop cannot be closed on this input.
@@ -24,6 +25,9 @@ pub enum CloseError {
         /// As the bundle has it.
         bundle: f64,
     },
+    /// What model and bundle say of the camera makes none together.
+    #[error("the model's tracker over the bundle's: {0}")]
+    Camera(#[from] CameraError),
     /// Neither model nor bundle says what the camera is.
     #[error(
         "neither the model nor the bundle gives the tracker's pixels and focal length (or field of view)"
@@ -140,7 +144,7 @@ pub enum CloseError {
 }
 
 impl CloseError {
-    /// Whether it is the bundle that holds too little.
+    /// Whether it is about what the bundle holds, or does not.
     #[must_use]
     pub fn is_of_bundle(&self) -> bool {
         matches!(
@@ -149,6 +153,11 @@ impl CloseError {
                 | Self::NoRowsLeft { .. }
                 | Self::NoOverlap { .. }
                 | Self::NothingToCompare(_)
+                | Self::Convention { .. }
+                | Self::StarConvention { .. }
+                | Self::TrackersDiffer { .. }
+                | Self::Camera(_)
+                | Self::NoCamera
                 | Self::Undetermined { .. }
         )
     }

@@ -151,46 +151,34 @@ fn reference(bundle: &Bundle) -> Option<AttitudeSeries> {
     Some(with_rates(series, bundle.rates.as_ref()))
 }
 
+/// The camera of the model; what it leaves out is the bundle's. What both give has to agree.
 fn camera(model: &Model, bundle: &Bundle) -> Result<Camera, CloseError> {
-    let declared = &model.tracker;
-    let pixels = declared.pixels.or(bundle.meta.tracker.pixels);
-    let believed = match (pixels, declared.focal_length_px, declared.fov_deg) {
-        (Some(pixels), Some(f), _) => Camera::from_focal_length_px(pixels, f).ok(),
-        (Some(pixels), None, Some(fov)) => Camera::from_fov_deg(pixels, fov).ok(),
-        _ => None,
+    let camera = model.camera_over(&bundle.meta.tracker)?;
+    let camera = camera.or_else(|| bundle.camera.clone());
+    let camera = camera.ok_or(CloseError::NoCamera)?;
+    let Some(measured) = &bundle.camera else {
+        return Ok(camera);
     };
-    let centre = declared.pixel_centre.or(bundle.meta.tracker.pixel_centre);
-    let believed = believed.and_then(|c| match centre {
-        Some(centre) => c.with_pixel_centre(centre).ok(),
-        None => Some(c),
-    });
-    match (believed, &bundle.camera) {
-        (Some(model), Some(measured)) => {
-            for axis in 0..2 {
-                let (a, b) = (model.pixels()[axis], measured.pixels()[axis]);
-                if a != b {
-                    return Err(CloseError::TrackersDiffer {
-                        what: "the number of pixels",
-                        model: f64::from(a),
-                        bundle: f64::from(b),
-                    });
-                }
-                let (a, b) = (
-                    model.focal_length_px()[axis],
-                    measured.focal_length_px()[axis],
-                );
-                if (a / b - 1.0).abs() > FOCAL_TOLERANCE {
-                    return Err(CloseError::TrackersDiffer {
-                        what: "the focal length, px,",
-                        model: a,
-                        bundle: b,
-                    });
-                }
-            }
-            Ok(model)
+    for axis in 0..2 {
+        let (a, b) = (camera.pixels()[axis], measured.pixels()[axis]);
+        if a != b {
+            return Err(CloseError::TrackersDiffer {
+                what: "the number of pixels",
+                model: f64::from(a),
+                bundle: f64::from(b),
+            });
         }
-        (Some(camera), None) => Ok(camera),
-        (None, Some(camera)) => Ok(camera.clone()),
-        (None, None) => Err(CloseError::NoCamera),
+        let (a, b) = (
+            camera.focal_length_px()[axis],
+            measured.focal_length_px()[axis],
+        );
+        if (a / b - 1.0).abs() > FOCAL_TOLERANCE {
+            return Err(CloseError::TrackersDiffer {
+                what: "the focal length, px,",
+                model: a,
+                bundle: b,
+            });
+        }
     }
+    Ok(camera)
 }

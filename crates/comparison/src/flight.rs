@@ -269,27 +269,10 @@ pub(crate) fn without_outliers(theta: &mut [f64]) {
 
 /// The camera of the model; what it leaves out is the bundle's.
 pub(crate) fn camera(model: &Model, bundle: &Bundle) -> Result<Camera, ComparisonError> {
-    let (declared, meta) = (&model.tracker, &bundle.meta.tracker);
-    let pixels = declared.pixels.or(meta.pixels);
-    let own = declared.focal_length_px.is_some() || declared.fov_deg.is_some();
-    let (focal, fov) = if own {
-        (declared.focal_length_px, declared.fov_deg)
-    } else {
-        (meta.focal_length_px, meta.fov_deg)
-    };
-    let camera = match (pixels, focal, fov) {
-        (Some(pixels), Some(focal), _) => Camera::from_focal_length_px(pixels, focal)?,
-        (Some(pixels), None, Some(fov)) => Camera::from_fov_deg(pixels, fov)?,
-        _ => {
-            return Err(ComparisonError::NothingToCompare(
-                "neither the model nor the bundle gives pixels and focal length under [tracker]",
-            ));
-        }
-    };
-    Ok(match declared.pixel_centre.or(meta.pixel_centre) {
-        Some(centre) => camera.with_pixel_centre(centre)?,
-        None => camera,
-    })
+    let camera = model.camera_over(&bundle.meta.tracker)?;
+    camera.ok_or(ComparisonError::NothingToCompare(
+        "neither the model nor the bundle gives pixels and focal length under [tracker]",
+    ))
 }
 
 fn built(

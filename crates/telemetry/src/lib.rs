@@ -21,6 +21,7 @@ mod residuals;
 mod table;
 mod tables;
 mod time;
+mod unfinished;
 
 pub use bundle::{
     Bundle, BundleWriter, TableFiles, TableFormat, bundle_files, foreign_file, made_here,
@@ -39,3 +40,4 @@ pub use output::{Output, write_file};
 pub use residuals::{AttitudeResiduals, DarkMap, StarResiduals};
 pub use tables::{AttitudeTable, Housekeeping, RateTable, ReferenceTable, WindowTable};
 pub use time::{Epoch, TimeScale};
+pub use unfinished::remove_unfinished;

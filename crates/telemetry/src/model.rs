@@ -211,6 +211,30 @@ impl Model {
         })
     }
 
+    /// The camera of this model over a bundle that describes itself as `meta`: what the model leaves out is the
+    /// bundle's. A focal length and a field of view are one thing here: either of the model replaces both. `None` where
+    /// the two together say too little.
+    ///
+    /// # Errors
+    ///
+    /// Values of both that make no camera together.
+    pub fn camera_over(&self, meta: &TrackerMeta) -> Result<Option<Camera>, CameraError> {
+        let own = &self.tracker;
+        let of_model = own.focal_length_px.is_some() || own.fov_deg.is_some();
+        let (focal_length_px, fov_deg) = if of_model {
+            (own.focal_length_px, own.fov_deg)
+        } else {
+            (meta.focal_length_px, meta.fov_deg)
+        };
+        camera(&TrackerMeta {
+            pixels: own.pixels.or(meta.pixels),
+            focal_length_px,
+            fov_deg,
+            exposure_s: None,
+            pixel_centre: own.pixel_centre.or(meta.pixel_centre),
+        })
+    }
+
     /// An error in an effect, shown at the value of its key (`id`, a parameter) if the model came
     /// from a file: for what only the effects catalogue can judge.
     pub fn effect_error(&self, index: usize, key: &str, message: &str) -> TelemetryError {

@@ -12,6 +12,7 @@ use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use crate::TelemetryError;
+use crate::unfinished::Unfinished;
 
 /// A folder being written. Unless [`commit`](Self::commit) is called, dropping it leaves the disk
 /// as it was.
@@ -31,11 +32,8 @@ use crate::TelemetryError;
 #[derive(Debug)]
 pub struct Output {
     target: PathBuf,
-    partial: PathBuf,
-    /// Folders above the target that were made for it, outermost first.
-    made: Vec<PathBuf>,
+    unfinished: Unfinished,
     existed: bool,
-    committed: bool,
 }
 
 impl Output {
@@ -52,30 +50,23 @@ impl Output {
         if existed && !dir.is_dir() {
             return Err(refuse(&io::ErrorKind::NotADirectory.into()));
         }
-        let mut output = Self {
-            target: dir.into(),
-            partial: partial_of(dir, existed),
-            made: Vec::new(),
-            existed,
-            committed: false,
-        };
+        let mut made = Vec::new();
         if !existed {
             let above = dir.ancestors().skip(1);
             let missing = above.take_while(|path| !path.as_os_str().is_empty() && !path.exists());
-            output.made = missing.map(PathBuf::from).collect();
-            output.made.reverse();
+            made = missing.map(PathBuf::from).collect();
+            made.reverse();
         }
+        let output = Self {
+            target: dir.into(),
+            unfinished: Unfinished::begin(partial_of(dir, existed), made),
+            existed,
+        };
         // on an error the drop takes away what was made so far
-        match fs::create_dir_all(&output.partial) {
+        match fs::create_dir_all(output.unfinished.partial()) {
             Ok(()) => Ok(output),
             Err(error) => Err(refuse(&error)),
         }
-    }
-
-    /// Where files are until they are committed: what a handler of Ctrl-C removes.
-    #[must_use]
-    pub fn partial(&self) -> &Path {
-        &self.partial
     }
 
     /// The folder that is being written.
@@ -90,7 +81,8 @@ impl Output {
     ///
     /// What the operating system says.
     pub fn create(&self, name: &str) -> Result<File, TelemetryError> {
-        File::create(self.partial.join(name)).map_err(|error| self.refuse(name, &error))
+        File::create(self.unfinished.partial().join(name))
+            .map_err(|error| self.refuse(name, &error))
     }
 
     /// Writes a file of the folder, buffered.
@@ -119,16 +111,16 @@ impl Output {
     /// # Errors
     ///
     /// What the operating system says.
-    pub fn commit(mut self) -> Result<(), TelemetryError> {
+    pub fn commit(self) -> Result<(), TelemetryError> {
         let moved = if self.existed {
             self.move_files()
         } else {
-            fs::rename(&self.partial, &self.target)
+            fs::rename(self.unfinished.partial(), &self.target)
         };
         moved.map_err(|error| {
             TelemetryError::io(self.target.display().to_string(), "write", &error)
         })?;
-        self.committed = true;
+        self.unfinished.finish();
         Ok(())
     }
 
@@ -141,7 +133,7 @@ impl Output {
     pub fn commit_in_place_of(self, earlier: &[&str]) -> Result<(), TelemetryError> {
         let stale: Vec<PathBuf> = earlier
             .iter()
-            .filter(|name| !self.partial.join(name).exists())
+            .filter(|name| !self.unfinished.partial().join(name).exists())
             .map(|name| self.target.join(name))
             .filter(|path| path.is_file())
             .collect();
@@ -155,24 +147,12 @@ impl Output {
     }
 
     fn move_files(&self) -> io::Result<()> {
-        for entry in fs::read_dir(&self.partial)? {
+        let partial = self.unfinished.partial();
+        for entry in fs::read_dir(partial)? {
             let entry = entry?;
             fs::rename(entry.path(), self.target.join(entry.file_name()))?;
         }
-        fs::remove_dir(&self.partial)
-    }
-}
-
-impl Drop for Output {
-    fn drop(&mut self) {
-        if self.committed {
-            return;
-        }
-        // nothing to do about a failure while another error is on its way
-        let _ = fs::remove_dir_all(&self.partial);
-        for path in self.made.iter().rev() {
-            let _ = fs::remove_dir(path);
-        }
+        fs::remove_dir(partial)
     }
 }
 
@@ -196,15 +176,15 @@ pub fn write_file(
     path: &Path,
     content: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
 ) -> Result<(), TelemetryError> {
-    let partial = partial_of(path, false);
-    let written = File::create(&partial)
+    let unfinished = Unfinished::begin(partial_of(path, false), Vec::new());
+    let partial = unfinished.partial();
+    File::create(partial)
         .map(BufWriter::new)
         .and_then(|mut to| content(&mut to).and_then(|()| to.flush()))
-        .and_then(|()| fs::rename(&partial, path));
-    written.map_err(|error| {
-        let _ = fs::remove_file(&partial);
-        TelemetryError::io(path.display().to_string(), "write", &error)
-    })
+        .and_then(|()| fs::rename(partial, path))
+        .map_err(|error| TelemetryError::io(path.display().to_string(), "write", &error))?;
+    unfinished.finish();
+    Ok(())
 }
 
 #[cfg(test)]

@@ -3,7 +3,8 @@
 mod common;
 
 use common::repository;
-use telemetry::{EffectEntry, EffectValue, Model, ModelKind};
+use focal_plane::Camera;
+use telemetry::{EffectEntry, EffectValue, Model, ModelKind, TrackerMeta};
 
 const GOOD: &str = r#"format = "boresight-model/1"
 kind = "pbm"
@@ -95,6 +96,35 @@ fn what_is_left_out_is_none() {
         (None, None)
     );
     assert_eq!(model.camera(), Ok(None));
+}
+
+/// What a model leaves out of its camera is the bundle's, key by key; what both make together is checked.
+#[test]
+fn the_camera_of_a_model_is_completed_by_the_bundle() {
+    let head = "format = \"boresight-model/1\"\n[tracker]\n";
+    let over = |text: &str| {
+        let model = Model::parse(&format!("{head}{text}"), "m.toml", &[]).unwrap();
+        model.camera_over(&TrackerMeta {
+            pixels: Some([1024, 1024]),
+            fov_deg: Some([20.0, 20.0]),
+            ..TrackerMeta::default()
+        })
+    };
+    let of_bundle = over("").unwrap().unwrap();
+    assert_eq!(of_bundle.pixels(), [1024, 1024]);
+    let centred = over("pixel_centre = 0.0\n").unwrap().unwrap();
+    assert_eq!(centred, of_bundle.clone().with_pixel_centre(0.0).unwrap());
+    // another focal length replaces a field of view
+    let longer = over("focal_length_px = 3000.0\n").unwrap().unwrap();
+    let own = Camera::from_focal_length_px([1024, 1024], 3000.0).unwrap();
+    assert_eq!(longer, own);
+    assert_ne!(of_bundle, own);
+    assert!(over("fov_deg = [20.0, 10.0]\n").is_err());
+    let lacking = Model::parse(head, "m.toml", &[]).unwrap();
+    assert_eq!(lacking.camera_over(&TrackerMeta::default()), Ok(None));
+    let nothing = format!("{head}fov_deg = [20.0, 0.0]\n");
+    let said = Model::parse(&nothing, "m.toml", &[]).unwrap_err();
+    assert!(said.to_string().contains("m.toml, line 3"), "{said}");
 }
 
 #[test]

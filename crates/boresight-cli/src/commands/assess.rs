@@ -6,11 +6,12 @@ use anyhow::Context as _;
 use boresight::assess::{AssessError, Assessment, Options, assess};
 use boresight::report::{assess_figures, assess_summary};
 use boresight::telemetry::Output;
-use boresight::telemetry::report::AssessMethod;
+use boresight::telemetry::report::{ASSESS_FORMAT, AssessMethod};
 
 use crate::arguments::{Assess, Method};
 use crate::console::Console;
 use crate::inputs;
+use crate::results;
 use crate::targets;
 
 /// All files that the command may write.
@@ -51,7 +52,7 @@ pub(crate) fn run(options: &Assess, console: &Console) -> anyhow::Result<()> {
         console.progress("writing results");
         let output = Output::new(dir)?;
         write(&found, &text, &json, &output)?;
-        output.commit()?;
+        results::commit(output, &RESULTS, ASSESS_FORMAT)?;
     }
     console.say(&format!("Input     {name}\n{tables}{text}"));
     console.machine(&json);

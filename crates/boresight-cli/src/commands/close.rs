@@ -15,6 +15,7 @@ use crate::arguments::Close;
 use crate::console::Console;
 use crate::example;
 use crate::inputs;
+use crate::results;
 use crate::targets;
 
 /// All files that the command may write.
@@ -66,12 +67,6 @@ pub(crate) fn run(options: &Close, console: &Console) -> anyhow::Result<()> {
     if let Some(dir) = &options.out {
         console.progress("writing results");
         let output = Output::new(dir)?;
-        // An interrupted run leaves nothing behind.
-        let partial = output.partial().to_owned();
-        let _ = ctrlc::set_handler(move || {
-            let _ = std::fs::remove_dir_all(&partial);
-            interrupted();
-        });
         let run = Run {
             closed: &closed,
             bundle: &bundle,
@@ -85,11 +80,7 @@ pub(crate) fn run(options: &Close, console: &Console) -> anyhow::Result<()> {
         let (written, page) = rayon::join(|| write(&closed, &text, &output), || html(&run));
         written?;
         output.write("report.html", |to| to.write_all(page.as_bytes()))?;
-        if targets::is_result(&dir.join("report.json"), REPORT_FORMAT) {
-            output.commit_in_place_of(&RESULTS)?;
-        } else {
-            output.commit()?;
-        }
+        results::commit(output, &RESULTS, REPORT_FORMAT)?;
     }
     console.say(&format!("Input     {title}\n{tables}{text}"));
     if console.json() {
@@ -120,14 +111,6 @@ fn with_nearest(error: CloseError) -> anyhow::Error {
         }
     }
     error.into()
-}
-
-#[expect(
-    clippy::exit,
-    reason = "the answer to Ctrl-C, after the partial output is gone"
-)]
-pub(crate) fn interrupted() {
-    std::process::exit(130)
 }
 
 /// Draws of each model behind its spectrum: enough for a mean and its 3 sigma.

@@ -5,12 +5,13 @@ use std::io::Write as _;
 use anyhow::Context as _;
 use boresight::comparison::{CompareSettings, compare};
 use boresight::report::{compare_figures, compare_summary, compare_tables};
+use boresight::telemetry::report::COMPARE_FORMAT;
 use boresight::telemetry::{Model, Output};
 
 use crate::arguments::Compare;
-use crate::commands::close::interrupted;
 use crate::console::Console;
 use crate::inputs;
+use crate::results;
 use crate::targets;
 
 /// All files that the command may write.
@@ -61,11 +62,6 @@ pub(crate) fn run(options: &Compare, console: &Console) -> anyhow::Result<()> {
     if let Some(dir) = &options.out {
         console.progress("writing results");
         let output = Output::new(dir)?;
-        let partial = output.partial().to_owned();
-        let _ = ctrlc::set_handler(move || {
-            let _ = std::fs::remove_dir_all(&partial);
-            interrupted();
-        });
         output.write("compare.json", |to| writeln!(to, "{json}"))?;
         output.write("summary.txt", |to| to.write_all(text.as_bytes()))?;
         for (name, content) in compare_tables(&compared)
@@ -74,7 +70,7 @@ pub(crate) fn run(options: &Compare, console: &Console) -> anyhow::Result<()> {
         {
             output.write(&name, |to| to.write_all(content.as_bytes()))?;
         }
-        output.commit()?;
+        results::commit(output, &RESULTS, COMPARE_FORMAT)?;
     }
     console.say(&format!(
         "Input     {} against {}\n{tables}{text}",

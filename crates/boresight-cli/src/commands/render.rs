@@ -8,7 +8,6 @@ use boresight::telemetry::BundleWriter;
 use boresight::telemetry::config::Config;
 
 use crate::arguments::Simulate;
-use crate::commands::close::interrupted;
 use crate::commands::simulate::{Input, refuse_inputs};
 use crate::console::Console;
 
@@ -86,6 +85,10 @@ fn render(
     options: &Simulate,
     console: &Console,
 ) -> anyhow::Result<()> {
+    anyhow::ensure!(
+        options.figures.is_none(),
+        "--figures draws the runs of models, and this one is rendered from pixels; leave the option out, or give a scenario and --fidelity model"
+    );
     refuse_inputs(options, &course.motion, &course.folder, out)?;
     let settings = &course.run;
     let (truth, first_s, frames) = course
@@ -104,12 +107,6 @@ fn render(
     };
     let progress = |done: f64| console.progress(&format!("rendering, {:.0} %", 100.0 * done));
     let writer = BundleWriter::new(out, options.tables.format())?;
-    // An interrupted run leaves nothing behind.
-    let partial = writer.output().partial().to_owned();
-    let _ = ctrlc::set_handler(move || {
-        let _ = std::fs::remove_dir_all(&partial);
-        interrupted();
-    });
     let done = imager::write(
         instrument,
         truth.as_ref(),

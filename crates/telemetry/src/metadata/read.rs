@@ -142,7 +142,7 @@ pub(crate) fn optics(section: &Section<'_>) -> Result<TrackerMeta, TelemetryErro
         None => section.error(error.to_string()),
     };
     if let Some(fov_deg) = optics.fov_deg
-        && (optics.pixels.is_some() || fov_deg.iter().any(|f| !(0.0..180.0).contains(f)))
+        && (optics.pixels.is_some() || fov_deg.iter().any(|f| !(*f > 0.0 && *f < 180.0)))
     {
         Camera::from_fov_deg(pixels, fov_deg).map_err(|e| blame("fov_deg", e))?;
     }
