@@ -9,6 +9,7 @@
 //!
 //! Source: \[M23\] Figs. 8, 11, 12, 13, 16, 17 and Eq. 19.
 
+use focal_plane::AttitudeSeries;
 use telemetry::report::{
     COMPARE_FORMAT, CompareReport, ComparedAxes, ComparedAxis, ComparedBand, ComparedKind,
     ComparedModel, Rows, StarSource,
@@ -105,22 +106,14 @@ pub fn compare(
     let truth = Residual::reference(bundle)?;
     let mut notes = first_notes(&residual);
     let models: Vec<&Model> = std::iter::once(model).chain(others).collect();
-    let prepared: Vec<Result<_, ComparisonError>> = models
-        .par_iter()
-        .map(|model| {
-            let mut said = vec![];
-            let (t_s, seed) = (&residual.t_s, settings.seed);
-            let flight = Flight::new(model, bundle, &truth, t_s, seed, &mut said)
-                .map_err(|error| error.of_model(model))?;
-            Ok((flight, said))
-        })
-        .collect();
-    let mut flights = vec![];
-    for prepared in prepared {
-        let (flight, said) = prepared?;
-        flights.push(flight);
-        notes.extend(said);
-    }
+    let flights = prepared(
+        &models,
+        bundle,
+        &truth,
+        &residual,
+        settings.seed,
+        &mut notes,
+    )?;
     let first: Vec<Result<_, ComparisonError>> =
         flights.par_iter().map(|flight| flight.draw(0)).collect();
     let first: Vec<[Vec<f64>; 3]> = first.into_iter().collect::<Result<_, _>>()?;
@@ -134,27 +127,131 @@ pub fn compare(
             "{count} frames are left out: the model has no attitude there (no stars, or an exposure beyond the reference)"
         ));
     }
-    let kept = [0, 1, 2].map(|axis| crate::residual::masked(&residual.kept(axis), &lost));
-    let mut plans = vec![];
-    let mut measured = vec![];
-    for (kept, axis) in kept.iter().zip(AXES) {
-        ComparisonError::check_scatter(axis, std_of(kept))?;
-        let of_spectrum = |reason| ComparisonError::Spectrum { axis, reason };
-        let plan = Spectrum::new(&residual.t_s, kept).map_err(of_spectrum)?;
-        measured.push(plan.of(kept).map_err(of_spectrum)?);
-        plans.push(plan);
-    }
-    let (Ok(plans), Ok(measured)) = (
-        <[Spectrum; 3]>::try_from(plans),
-        <[Psd; 3]>::try_from(measured),
-    ) else {
-        unreachable!("three axes were planned")
-    };
+    let measured = Measured::of(&residual, &lost)?;
     let mut flown = vec![];
     let mut compared = vec![];
-    for ((flight, model), first) in flights.iter().zip(&models).zip(first) {
+    for ((flight, model), first) in flights.iter().zip(models.iter().copied()).zip(first) {
+        let by = Against {
+            measured: &measured,
+            draws: settings.draws,
+            progress,
+        };
+        let (figures, standing) = by.fly(flight, model, first, &mut notes)?;
+        flown.push(figures);
+        compared.push(standing);
+    }
+    notes.extend(reference_note(bundle, &models, &measured.kept));
+    let used = (0..lost.len()).filter(|&k| !lost[k] && !residual.is_outlier(k));
+    let mut compared = compared.into_iter();
+    let Some(model) = compared.next() else {
+        unreachable!("the model itself is among them")
+    };
+    let report = CompareReport {
+        format: COMPARE_FORMAT.to_owned(),
+        draws: settings.draws,
+        seed: settings.seed,
+        rows: Rows {
+            used: used.count(),
+            outliers: residual.rows_with_outlier(),
+            outside_reference: residual.outside_reference,
+        },
+        sample_rate_hz: measured.plans[0].fs_hz(),
+        span_s: residual.t_s[residual.t_s.len() - 1] - residual.t_s[0],
+        measured_std_arcsec: measured.kept.each_ref().map(|kept| std_of(kept)),
+        model,
+        others: compared.collect(),
+        notes,
+    };
+    Ok(Compared {
+        report,
+        residual,
+        measured: measured.density,
+        models: flown,
+    })
+}
+
+/// The models along the measured motion, ready to be drawn.
+fn prepared<'a>(
+    models: &[&'a Model],
+    bundle: &Bundle,
+    truth: &'a AttitudeSeries,
+    residual: &'a Residual,
+    seed: u64,
+    notes: &mut Vec<String>,
+) -> Result<Vec<Flight<'a>>, ComparisonError> {
+    let prepared: Vec<Result<_, ComparisonError>> = models
+        .par_iter()
+        .map(|&model| {
+            let mut said = vec![];
+            let flight = Flight::new(model, bundle, truth, &residual.t_s, seed, &mut said)
+                .map_err(|error| error.of_model(model))?;
+            Ok((flight, said))
+        })
+        .collect();
+    let mut flights = vec![];
+    for prepared in prepared {
+        let (flight, said) = prepared?;
+        flights.push(flight);
+        notes.extend(said);
+    }
+    Ok(flights)
+}
+
+/// The measured residual where all models have an attitude, and its spectra.
+struct Measured {
+    /// About x, y, z, arcsec; NaN where it is left out.
+    kept: [Vec<f64>; 3],
+    plans: [Spectrum; 3],
+    /// arcsec^2/Hz.
+    density: [Psd; 3],
+}
+
+impl Measured {
+    fn of(residual: &Residual, lost: &[bool]) -> Result<Self, ComparisonError> {
+        let kept = [0, 1, 2].map(|axis| crate::residual::masked(&residual.kept(axis), lost));
+        let mut plans = vec![];
+        let mut density = vec![];
+        for (kept, axis) in kept.iter().zip(AXES) {
+            ComparisonError::check_scatter(axis, std_of(kept))?;
+            let of_spectrum = |reason| ComparisonError::Spectrum { axis, reason };
+            let plan = Spectrum::new(&residual.t_s, kept).map_err(of_spectrum)?;
+            density.push(plan.of(kept).map_err(of_spectrum)?);
+            plans.push(plan);
+        }
+        let (Ok(plans), Ok(density)) = (
+            <[Spectrum; 3]>::try_from(plans),
+            <[Psd; 3]>::try_from(density),
+        ) else {
+            unreachable!("three axes were planned")
+        };
+        Ok(Self {
+            kept,
+            plans,
+            density,
+        })
+    }
+}
+
+/// What each model is held against.
+struct Against<'a> {
+    measured: &'a Measured,
+    draws: u64,
+    progress: &'a dyn Fn(&str),
+}
+
+impl Against<'_> {
+    /// The ensemble of one model, whose `first` draw is there, and how it stands.
+    fn fly(
+        &self,
+        flight: &Flight<'_>,
+        model: &Model,
+        first: [Vec<f64>; 3],
+        notes: &mut Vec<String>,
+    ) -> Result<(Flown, ComparedModel), ComparisonError> {
+        let measured = self.measured;
         let name = name_of(model);
-        let silent = [0, 1, 2].map(|axis| std_of(&first[axis]) <= SILENT * std_of(&kept[axis]));
+        let silent =
+            [0, 1, 2].map(|axis| std_of(&first[axis]) <= SILENT * std_of(&measured.kept[axis]));
         if silent == [true; 3] {
             return Err(ComparisonError::NoNoise { model: name });
         }
@@ -163,9 +260,9 @@ pub fn compare(
                 "{name} has no error about {axis}: nothing to hold against"
             ));
         }
-        progress(&format!("{} draws of {name}", settings.draws));
+        (self.progress)(&format!("{} draws of {name}", self.draws));
         let draws = |whole: bool| {
-            ensemble(&plans, settings.draws, |draw| {
+            ensemble(&measured.plans, self.draws, |draw| {
                 let mut theta = match whole {
                     true if draw == 0 => first.clone(),
                     true => flight.draw(draw)?,
@@ -177,51 +274,25 @@ pub fn compare(
         };
         let axes = draws(true)?;
         let plain = model.kind == ModelKind::Hem && flight.stars() != StarSource::None;
-        compared.push(ComparedModel {
+        let without_distortion = if plain { Some(draws(false)?) } else { None };
+        let standing = ComparedModel {
             name: name.clone(),
             kind: match model.kind {
                 ModelKind::Pbm => ComparedKind::Pbm,
                 ModelKind::Hem => ComparedKind::Hem,
             },
             stars: flight.stars(),
-            axes: standings(&axes, &measured, &first, silent),
-        });
-        flown.push(Flown {
+            axes: standings(&axes, &measured.density, &first, silent),
+        };
+        let flown = Flown {
             name,
             kind: model.kind,
             axes,
-            without_distortion: if plain { Some(draws(false)?) } else { None },
+            without_distortion,
             first,
-        });
+        };
+        Ok((flown, standing))
     }
-    notes.extend(reference_note(bundle, &models, &kept));
-    let with_outlier = residual.rows_with_outlier();
-    let mut compared = compared.into_iter();
-    let Some(model) = compared.next() else {
-        unreachable!("the model itself is among them")
-    };
-    let report = CompareReport {
-        format: COMPARE_FORMAT.to_owned(),
-        draws: settings.draws,
-        seed: settings.seed,
-        rows: Rows {
-            used: residual.t_s.len() - with_outlier,
-            outliers: with_outlier,
-            outside_reference: residual.outside_reference,
-        },
-        sample_rate_hz: plans[0].fs_hz(),
-        span_s: residual.t_s[residual.t_s.len() - 1] - residual.t_s[0],
-        measured_std_arcsec: [0, 1, 2].map(|axis| std_of(&kept[axis])),
-        model,
-        others: compared.collect(),
-        notes,
-    };
-    Ok(Compared {
-        report,
-        residual,
-        measured,
-        models: flown,
-    })
 }
 
 /// Refuses draws that leave fewer frames than a spectrum needs.

@@ -132,9 +132,12 @@ impl Residual {
     /// Rows that are an outlier about any axis.
     #[must_use]
     pub fn rows_with_outlier(&self) -> usize {
-        (0..self.t_s.len())
-            .filter(|&k| self.outlier.iter().any(|axis| axis[k]))
-            .count()
+        (0..self.t_s.len()).filter(|&k| self.is_outlier(k)).count()
+    }
+
+    /// Whether a row is one about any axis.
+    pub(crate) fn is_outlier(&self, row: usize) -> bool {
+        self.outlier.iter().any(|axis| axis[row])
     }
 
     /// Standard deviation about one axis, arcsec: the mean is a misalignment, and no noise.
