@@ -16,11 +16,11 @@
 //! Source: \[M23\] Section 4.2.1 names the effect; the series is that of the mean of a path.
 
 use focal_plane::{Camera, PointsMut, VectorsMut};
-use star_tracker::{Disturbance, Stages};
+use star_tracker::{Disturbance, GAUSS_LEGENDRE_8, Stages};
 
 use crate::candidate::check_columns;
 use crate::parameters::Reader;
-use crate::path::{GAUSS_LEGENDRE_8, Path, mean_turn};
+use crate::path::{Path, mean_turn};
 use crate::{
     ActsOn, AttitudeRows, Candidate, Coefficient, Effect, EffectError, EffectKind, Parameter,
     Parameters, Scene, StarRows, Surroundings,

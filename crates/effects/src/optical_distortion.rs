@@ -93,6 +93,12 @@ impl EffectKind for Kind {
         let reader = Reader::new(ID, parameters, &known)?;
         // Terms not given are not there, and are not reported as zeros.
         let terms: Vec<usize> = (0..TERMS.len()).filter(|&k| reader.has(TERMS[k])).collect();
+        if terms.is_empty() {
+            return Err(EffectError::MissingParameter {
+                effect: ID,
+                name: "a term of the lens: k0 to k3, p1, p2, b1, b2, t1 or t2",
+            });
+        }
         let values = terms
             .iter()
             .map(|&k| reader.required(TERMS[k]))

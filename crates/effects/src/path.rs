@@ -9,20 +9,9 @@
 
 use focal_plane::{AttitudeSource, Camera, rotation_vector};
 use nalgebra::{UnitQuaternion, Vector3};
+use star_tracker::GAUSS_LEGENDRE_8;
 
 use crate::StarRows;
-
-/// Gauss-Legendre nodes and weights on [-1, 1], exact to degree 15 (Abramowitz & Stegun, Table 25.4).
-pub(crate) const GAUSS_LEGENDRE_8: [(f64, f64); 8] = [
-    (-0.960_289_856_497_536_2, 0.101_228_536_290_376_26),
-    (-0.796_666_477_413_626_7, 0.222_381_034_453_374_47),
-    (-0.525_532_409_916_329, 0.313_706_645_877_887_3),
-    (-0.183_434_642_495_649_8, 0.362_683_783_378_362),
-    (0.183_434_642_495_649_8, 0.362_683_783_378_362),
-    (0.525_532_409_916_329, 0.313_706_645_877_887_3),
-    (0.796_666_477_413_626_7, 0.222_381_034_453_374_47),
-    (0.960_289_856_497_536_2, 0.101_228_536_290_376_26),
-];
 
 /// Mean turn of the tracker from `t_s` to an exposure of `exposure_s` about `t_s + shift_s`, rad, tracker axes:
 /// the mean of `log( q(t + shift + s) q(t)^-1 )`. `None` where `source` does not know the path. `hint` is that of

@@ -92,11 +92,6 @@ impl Stages {
             spike: self.spike | other.spike,
         }
     }
-
-    /// Whether anything before the pinhole differs from the plain `v = q u`.
-    pub const fn before_pinhole(self) -> bool {
-        self.direction | self.instant | self.exposure | self.attitude | self.tracker_direction
-    }
 }
 
 /// Something that a measurement suffers beyond the declared model.

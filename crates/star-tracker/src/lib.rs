@@ -66,6 +66,7 @@ pub use error::TrackerError;
 pub use hem::{Hem, HemState, k0, k0_as_printed};
 pub use noise::TemporalNoise;
 pub use pbm::{Pbm, Scratch};
+pub use quadrature::GAUSS_LEGENDRE_8;
 pub use rows::{Measured, Rows};
 pub use solve::solve_frames;
 pub use star_field::{CatalogueTracking, FieldStar, StarField, replacement_box};
