@@ -77,7 +77,7 @@ const REMAINDER: f64 = 0.05;
 const SLOW_SHARE: f64 = 0.2;
 
 /// What is looked for.
-pub(crate) struct Quest<'a> {
+pub(crate) struct Inquiry<'a> {
     /// Effects that may be named.
     pub(crate) candidates: &'a dyn Fn() -> Vec<Arc<dyn Candidate>>,
     /// Terms that describe, beside a slow error of the reference or not.
@@ -95,7 +95,7 @@ pub(crate) struct Quest<'a> {
     pub(crate) sight: Option<&'a OnCentroids>,
 }
 
-/// What a quest ends with.
+/// What a inquiry ends with.
 pub(crate) enum Outcome<'a> {
     Named(Box<Named<'a>>),
     /// What was found takes the light elsewhere, whatever may speak against it.
@@ -137,15 +137,15 @@ struct Standing<'a> {
 pub(crate) fn run<'a>(
     white: &StarEvidence<'a>,
     folds: &Folds,
-    quest: &Quest<'_>,
+    inquiry: &Inquiry<'_>,
 ) -> Result<Outcome<'a>, CloseError> {
-    let mut so_far = SoFar::begin(white, folds, quest)?;
+    let mut so_far = SoFar::begin(white, folds, inquiry)?;
     for number in 0.. {
         let last = number == MOST_REFUSALS;
         let beside = white.keeping(&so_far.kept);
-        let candidates = (quest.candidates)();
+        let candidates = (inquiry.candidates)();
         let may = so_far.may_be_named(&candidates);
-        let sight = quest.sight.filter(|_| number == 0);
+        let sight = inquiry.sight.filter(|_| number == 0);
         let start = so_far.start;
         let (mut searched, outdone) = match attempt(&beside, folds, candidates, &may, start, sight)?
         {
@@ -154,12 +154,12 @@ pub(crate) fn run<'a>(
         };
         let level = searched.evidence.as_ref().unwrap_or(&beside);
         searched.found = joined(level, folds, searched.found, &may)?;
-        so_far.see(&searched.found, number, &quest.surroundings);
+        so_far.see(&searched.found, number, &inquiry.surroundings);
         let mut round = Round {
             white,
             beside,
             folds,
-            quest,
+            inquiry,
             last,
             may,
             outdone,

@@ -18,7 +18,8 @@
 //! image_level        whether dark map and spots explain what raw windows show
 //! questions          what else it could be, what would tell, and what somebody asks by name
 //! unexplained        what no effect explains: lines, jumps, waves on the detector
-//! figures            findings turned into the report
+//! findings           what was found and considered, turned into the report
+//! follows            what the leftover follows
 //! noise_level        whether what is left is as loud as declared
 //! motion  bins       whether samples resolve a motion; long series as means over short stretches
 //! ```
@@ -35,7 +36,8 @@ mod conventions;
 mod declared;
 mod error;
 mod evidence;
-mod figures;
+mod findings;
+mod follows;
 mod gaps;
 mod image_level;
 mod motion;
@@ -44,6 +46,7 @@ mod noise_level;
 mod outcome;
 mod power;
 mod questions;
+mod residual_size;
 mod search;
 mod situation;
 mod star;
@@ -52,7 +55,8 @@ mod unexplained;
 
 pub use close::{close, close_asking};
 pub use error::CloseError;
-pub use figures::CONFUSABLE;
+pub use findings::CONFUSABLE;
+pub use follows::is_beyond_chance;
 pub use noise_level::{noise_ratio, times};
 pub use outcome::{Closed, Rival};
 pub use questions::hypothesis::{NEXT_TO_NEVER, Questions, of_size, p_is};

@@ -45,6 +45,7 @@ use crate::search::selection::{FAMILY_ALPHA, columns_of};
 use crate::situation::Situation;
 use crate::star::data::StarData;
 use crate::star::evidence::StarEvidence;
+use density::DECLARED;
 pub(crate) use follows::{NoiseFollows, noise_follows};
 use judge::{Judged, Known, judge};
 use quick::Quick;
@@ -113,7 +114,7 @@ impl NoiseEffects {
         };
         for entry in &mut self.considered {
             entry.needed = match entry.id.as_str() {
-                MAGNITUDE => steepest(wanted, &grown),
+                MAGNITUDE => gentlest(wanted, &grown),
                 RATE => Some((wanted / mean(&|r| rate[r])).sqrt()),
                 OUTLIERS => Some(wanted / (SPIKE * SPIKE * mean(&|r| declared[r]))),
                 _ => None,
@@ -193,19 +194,39 @@ pub(crate) fn in_declared_sigmas(
     Some(squares.filter(|s| s.is_finite()).sum())
 }
 
-/// Declared outliers: share and size.
-fn declared_outliers(situation: &Situation<'_>) -> Result<Option<[f64; 2]>, CloseError> {
-    let mut found = None;
+/// Declared outliers: share and size of each kind.
+fn declared_outliers(situation: &Situation<'_>) -> Result<[[f64; 2]; DECLARED], CloseError> {
+    let mut declared = Vec::new();
     for effect in declared::effects(situation)? {
         if effect.id() == OUTLIERS {
             let value = |name: &str| {
                 let all = effect.parameters();
                 all.iter().find(|p| p.name == name).map_or(0.0, |p| p.value)
             };
-            found = Some([value("rate"), value("size_arcsec")]);
+            declared.push([value("rate"), value("size_arcsec")]);
         }
     }
-    Ok(found)
+    Ok(of_few_kinds(declared))
+}
+
+/// Spikes of any number of kinds as those of [`DECLARED`]: the nearest in size are one, of their mean square.
+fn of_few_kinds(mut declared: Vec<[f64; 2]>) -> [[f64; 2]; DECLARED] {
+    declared.retain(|[share, _]| *share > 0.0);
+    declared.sort_by(|a, b| a[1].total_cmp(&b[1]));
+    while declared.len() > DECLARED {
+        let ratio = |k: &usize| declared[k + 1][1] / declared[*k][1];
+        let near = (0..declared.len() - 1).min_by(|a, b| ratio(a).total_cmp(&ratio(b)));
+        let k = near.unwrap_or(0);
+        let [more, larger] = declared.remove(k + 1);
+        let [share, size] = declared[k];
+        let square = (share * size * size + more * larger * larger) / (share + more);
+        declared[k] = [share + more, square.sqrt()];
+    }
+    let mut out = [[0.0; 2]; DECLARED];
+    out.iter_mut()
+        .zip(declared)
+        .for_each(|(out, kind)| *out = kind);
+    out
 }
 
 /// Largest noise of a rate that nature makes, arcsec/(deg/s): of a spot that is smeared over the longest exposure any
@@ -299,7 +320,7 @@ pub(crate) fn claim(
 }
 
 /// The gentlest slope of either sign at which `gain` reaches `wanted`, by halving.
-fn steepest(wanted: f64, gain: &dyn Fn(f64) -> f64) -> Option<f64> {
+fn gentlest(wanted: f64, gain: &dyn Fn(f64) -> f64) -> Option<f64> {
     let side = |sign: f64| {
         if gain(sign * STEEPEST) < wanted {
             return None;

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-use closed_loop::{CONFUSABLE, Closed, NEEDED_SIGMA, p_is};
+use closed_loop::{CONFUSABLE, Closed, NEEDED_SIGMA, is_beyond_chance, p_is};
 use telemetry::report::{
     Confusable, ConsideredEffect, Dependence, Errors, Report, Selector, listed,
 };
@@ -337,16 +337,17 @@ fn leftover(out: &mut String, report: &Report) {
         return;
     }
     let noise = &left.noise_depends_on;
-    if left.depends_on.iter().any(is_certain) && left.depends_on != *noise {
+    if left.depends_on.iter().any(is_beyond_chance) && left.depends_on != *noise {
         line!(
             out,
             "What is left follows (share of its variance, out of fold):"
         );
-        follows(out, &left.depends_on);
+        let told = left.depends_on.iter().filter(|d| is_beyond_chance(d));
+        follows(out, told.collect());
     }
     if !noise.is_empty() {
         line!(out, "The noise level follows (rms change of its variance):");
-        follows(out, noise);
+        follows(out, noise.iter().collect());
     }
     let list = |values: &[f64]| -> String {
         let texts: Vec<String> = values.iter().copied().map(number).collect();
@@ -361,13 +362,8 @@ fn leftover(out: &mut String, report: &Report) {
     }
 }
 
-/// Whether that is beyond chance: where nothing is, what comes nearest is listed in the report.
-pub(crate) fn is_certain(d: &Dependence) -> bool {
-    d.p_value < 0.01 && d.variance_explained > 0.0
-}
-
-fn follows(out: &mut String, list: &[Dependence]) {
-    let told: Vec<_> = list.iter().filter(|d| is_certain(d)).take(5).collect();
+fn follows(out: &mut String, mut told: Vec<&Dependence>) {
+    told.truncate(5);
     let width = column(told.iter().map(|d| d.variable.as_str()), 34);
     for d in told {
         line!(
@@ -517,7 +513,8 @@ mod tests {
             p_value: 1e-6,
         };
         let mut out = String::new();
-        follows(&mut out, &[of(long), of("rate")]);
+        let all = [of(long), of("rate")];
+        follows(&mut out, all.iter().collect());
         let at: Vec<_> = out.lines().map(|row| row.find('%')).collect();
         assert!(at[0].is_some() && at[0] == at[1], "{out}");
     }

@@ -19,10 +19,12 @@ use crate::attitude::motion_terms;
 use crate::attitude::spatial_errors::SpatialErrors;
 use crate::error::CloseError;
 use crate::evidence::Residuals;
-use crate::figures;
+use crate::findings;
+use crate::follows;
 use crate::outcome::{Closed, Rival};
 use crate::questions::hypothesis::{self, Grounds};
 use crate::questions::needed::ToExplain;
+use crate::residual_size;
 use crate::search::Found;
 use crate::search::orbits::Look;
 use crate::search::refusal::Refused;
@@ -89,7 +91,7 @@ pub(super) fn finish(
     let power = power(f)?;
     let share = power.share_left();
     // what is left is judged before a term without a cause is added
-    let mut unattributed = figures::unattributed(found, share, |c| !motion_terms::is_of_motion(c));
+    let mut unattributed = follows::unattributed(found, share, |c| !motion_terms::is_of_motion(c));
     let with = |g: usize| f.residuals(&[f.chosen(), &[g]].concat());
     let own = f.own_slow();
     let described = by_axes(data, found, &plain, &with, own, share, &mut unattributed)?;
@@ -114,7 +116,7 @@ pub(super) fn finish(
         alone,
         length: &|column, _| lengths[column],
     };
-    let mut considered = figures::considered(found, &to_explain, f.refused, &surroundings);
+    let mut considered = findings::considered(found, &to_explain, f.refused, &surroundings);
     if let Some(look) = look {
         look.tell(&mut considered);
     }
@@ -138,7 +140,7 @@ pub(super) fn finish(
     let outliers = outlier.iter().filter(|o| **o).count();
     let report = Report {
         format: telemetry::report::REPORT_FORMAT.to_owned(),
-        verdict: figures::verdict(&effects, unattributed.present),
+        verdict: findings::verdict(&effects, unattributed.present),
         folds: f.folds.count,
         rows: Rows {
             used: data.t_s.len() - outliers,
@@ -186,7 +188,7 @@ fn errors(data: &AttitudeData, residual: &Residuals) -> Errors {
     Errors {
         star_rms_arcsec: None,
         attitude_rms_arcsec: Some(std::array::from_fn(|a| {
-            figures::rms(&residual.axes[a], &data.outlier[a]).unwrap_or(f64::NAN)
+            residual_size::rms(&residual.axes[a], &data.outlier[a]).unwrap_or(f64::NAN)
         })),
         log_psd_cost: None,
         chi2_per_dof: None,

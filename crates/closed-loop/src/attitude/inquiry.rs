@@ -20,9 +20,9 @@ use crate::bins;
 use crate::causes::SMEAR;
 use crate::error::CloseError;
 use crate::evidence::Residuals;
-use crate::figures;
 use crate::motion::{self, Around};
 use crate::outcome::Rival;
+use crate::residual_size;
 use crate::search::Found;
 use crate::search::catalogue;
 use crate::search::empirical::{Empirical, Variable, range};
@@ -38,7 +38,7 @@ const LIKELY: f64 = 0.5;
 const FINEST: usize = 20_000;
 
 /// What is looked for.
-pub(super) struct Quest<'q> {
+pub(super) struct Inquiry<'q> {
     pub(super) situation: &'q Situation<'q>,
     /// Of the rows, not of their means.
     pub(super) folds: &'q Folds,
@@ -73,7 +73,7 @@ struct PutForward {
     bins: Option<usize>,
 }
 
-impl Quest<'_> {
+impl Inquiry<'_> {
     /// Searches the catalogue, what the leftover may follow, and what was put forward.
     pub(super) fn search(
         &self,
@@ -211,7 +211,9 @@ impl Quest<'_> {
             rivals.push(Rival {
                 what: names(found, &set),
                 rms_arcsec: (0..3)
-                    .map(|a| figures::rms(&residual.axes[a], &data.outlier[a]).unwrap_or(f64::NAN))
+                    .map(|a| {
+                        residual_size::rms(&residual.axes[a], &data.outlier[a]).unwrap_or(f64::NAN)
+                    })
                     .collect(),
                 delta_loglik: gain,
             });

@@ -10,7 +10,8 @@ use crate::attitude::data::AttitudeData;
 use crate::attitude::search;
 use crate::error::CloseError;
 use crate::evidence::Residuals;
-use crate::figures;
+use crate::follows;
+use crate::residual_size;
 use crate::search::Found;
 use crate::unexplained::SEARCH_ALPHA;
 
@@ -36,7 +37,9 @@ pub(super) fn by_axes(
     // what the axes share hides what is one axis' own
     let squares = |r: &Residuals| -> [f64; 3] {
         let (axes, outlier) = data.mixing.mix_rows(&r.axes, &data.outlier);
-        std::array::from_fn(|a| figures::rms(&axes[a], &outlier[a]).map_or(0.0, |rms| rms * rms))
+        std::array::from_fn(|a| {
+            residual_size::rms(&axes[a], &outlier[a]).map_or(0.0, |rms| rms * rms)
+        })
     };
     let before = squares(plain);
     let whole: f64 = before.iter().sum();
@@ -44,8 +47,8 @@ pub(super) fn by_axes(
     let mut all = std::mem::take(&mut unattributed.depends_on);
     tell_at_own_noise(found, &mut all);
     for mut entry in all {
-        let term = figures::certain(&entry)
-            .then(|| figures::term_of(found, &entry))
+        let term = follows::is_beyond_chance(&entry)
+            .then(|| follows::term_of(found, &entry))
             .flatten();
         if let Some(g) = term {
             let after = squares(&with(g)?);
@@ -61,7 +64,7 @@ pub(super) fn by_axes(
         kept.push(entry);
     }
     if most > 0.0 {
-        kept.retain(figures::certain);
+        kept.retain(follows::is_beyond_chance);
     }
     kept.sort_by(|a, b| b.variance_explained.total_cmp(&a.variance_explained));
     unattributed.present = most > 0.0;
@@ -86,7 +89,7 @@ fn tell_at_own_noise(found: &Found, told: &mut Vec<Dependence>) {
             p_value,
         };
         match told.iter_mut().find(|d| d.variable == entry.variable) {
-            Some(known) if figures::certain(known) => {}
+            Some(known) if follows::is_beyond_chance(known) => {}
             Some(known) => *known = entry,
             None => told.push(entry),
         }
@@ -116,7 +119,7 @@ pub(super) fn slow_leftover(
             ..noise
         };
         let loglik = |n: &Coloured| n.log_likelihood(&data.bins.t_s, &means, count);
-        let square = figures::rms(&after.axes[axis], &data.outlier[axis])
+        let square = residual_size::rms(&after.axes[axis], &data.outlier[axis])
             .map_or(0.0, |r| (r * r - mean * mean).max(f64::MIN_POSITIVE));
         whole += square;
         // what the declared model makes by itself is not left over
@@ -146,7 +149,7 @@ pub(super) fn slow_leftover(
         p_value: ChiSquared::new(6.0).map_or(1.0, |law| law.sf(2.0 * gain)),
     };
     unattributed.depends_on.insert(0, entry);
-    unattributed.depends_on.retain(figures::certain);
+    unattributed.depends_on.retain(follows::is_beyond_chance);
     unattributed
         .depends_on
         .sort_by(|a, b| b.variance_explained.total_cmp(&a.variance_explained));

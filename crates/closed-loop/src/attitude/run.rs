@@ -12,9 +12,9 @@ use crate::attitude::data::AttitudeData;
 use crate::attitude::declared_effects;
 use crate::attitude::finish::{Finish, finish};
 use crate::attitude::fitted::{evidence, residuals};
+use crate::attitude::inquiry::Inquiry;
 use crate::attitude::mixing::Mixing;
 use crate::attitude::noise::declared_noise;
-use crate::attitude::quest::Quest;
 use crate::attitude::search::Declared;
 use crate::attitude::spatial_errors::SpatialErrors;
 use crate::bins;
@@ -70,7 +70,7 @@ pub(crate) fn run(
     progress("searching for causes");
     let scene = scene(situation, &data);
     let changes = SpatialErrors::declared(situation, &data.t_s);
-    let quest = Quest {
+    let inquiry = Inquiry {
         situation,
         folds: &folds,
         scene: &scene,
@@ -80,14 +80,14 @@ pub(crate) fn run(
             noise: declared_noise(situation)?,
         },
     };
-    let mut searched = quest.search(&data, &around, &[])?;
-    let steady = quest.steadier(&data, reference, &around, &searched);
+    let mut searched = inquiry.search(&data, &around, &[])?;
+    let steady = inquiry.steadier(&data, reference, &around, &searched);
     let motion = steady.as_ref().unwrap_or(&around);
     if steady.is_some() {
         progress("searching again along the path less the reference's slow error");
-        searched = quest.search(&data, motion, &[])?;
+        searched = inquiry.search(&data, motion, &[])?;
     }
-    if let Some(again) = quest.again(&mut data, motion, &searched, progress)? {
+    if let Some(again) = inquiry.again(&mut data, motion, &searched, progress)? {
         searched = again;
     }
     if steady.is_some() && !searched.is_smeared() {
@@ -97,7 +97,7 @@ pub(crate) fn run(
     let found = &searched.found;
     let evidence = evidence(&data, situation, searched.noise, motion);
     let after = residuals(&evidence, &folds, found, &found.selection.chosen)?;
-    let rivals = quest.rivals(&data, motion, &searched)?;
+    let rivals = inquiry.rivals(&data, motion, &searched)?;
     progress("figures");
     let whole = Finish {
         situation,

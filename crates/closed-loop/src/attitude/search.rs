@@ -30,7 +30,7 @@ use crate::attitude::motion_terms::is_of_motion;
 use crate::attitude::spatial_errors::SpatialErrors;
 use crate::error::CloseError;
 use crate::evidence::Evidence;
-use crate::figures;
+use crate::residual_size;
 use crate::search::empirical::EMPIRICAL;
 use crate::search::group::open_beside;
 use crate::search::refusal::{Refusal, Refused};
@@ -327,7 +327,7 @@ impl<'a, 'd> Trial<'a, 'd> {
         let amplitudes = amplitudes(self.fitted, self.folds, chosen, columns)?;
         let evidence = (self.with_noise)(self.noise);
         let residual = evidence.residuals(rows, &borrowed(self.candidates), &amplitudes);
-        let rms = |a: usize| figures::rms(&residual.axes[a], &self.data.outlier[a]);
+        let rms = |a: usize| residual_size::rms(&residual.axes[a], &self.data.outlier[a]);
         Some([rms(0)?, rms(1)?, rms(2)?].map(|r| r * r))
     }
 }

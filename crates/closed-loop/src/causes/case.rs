@@ -40,20 +40,20 @@ impl<'r, 'a> Case<'r, 'a> {
         inside: Option<&'r [Vec<f64>]>,
         so_far: &mut SoFar,
     ) -> Result<Self, CloseError> {
-        let (quest, level, found) = (round.quest, round.level(), &round.searched.found);
+        let (inquiry, level, found) = (round.inquiry, round.level(), &round.searched.found);
         // what an orbit that is too fast is held against
         let turns = so_far.found_terms.iter().any(Empirical::turns_to_and_fro);
         if !turns && (0..found.selection.chosen.len()).any(|k| round.is_too_fast(k)) {
             so_far.found_terms.extend(terms::turning(level.data));
         }
-        let usual = (quest.terms)(round.searched.wander.is_some());
+        let usual = (inquiry.terms)(round.searched.wander.is_some());
         let sought = inside.map_or_else(Vec::new, |inside| terms::sought(level, inside, &usual));
         let all = so_far.with_found(usual, &sought);
         Ok(Self {
             round,
             inside,
             constants: Constants::of(level, found, inside),
-            described: Described::new(level, round.folds, found, all, quest.ways)?,
+            described: Described::new(level, round.folds, found, all, inquiry.ways)?,
             sought,
             estimate: OnceCell::new(),
         })

@@ -35,7 +35,7 @@ use statrs::distribution::{ContinuousCDF, Gamma};
 use telemetry::report::{Dependence, Unattributed};
 
 use crate::causes::recurrence;
-use crate::figures;
+use crate::follows;
 use crate::star::data::StarData;
 use crate::star::frame_rotation::{Turn, Turns, counts, rotation_row};
 
@@ -115,7 +115,7 @@ impl Slow {
     pub(crate) fn tell(&self, unattributed: &mut Unattributed, left: f64) {
         let share = self.stars.max(0.0);
         let first = unattributed.depends_on.first();
-        let known = figures::largest(&unattributed.depends_on);
+        let known = follows::largest(&unattributed.depends_on);
         // the logarithm of a chance is half a square, and slow noise makes squares larger
         let certain = |d: &Dependence| {
             let p = d.p_value.powf(self.inflation().recip());
@@ -130,7 +130,7 @@ impl Slow {
             return;
         }
         // terms say more of the phase than that every star follows it by itself
-        let said = |d: &Dependence| figures::certain(d) && d.variable.contains(PHASE);
+        let said = |d: &Dependence| follows::is_beyond_chance(d) && d.variable.contains(PHASE);
         let list = &mut unattributed.depends_on;
         if unattributed.present
             && self.comes_back.is_some()

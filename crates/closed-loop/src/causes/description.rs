@@ -14,7 +14,7 @@ use std::sync::{Arc, OnceLock};
 
 use crate::causes::changing_effect::{Changing, Inner, Way};
 use crate::error::CloseError;
-use crate::figures::{self, Followed};
+use crate::follows::{self, Followed};
 use crate::search::empirical::{Empirical, Variable};
 use crate::search::group::Group;
 use crate::search::selection::{FAMILY_ALPHA, Judgement, columns_of, costs, each};
@@ -174,7 +174,7 @@ impl Described {
             .collect();
         let tried = terms.len();
         let each = each(self.fitted.scalars);
-        let mut told = figures::follows(&self.fitted.fits, &set, &terms, tried, each, left);
+        let mut told = follows::follows(&self.fitted.fits, &set, &terms, tried, each, left);
         self.stars_before_their_constants(&set, &mut told.depends_on);
         told
     }
@@ -258,8 +258,8 @@ impl Described {
             of_many: false,
             scanned: 0.0,
         };
-        let whole = figures::follows(fits, set, &[term], tried, 0.0, 1.0);
-        let Some(entry) = whole.depends_on.into_iter().find(figures::certain) else {
+        let whole = follows::follows(fits, set, &[term], tried, 0.0, 1.0);
+        let Some(entry) = whole.depends_on.into_iter().find(follows::is_beyond_chance) else {
             return;
         };
         let at = list.iter().position(|d| d.variable == name);
@@ -281,7 +281,10 @@ pub(crate) fn offer(
     terms: Vec<Empirical>,
     surroundings: &Surroundings<'_>,
 ) -> Result<(), CloseError> {
-    let mut certain = left.depends_on.iter().filter(|d| figures::certain(d));
+    let mut certain = left
+        .depends_on
+        .iter()
+        .filter(|d| follows::is_beyond_chance(d));
     let Some(term) = certain.find_map(|d| {
         let mut of_name = terms.iter().filter(|t| t.name() == d.variable);
         of_name.find(|t| t.is_declarable(surroundings))

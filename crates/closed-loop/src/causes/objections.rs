@@ -18,7 +18,7 @@ use crate::causes::stand_ins::{Known, stand_ins};
 use crate::causes::star_constants::Constants;
 use crate::causes::{DOUBT, SMEAR, wanders};
 use crate::error::CloseError;
-use crate::figures;
+use crate::residual_size;
 use crate::search::misplaced::{MISPLACED, piled};
 use crate::search::refusal::Refusal;
 use crate::search::selection::{columns_of, costs};
@@ -57,7 +57,7 @@ pub(super) fn in_place_of_wander(
     let Some(wander) = round.searched.wander.as_ref() else {
         return Ok(false);
     };
-    let mut all = (round.quest.terms)(false);
+    let mut all = (round.inquiry.terms)(false);
     let terms = wanders::terms(beside.data, wander, case.inside, &beside.weight);
     all.extend(terms);
     let plain = Described::new(beside, folds, &round.searched.found, all, &[])?;
@@ -176,7 +176,7 @@ fn worse(
     }
     let power = |set: &[usize]| -> Result<f64, CloseError> {
         let left = found.left_out_of_fold(level, folds, set)?;
-        Ok(figures::star_power(&left, level.data))
+        Ok(residual_size::star_power(&left, level.data))
     };
     let all = power(chosen)?;
     if all < WORSE * power(&[])? {
@@ -195,14 +195,14 @@ fn worse(
 /// Whether the effects that are found without a slow error of the reference explain as much as any
 /// description.
 fn suffice(round: &Round<'_, '_>) -> Result<bool, CloseError> {
-    let (level, folds, quest) = (&round.beside, round.folds, round.quest);
-    let candidates = (quest.candidates)();
+    let (level, folds, inquiry) = (&round.beside, round.folds, round.inquiry);
+    let candidates = (inquiry.candidates)();
     let Attempt::Searched(searched, _) =
         attempt(level, folds, candidates, &round.may, Start::White, None)?
     else {
         return Ok(false);
     };
-    let described = Described::new(level, folds, &searched.found, (quest.terms)(false), &[])?;
+    let described = Described::new(level, folds, &searched.found, (inquiry.terms)(false), &[])?;
     let nothing = Known {
         is_no_orbit: &|_| false,
         one_star: &|_, _| false,

@@ -1,11 +1,11 @@
-//! One search of the quest, beside what is kept.
+//! One search of the inquiry, beside what is kept.
 //!
 //! Not physics: what a search was given, and what came of it.
 
 use block_regression::Folds;
 use effects::Candidate;
 
-use crate::causes::Quest;
+use crate::causes::Inquiry;
 use crate::causes::commonness::{self, Slow};
 use crate::error::CloseError;
 use crate::search::Found;
@@ -22,7 +22,7 @@ pub(super) struct Round<'r, 'a> {
     /// The same with what is kept.
     pub(super) beside: StarEvidence<'a>,
     pub(super) folds: &'r Folds,
-    pub(super) quest: &'r Quest<'r>,
+    pub(super) inquiry: &'r Inquiry<'r>,
     /// Whether its outcome is taken as it is.
     pub(super) last: bool,
     /// Which candidates may be named.
@@ -46,13 +46,13 @@ impl<'a> Round<'_, 'a> {
 
     /// Whether that is an orbit that nature does not have.
     pub(super) fn is_too_fast(&self, place: usize) -> bool {
-        is_too_fast(self.chosen(place), &self.quest.surroundings)
+        is_too_fast(self.chosen(place), &self.inquiry.surroundings)
     }
 
-    /// Where what was found takes the light, if the quest is to follow it.
+    /// Where what was found takes the light, if the inquiry is to follow it.
     pub(super) fn elsewhere(&self) -> Result<Option<Box<Elsewhere>>, CloseError> {
         let choice = self.searched.found.choice();
-        match self.quest.lands.filter(|_| choice.moves_light()) {
+        match self.inquiry.lands.filter(|_| choice.moves_light()) {
             Some(phase) => Elsewhere::of(self.level(), self.folds, choice, phase),
             None => Ok(None),
         }

@@ -12,9 +12,9 @@ use crate::causes::changing_effect::{Changing, Inner};
 use crate::causes::description::{Described, Kept, Part};
 use crate::causes::invariance::Change;
 use crate::causes::rest::{looked_for, whole};
-use crate::causes::{Named, Outcome, Quest, Standing};
+use crate::causes::{Inquiry, Named, Outcome, Standing};
 use crate::error::CloseError;
-use crate::figures;
+use crate::findings;
 use crate::questions::needed::ToExplain;
 use crate::search::empirical::Empirical;
 use crate::search::refusal::{Refusal, Refused};
@@ -52,13 +52,13 @@ impl SoFar {
     pub(super) fn begin(
         white: &StarEvidence<'_>,
         folds: &Folds,
-        quest: &Quest<'_>,
+        inquiry: &Inquiry<'_>,
     ) -> Result<Self, CloseError> {
         let alone = white.data.free_attitude || white.residuals.len() != 1;
         let start = if alone {
             Start::White
         } else {
-            search::start(white, folds, &quest.reference)?
+            search::start(white, folds, &inquiry.reference)?
         };
         Ok(Self::new(start))
     }
@@ -77,7 +77,7 @@ impl SoFar {
         }
         if number == 0 {
             let nothing = ToExplain::NOTHING;
-            self.oversize = figures::considered(found, &nothing, &Refused::new(), surroundings);
+            self.oversize = findings::considered(found, &nothing, &Refused::new(), surroundings);
             self.oversize.retain(|c| c.refused.is_some());
         }
     }

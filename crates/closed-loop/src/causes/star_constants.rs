@@ -24,7 +24,7 @@ use telemetry::report::{Dependence, Unattributed};
 use crate::causes::commonness::IN_TIME;
 use crate::causes::description::{Described, Part};
 use crate::causes::stand_ins::BY_FAR;
-use crate::figures;
+use crate::follows;
 use crate::search::selection::columns_of;
 use crate::search::{Found, without};
 use crate::star::data::StarData;
@@ -268,7 +268,7 @@ impl<'a> Constants<'a> {
             p_value,
         });
         before.extend(behind);
-        unattributed.variance_fraction = Some(left * figures::largest(&before));
+        unattributed.variance_fraction = Some(left * follows::largest(&before));
         unattributed.depends_on = before;
     }
 }

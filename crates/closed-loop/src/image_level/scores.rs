@@ -11,8 +11,8 @@ use statrs::distribution::StudentsT;
 use super::Step;
 use crate::error::CloseError;
 use crate::evidence::Evidence;
-use crate::figures;
 use crate::outcome::Rival;
+use crate::residual_size;
 use crate::search::selection::{FAMILY_ALPHA, columns_of};
 use crate::search::{Fitted, amplitudes, borrowed, fit};
 use crate::star::data::StarData;
@@ -130,7 +130,7 @@ pub(super) fn score<'a>(
             let residual = evidence.residuals(folds, &borrowed(phase), &amplitudes);
             rivals.push(Rival {
                 what,
-                rms_arcsec: figures::star_rms(&residual, data).to_vec(),
+                rms_arcsec: residual_size::star_rms(&residual, data).to_vec(),
                 delta_loglik: loglik,
             });
             Ok(())

@@ -14,6 +14,11 @@
 use super::rows::Row;
 use super::variance::{LEVEL, MAGNITUDE, NO_SHARE, PARAMETERS, PER_MAG, RATE, SHARE, SIZE};
 
+/// Kinds of declared spikes, each of its own size.
+pub(super) const DECLARED: usize = 2;
+/// No spike, one, and those that are declared.
+const COMPONENTS: usize = 2 + DECLARED;
+
 /// The model at a point: what all rows share.
 pub(super) struct There {
     pub(super) level: f64,
@@ -21,10 +26,10 @@ pub(super) struct There {
     pub(super) slope: f64,
     /// Variance per squared rate.
     pub(super) rate: f64,
-    /// Shares of rows without a spike, with one, and with a declared one.
-    pub(super) share: [f64; 3],
+    /// Shares of rows without a spike, with one, and with a declared one of each kind.
+    pub(super) share: [f64; COMPONENTS],
     /// What a spike adds to the variance.
-    pub(super) more: [f64; 3],
+    pub(super) more: [f64; COMPONENTS],
 }
 
 /// Rows side by side.
@@ -77,9 +82,9 @@ impl<const N: usize> Lanes<N> {
 pub(super) struct Densities<const N: usize> {
     pub(super) exponent: [f64; N],
     pub(super) factor: [f64; N],
-    pub(super) posterior: [[f64; N]; 3],
+    pub(super) posterior: [[f64; N]; COMPONENTS],
     /// One over the variance of each component.
-    inverse: [[f64; N]; 3],
+    inverse: [[f64; N]; COMPONENTS],
 }
 
 impl There {
@@ -93,11 +98,11 @@ impl There {
         let mut out = Densities {
             exponent: [0.0; N],
             factor: [0.0; N],
-            posterior: [[0.0; N]; 3],
-            inverse: [[0.0; N]; 3],
+            posterior: [[0.0; N]; COMPONENTS],
+            inverse: [[0.0; N]; COMPONENTS],
         };
         // relative to the widest component, which no square makes impossible
-        let spikes = (1..3).filter(|&k| self.share[k] > 0.0);
+        let spikes = (1..COMPONENTS).filter(|&k| self.share[k] > 0.0);
         let most = spikes.map(|k| self.more[k]).fold(0.0, f64::max);
         let mut variance = [0.0; N];
         let mut widest = [0.0; N];
@@ -106,7 +111,7 @@ impl There {
             widest[l] = 1.0 / (variance[l] + most * rows.shows[l]);
             out.exponent[l] = -rows.half[l] * widest[l];
         }
-        for k in (0..3).filter(|&k| self.share[k] > 0.0) {
+        for k in (0..COMPONENTS).filter(|&k| self.share[k] > 0.0) {
             let (inverse, part) = (&mut out.inverse[k], &mut out.posterior[k]);
             let mut relative = [1.0; N];
             if self.more[k] < most {
@@ -137,7 +142,7 @@ impl There {
         rows: &Lanes<N>,
         density: &Densities<N>,
     ) -> [[f64; N]; PARAMETERS] {
-        let [rest, rho, _] = self.share;
+        let [rest, rho, ..] = self.share;
         let of_others = rho / rest.max(NO_SHARE);
         let mut out = [[0.0; N]; PARAMETERS];
         for l in 0..N {
@@ -146,7 +151,7 @@ impl There {
                 density.posterior[k][l] * (rows.half[l] * inverse - 1.0) * inverse * rows.there[l]
             };
             let spike = slope(1);
-            let all = slope(0) + spike + slope(2);
+            let all = slope(0) + spike + (2..COMPONENTS).map(slope).sum::<f64>();
             let share = density.posterior[1][l] - density.posterior[0][l] * of_others;
             out[LEVEL][l] = all * rows.own[l];
             out[MAGNITUDE][l] = all * rows.own[l] * PER_MAG * rows.mag[l];

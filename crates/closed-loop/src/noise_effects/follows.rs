@@ -20,7 +20,7 @@ use super::rows::{Row, Source, squared_rates};
 use super::squares::{Columns, Judged, MIN_ROWS, Table, both};
 use super::{NoiseEffects, declared_variance};
 use crate::error::CloseError;
-use crate::figures::first_of_each;
+use crate::follows::first_of_each;
 use crate::search::empirical::{Scale, Variable};
 use crate::situation::Situation;
 use crate::star::data::StarData;

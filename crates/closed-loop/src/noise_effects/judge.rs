@@ -28,6 +28,7 @@ use std::cell::OnceCell;
 use block_regression::{Folds, beyond};
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
 
+use super::density::DECLARED;
 use super::rate_by_star;
 use super::rivals::Rival;
 use super::rows::Row;
@@ -170,8 +171,8 @@ pub(super) struct Known<'a> {
     pub(super) least_slope: f64,
     /// Largest noise of a rate that nature makes, arcsec/(deg/s).
     pub(super) most_rate: f64,
-    /// Declared share and size.
-    pub(super) outliers: Option<[f64; 2]>,
+    /// Declared shares and sizes.
+    pub(super) outliers: [[f64; 2]; DECLARED],
     /// What the noise may follow in place of the rate.
     pub(super) rivals: &'a [Rival<'a>],
 }

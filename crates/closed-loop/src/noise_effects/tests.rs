@@ -3,6 +3,7 @@ use rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal, StudentT, Uniform};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
+use super::density::DECLARED;
 use super::judge::{Judged, Known, Verdicts, judge};
 use super::rivals::Rival;
 use super::rows::Row;
@@ -29,7 +30,7 @@ const KNOWN: Known<'_> = Known {
     moving: true,
     least_slope: super::SLOPE_OF_NONE,
     most_rate: 300.0,
-    outliers: None,
+    outliers: [[0.0; 2]; DECLARED],
     rivals: &[],
 };
 
@@ -338,7 +339,7 @@ fn the_size_of_no_spikes_leaves_the_others_their_covariance() {
             marked: false,
         })
         .collect();
-    let model = Model::new(&rows, None);
+    let model = Model::new(&rows, [[0.0; 2]; DECLARED]);
     let mut free = [false; PARAMETERS];
     (free[LEVEL], free[SHARE], free[SIZE]) = (true, true, true);
     let at = model.plain(&rows);
@@ -506,4 +507,19 @@ fn moving_rows(
         }
     }
     rows
+}
+
+/// A model that was closed twice declares spikes twice: both kinds count, and of more than two the nearest in size are
+/// one.
+#[test]
+fn every_declared_kind_of_spikes_counts() {
+    let rate = |k: usize| [0.02, 0.01, 0.03][k];
+    let size = |k: usize| [5.0, 50.0, 60.0][k];
+    let kinds = |n: usize| super::of_few_kinds((0..n).rev().map(|k| [rate(k), size(k)]).collect());
+    assert_eq!(kinds(0), [[0.0; 2]; DECLARED]);
+    assert_eq!(kinds(2), [[0.02, 5.0], [0.01, 50.0]]);
+    let [small, large] = kinds(3);
+    assert_eq!(small, [0.02, 5.0]);
+    // (0.01 50^2 + 0.03 60^2) / 0.04
+    assert!((large[0] - 0.04).abs() < 1e-12 && (large[1].powi(2) - 3325.0).abs() < 1e-9);
 }

@@ -2,11 +2,11 @@
 //!
 //! ```text
 //! v    = e^a V 10^(0.4 b (m - 5)) + w R^2             V declared variance, R rate in deg/s
-//! q/v ~ chi2_2 with weight 1 - rho - rho_0,   q/(v + S^2) ~ chi2_2 with rho,   q/(v + S_0^2) with rho_0
+//! q/v ~ chi2_2 with weight 1 - rho - sum rho_d,   q/(v + S^2) ~ chi2_2 with rho,   q/(v + S_d^2) with rho_d
 //! ln L = sum ln sum_c pi_c exp(-q / 2 v_c) / v_c
 //! ```
 //!
-//! `a`, the noise level itself, is always free. `rho_0, S_0` are the outliers that
+//! `a`, the noise level itself, is always free. `rho_d, S_d` are the outliers that
 //! the model declares. The covariance of the estimates comes from sums of scores
 //! over clusters: blocks of time, or stars,
 //!
@@ -25,7 +25,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, SMatrix, SVector};
 use pulp::{Arch, NullaryFnOnce};
 use rayon::prelude::*;
 
-use super::density::{Lanes, Levels, There};
+use super::density::{DECLARED, Lanes, Levels, There};
 use super::rows::Row;
 use super::squares::SPIKE;
 
@@ -69,8 +69,8 @@ const PAIRS: usize = PARAMETERS * (PARAMETERS + 1) / 2;
 pub(super) struct Model {
     /// Usual variance per axis, arcsec^2.
     variance: f64,
-    /// Outliers that are declared: share and variance.
-    declared: Option<[f64; 2]>,
+    /// Outliers that are declared: share and variance of each kind.
+    declared: [[f64; 2]; DECLARED],
 }
 
 /// Log-likelihood, gradient, and sum of the outer products of the rows' gradients.
@@ -200,7 +200,7 @@ pub(super) fn information(folds: &[Without], fit: &Fit, k: usize) -> Vec<f64> {
 }
 
 impl Model {
-    pub(super) fn new(rows: &[Row], declared: Option<[f64; 2]>) -> Self {
+    pub(super) fn new(rows: &[Row], declared: [[f64; 2]; DECLARED]) -> Self {
         let mut ratio: Vec<f64> = rows
             .iter()
             .filter(|r| !r.marked)
@@ -246,13 +246,13 @@ impl Model {
     /// The model at a point.
     fn there(&self, at: &Vector) -> There {
         let share = sigmoid(at[SHARE]);
-        let [declared, s0] = self.declared.unwrap_or([0.0, 0.0]);
+        let [[first, s1], [second, s2]] = self.declared;
         There {
             level: at[LEVEL],
             slope: PER_MAG * at[MAGNITUDE],
             rate: at[RATE],
-            share: [1.0 - share - declared, share, declared],
-            more: [0.0, at[SIZE].exp(), s0],
+            share: [1.0 - share - first - second, share, first, second],
+            more: [0.0, at[SIZE].exp(), s1, s2],
         }
     }
 

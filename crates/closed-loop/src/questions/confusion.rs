@@ -15,7 +15,7 @@ use effects::Candidate;
 use nalgebra::{DMatrix, UnitQuaternion};
 use telemetry::report::{FoundEffect, Selector, listed};
 
-use crate::figures::{amplitudes_of, most_alike, told};
+use crate::findings::{amplitudes_of, most_alike, told};
 use crate::questions::manoeuvre::{Flown, Pair, recommend};
 use crate::search::selection::columns_of;
 use crate::search::{Found, without};

@@ -20,7 +20,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 use telemetry::report::{ConsideredEffect, FoundEffect, Hypothesis, HypothesisSize, RefusedSize};
 
 use crate::error::CloseError;
-use crate::figures::told;
+use crate::findings::told;
 use crate::noise_level::times;
 use crate::questions::needed::ToExplain;
 use crate::questions::told::Told;

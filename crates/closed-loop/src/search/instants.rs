@@ -74,7 +74,7 @@ pub(crate) fn complete(
                 }
                 continue;
             }
-            let (values, _) = crate::figures::amplitudes_of(found, g, &set, &estimate);
+            let (values, _) = crate::findings::amplitudes_of(found, g, &set, &estimate);
             let slope = Slope::of(candidate, j, SHARE * parameter.step, values);
             slopes.extend(slope.map(|s| (k, parameter.name, s)));
         }

@@ -27,7 +27,7 @@ use telemetry::report::ConsideredEffect;
 
 use crate::error::CloseError;
 use crate::evidence::Evidence;
-use crate::figures::amplitudes_from;
+use crate::findings::amplitudes_from;
 use crate::search::selection::columns_of;
 use crate::search::{Fitted, Found, fit};
 use crate::unexplained::leftover::Track;

@@ -18,13 +18,14 @@ use crate::causes::commonness::Slow;
 use crate::causes::description::Described;
 use crate::error::CloseError;
 use crate::evidence::Residuals;
-use crate::figures;
+use crate::findings;
 use crate::image_level::ImageLevel;
 use crate::noise_effects;
 use crate::noise_level::noise_ratio;
 use crate::outcome::Closed;
 use crate::questions::hypothesis::{self, Grounds};
 use crate::questions::needed::{ToExplain, length_beside};
+use crate::residual_size;
 use crate::search::orbits::Look;
 use crate::search::refusal::Refused;
 use crate::search::selection::columns_of;
@@ -122,7 +123,7 @@ impl Finish<'_> {
 
     /// `model` is the declared one, or that with what was added.
     fn errors(&self, model: &Model, best: &AtBest, attitude: Option<[f64; 3]>) -> Errors {
-        let rms = figures::star_rms(&best.residual, self.data);
+        let rms = residual_size::star_rms(&best.residual, self.data);
         Errors {
             star_rms_arcsec: Some(rms),
             attitude_rms_arcsec: attitude,
@@ -224,7 +225,7 @@ pub(crate) fn finish(
     let [attitude_before, attitude_after] = tables::attitude_rms(attitude.as_ref());
     let report = Report {
         format: telemetry::report::REPORT_FORMAT.to_owned(),
-        verdict: figures::verdict(&effects, unattributed.present),
+        verdict: findings::verdict(&effects, unattributed.present),
         folds: f.folds.count,
         rows,
         // the rest of it is told by whoever knows the rows that are none here

@@ -23,7 +23,7 @@ use spectra::standing_out::mark;
 
 use crate::attitude::spatial_errors::SpatialErrors;
 use crate::bins::{self, Bins};
-use crate::figures;
+use crate::follows;
 use crate::star::data::StarData;
 use crate::star::frame_rotation::rotation_row;
 use crate::unexplained::SEARCH_ALPHA;
@@ -86,7 +86,7 @@ impl Leftover {
         }
         if !unattributed.present {
             // what chance does as well is not named beside it
-            unattributed.depends_on.retain(figures::certain);
+            unattributed.depends_on.retain(follows::is_beyond_chance);
         }
         unattributed.present = true;
         unattributed.lines_hz = self.lines_hz;

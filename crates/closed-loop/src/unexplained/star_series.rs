@@ -28,7 +28,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
 use telemetry::report::Unattributed;
 
 use crate::causes::commonness::{self, IN_TIME, MOSTLY, stars_first};
-use crate::figures;
+use crate::follows;
 use crate::star::data::StarData;
 use crate::unexplained::around::Around;
 use crate::unexplained::grid::{Grid, coherent_s, top};
@@ -107,7 +107,7 @@ impl OwnSeries {
         let share = unattributed.variance_fraction.unwrap_or(0.0);
         unattributed.variance_fraction = Some(share.max(self.explained * left));
         let list = &mut unattributed.depends_on;
-        let known = figures::largest(list);
+        let known = follows::largest(list);
         if self.explained < MOSTLY * known {
             return;
         }

@@ -1,13 +1,13 @@
 //! The report in tables: errors, effects, rivals, what was not added, what is left.
 
-use closed_loop::{CONFUSABLE, Closed};
+use closed_loop::{CONFUSABLE, Closed, is_beyond_chance};
 use telemetry::report::{ConsideredEffect, Dependence, Errors, Estimate, FoundEffect, Report};
 
 use super::Page;
 use super::write::{Cell, datum, escaped, step};
 use crate::number::{change, hertz, p_is, percent, probability, short, short_to, with_sigma};
 use crate::order::by_number;
-use crate::text::{is_certain, selectors};
+use crate::text::selectors;
 use crate::why_not::why_not;
 
 /// Variables that are told where nothing follows any.
@@ -399,7 +399,7 @@ pub(super) fn leftover(page: &mut Page, report: &Report) {
             )
         });
         let follows = left.depends_on.iter().chain(&left.noise_depends_on);
-        let first = match (left.present, follows.clone().any(is_certain)) {
+        let first = match (left.present, follows.clone().any(is_beyond_chance)) {
             (true, true) => "Something is left that follows a variable and that no effect explains.",
             (true, false) => "Something is left in time that follows no variable and that no effect explains.",
             (false, _) => "Nothing is left that follows any variable: the rest behaves as noise.",

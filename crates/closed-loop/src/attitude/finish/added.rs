@@ -11,10 +11,12 @@ use telemetry::report::{FoundEffect, Unattributed};
 use crate::attitude::finish::Finish;
 use crate::error::CloseError;
 use crate::evidence::Residuals;
-use crate::figures;
+use crate::findings;
+use crate::follows;
 use crate::power::Power;
 use crate::questions::confusion;
 use crate::questions::manoeuvre::attitudes::fly;
+use crate::residual_size;
 use crate::search::{instants, orbits};
 
 /// Mean squares over all axes.
@@ -28,7 +30,7 @@ pub(super) fn power(f: &Finish<'_>) -> Result<Power, CloseError> {
 
 fn of_residual(f: &Finish<'_>, residual: &Residuals) -> f64 {
     (0..3)
-        .filter_map(|a| figures::rms(&residual.axes[a], &f.data().outlier[a]))
+        .filter_map(|a| residual_size::rms(&residual.axes[a], &f.data().outlier[a]))
         .map(|v| v * v)
         .sum()
 }
@@ -55,7 +57,7 @@ impl Added {
         let mut groups = f.chosen().to_vec();
         let mut after = plain.clone();
         if questions.empirical
-            && let Some(g) = figures::best_empirical(found, unattributed, &surroundings)
+            && let Some(g) = follows::best_empirical(found, unattributed, &surroundings)
         {
             groups.push(g);
             after = f.residuals(&groups)?;
@@ -63,7 +65,7 @@ impl Added {
         }
         let explained = power.explained(with_term);
         let (mut effects, entries) =
-            figures::effects_found(found, &groups, &explained, &surroundings, questions)?;
+            findings::effects_found(found, &groups, &explained, &surroundings, questions)?;
         if effects.is_empty() {
             // nothing was added: constants that coloured noise weighs otherwise are no gain, and no loss
             after.clone_from(f.before);

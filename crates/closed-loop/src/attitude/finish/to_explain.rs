@@ -8,8 +8,8 @@ use crate::attitude::data::{AttitudeData, AttitudeEvidence};
 use crate::attitude::finish::Finish;
 use crate::attitude::noise::fit_whole_noise;
 use crate::evidence::Residuals;
-use crate::figures;
 use crate::questions::needed::remarkable;
+use crate::residual_size;
 use crate::search::{Found, borrowed};
 
 /// What is left, and what there was, arcsec^2; `plain` is what the chosen leave out of fold.
@@ -56,7 +56,7 @@ fn beyond_white(data: &AttitudeData, residual: &Residuals) -> Option<f64> {
     for axis in 0..3 {
         let rows: f64 = data.count[axis].iter().sum();
         let white = noise[axis].white * noise[axis].white;
-        let square = figures::rms(&residual.axes[axis], &data.outlier[axis])?.powi(2);
+        let square = residual_size::rms(&residual.axes[axis], &data.outlier[axis])?.powi(2);
         if let Some(excess) = remarkable(rows * (square - white), white, rows) {
             *whole.get_or_insert(0.0) += excess;
         }
@@ -74,7 +74,7 @@ fn unexplained(
     let square = |r: &Residuals| -> f64 {
         let axis = |a: usize| {
             let rows: f64 = data.count[a].iter().sum();
-            Some(rows * figures::rms(&r.axes[a], &data.outlier[a])?.powi(2))
+            Some(rows * residual_size::rms(&r.axes[a], &data.outlier[a])?.powi(2))
         };
         (0..3).filter_map(axis).sum()
     };

@@ -21,7 +21,7 @@ use telemetry::report::FoundEffect;
 use super::{ABERRATION, period_s, velocities};
 use crate::error::CloseError;
 use crate::evidence::Evidence;
-use crate::figures::amplitudes_from;
+use crate::findings::amplitudes_from;
 use crate::search::selection::columns_of;
 use crate::search::{Found, fit, without};
 

@@ -11,11 +11,11 @@ use effects::{Candidate, Scene};
 use crate::causes::changing_effect::Way;
 use crate::causes::description::{self, Described};
 use crate::causes::terms;
-use crate::causes::{self, Named, Outcome, Quest};
+use crate::causes::{self, Inquiry, Named, Outcome};
 use crate::declared;
 use crate::error::CloseError;
-use crate::figures;
 use crate::motion::{self, Around};
+use crate::residual_size;
 use crate::search::catalogue;
 use crate::search::orbits::{self, Look};
 use crate::star::data::StarData;
@@ -60,7 +60,7 @@ impl<'g, 'a> Ground<'g, 'a> {
         scene: &'g Scene<'g>,
     ) -> Result<Self, CloseError> {
         let (situation, data) = (begun.situation, level.data);
-        let rms = figures::star_rms(&begun.settled.before, data);
+        let rms = residual_size::star_rms(&begun.settled.before, data);
         Ok(Self {
             begun,
             level,
@@ -157,7 +157,7 @@ impl<'g, 'a> Ground<'g, 'a> {
             list.extend(put_forward.iter().cloned());
             list
         };
-        let quest = Quest {
+        let inquiry = Inquiry {
             candidates: &candidates,
             terms: &|wander| {
                 let yields = self.yields && (!wander || self.accelerates());
@@ -169,7 +169,7 @@ impl<'g, 'a> Ground<'g, 'a> {
             lands: lands.then_some(phase),
             sight: (lands && known.landings == LANDINGS).then_some(phase),
         };
-        causes::run(self.level, folds, &quest)
+        causes::run(self.level, folds, &inquiry)
     }
 
     /// The reference, or its path without its slow error.

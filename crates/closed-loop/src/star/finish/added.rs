@@ -8,11 +8,13 @@ use telemetry::report::{FoundEffect, Unattributed};
 
 use crate::error::CloseError;
 use crate::evidence::Residuals;
-use crate::figures;
+use crate::findings;
+use crate::follows;
 use crate::image_level;
 use crate::power::Power;
 use crate::questions::confusion;
 use crate::questions::manoeuvre::stars::Sky;
+use crate::residual_size;
 use crate::search::instants;
 use crate::search::orbits::images;
 use crate::search::selection::columns_of;
@@ -33,7 +35,7 @@ pub(super) fn power(f: &Finish<'_>, plain: &Residuals) -> Result<Power, CloseErr
 }
 
 fn of_residual(f: &Finish<'_>, residual: &Residuals) -> f64 {
-    figures::star_power(residual, f.data)
+    residual_size::star_power(residual, f.data)
 }
 
 /// What was added.
@@ -60,7 +62,7 @@ impl Added {
         let mut groups = f.found.selection.chosen.clone();
         let mut with_term = None;
         if questions.empirical
-            && let Some(g) = figures::best_empirical(f.found, unattributed, &surroundings)
+            && let Some(g) = follows::best_empirical(f.found, unattributed, &surroundings)
         {
             groups.push(g);
             let left = f.residuals(&groups)?;
@@ -68,7 +70,7 @@ impl Added {
         }
         let explained = power.explained(with_term.as_ref().map(|left| of_residual(f, left)));
         let (mut effects, entries) =
-            figures::effects_found(f.found, &groups, &explained, &surroundings, questions)?;
+            findings::effects_found(f.found, &groups, &explained, &surroundings, questions)?;
         tell_apart(f, &mut effects);
         images::complete(f.level, f.folds, f.found, &surroundings, &mut effects)?;
         instants::complete(

@@ -4,7 +4,7 @@
 
 use telemetry::report::{ConsideredEffect, FoundEffect, Unattributed};
 
-use crate::figures;
+use crate::findings;
 use crate::image_level;
 use crate::power::Power;
 use crate::questions::needed::{self, ToExplain};
@@ -33,7 +33,7 @@ pub(super) fn list(
     effects: &[FoundEffect],
 ) -> Vec<ConsideredEffect> {
     let surroundings = f.situation.surroundings();
-    let mut considered = figures::considered(f.found, to_explain, f.refused, &surroundings);
+    let mut considered = findings::considered(f.found, to_explain, f.refused, &surroundings);
     if let Some(orbit) = &f.orbit {
         orbit.tell(&mut considered);
     }

@@ -9,7 +9,7 @@ use crate::causes::slow_left;
 use crate::causes::star_constants::Constants;
 use crate::causes::terms;
 use crate::error::CloseError;
-use crate::figures;
+use crate::findings;
 use crate::image_level::ImageLevel;
 use crate::noise_effects::{self, NoiseEffects, NoiseFollows};
 use crate::power::Power;
@@ -152,7 +152,7 @@ impl Left {
 /// What no variable predicts may be an effect that changes with one.
 fn tell_change(f: &Finish<'_>, power: &Power, unattributed: &mut Unattributed) {
     if !unattributed.present
-        && let Some(change) = figures::changing(f.found, f.refused)
+        && let Some(change) = findings::changing(f.found, f.refused)
     {
         unattributed.present = true;
         unattributed.variance_fraction =

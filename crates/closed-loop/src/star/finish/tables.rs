@@ -5,7 +5,7 @@
 use telemetry::{AttitudeResiduals, DarkMap, StarResiduals};
 
 use crate::evidence::Residuals;
-use crate::figures;
+use crate::residual_size;
 use crate::star::finish::Finish;
 use crate::star::own_attitude;
 
@@ -27,7 +27,7 @@ pub(super) fn attitude(
 /// Its rms before and after, arcsec.
 pub(super) fn attitude_rms(attitude: Option<&AttitudeResiduals>) -> [Option<[f64; 3]>; 2] {
     let rms = |series: &[Vec<f64>; 3], outlier: &[bool]| {
-        std::array::from_fn(|a| figures::rms(&series[a], outlier).unwrap_or(f64::NAN))
+        std::array::from_fn(|a| residual_size::rms(&series[a], outlier).unwrap_or(f64::NAN))
     };
     [
         attitude.map(|a| rms(&a.before_arcsec, &a.outlier)),
