@@ -45,6 +45,14 @@ impl Described {
         terms.unwrap_or_default()
     }
 
+    /// The same without what stands at an instant or a place that was looked for.
+    pub(crate) fn smooth_terms_left(&self) -> Vec<Arc<dyn Candidate>> {
+        let smooth = |(k, _): &Part| !self.terms[*k].term.is_looked_for();
+        let parts = self.rest().map(|(_, parts)| parts.clone());
+        let parts: Vec<Part> = parts.into_iter().flatten().filter(smooth).collect();
+        whole(self, parts)
+    }
+
     /// Whether these are of the time alone.
     pub(super) fn is_of_time(&self, parts: &[Part]) -> bool {
         parts.iter().all(|(k, _)| self.terms[*k].term.is_of_time())

@@ -139,6 +139,8 @@ struct Given<'a> {
     /// The same, or where there are no magnitudes the flux that was measured.
     light: Ranged,
     rate: Option<Ranged>,
+    /// Its size.
+    speed: Option<Ranged>,
     acceleration: Option<Ranged>,
     channels: Vec<Ranged>,
 }
@@ -181,6 +183,11 @@ impl<'a> Given<'a> {
             flux,
             light,
             rate: motion(Variable::Rate, &data.velocity),
+            speed: moves.then(|| {
+                let [x, y] = &data.velocity;
+                let sizes = x.iter().zip(y).map(|(x, y)| x.hypot(*y));
+                (Variable::Rate, about_mean(sizes))
+            }),
             acceleration: motion(Variable::Acceleration, &data.acceleration)
                 .filter(|_| acceleration),
             channels: channels.collect(),
@@ -246,11 +253,16 @@ impl<'a> Given<'a> {
         for of in &self.phase {
             pairs.extend(self.position.iter().map(|by| (of, by)));
         }
+        // a spot that smears flattens its pixel phase
+        if let Some(speed) = &self.speed {
+            pairs.extend(self.phase.iter().map(|of| (of, speed)));
+        }
         // charge is held back in proportion to it, the more the farther it is moved
         pairs.extend(self.position.iter().map(|of| (of, &self.flux)));
         if let Some(rate) = &self.rate {
+            // a clock drifts with its temperature
             let by = self.position.iter();
-            let by = by.chain([&self.time, &self.mag, &self.colour]);
+            let by = by.chain(scalars.iter().copied());
             pairs.extend(by.map(|by| (rate, by)));
         }
         for of in [&self.mag, &self.colour] {

@@ -143,8 +143,9 @@ impl Empirical {
             return None;
         }
         if !term.is_of_many() {
-            // a size that hardly changes, times the time, is the time
-            let has_size = term.is_of_motion() && !matches!(by, Variable::Time);
+            // a size that hardly changes, times the time or a channel, is the time or the channel
+            let whole = matches!(by, Variable::Time | Variable::Housekeeping(..));
+            let has_size = term.is_of_motion() && !whole;
             let of_size = if has_size { BENT - SIZE } else { 0 };
             term.coefficients.truncate(OF_A_PAIR + of_size);
         }
@@ -325,6 +326,11 @@ impl Empirical {
         } else if n == FIELDS * ORDERS {
             // what bends alone, and the scale
             parts.extend([vec![4, 5], (4..8).collect(), vec![3]]);
+            if matches!(self.variable, Variable::Housekeeping(..)) {
+                // one field, however it bends: a camera turns about one axis
+                let bent = |field: usize| (field..n).step_by(FIELDS).collect();
+                parts.extend((0..FIELDS).map(bent));
+            }
         }
         parts.push((0..n).collect());
         parts

@@ -28,14 +28,16 @@ use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
 use telemetry::report::Unattributed;
 
 use crate::causes::commonness::{self, IN_TIME, MOSTLY, stars_first};
-use crate::follows;
+use crate::follows::{self, is_beyond_chance};
 use crate::star::data::StarData;
 use crate::unexplained::around::Around;
 use crate::unexplained::grid::{Grid, coherent_s, top};
 use crate::unexplained::star_freedom::Freedom;
 use by_place::by_place;
+use own::Own;
 
 mod by_place;
+mod own;
 
 /// Chance that either is told although there is none.
 const ALPHA: f64 = 0.001;
@@ -57,8 +59,6 @@ const USUAL: Around = Around {
     count: 12,
     guard: 2,
 };
-/// Points on each side of a step.
-const MIN_SIDE: usize = 8;
 /// Sums of squares have wider tails than chi-squared.
 const WIDER: f64 = 1.3;
 /// Steps of the samples within which two jumps are one.
@@ -73,6 +73,8 @@ const SLOW_SHARE: f64 = 0.2;
 pub(crate) struct OwnSeries {
     pub(crate) line_hz: Option<f64>,
     pub(crate) jump_s: Option<f64>,
+    /// What is smooth takes more of the stars than that jump.
+    drifts: bool,
     /// Lines nearer to each other are one, and so are jumps.
     bin_hz: f64,
     apart_s: f64,
@@ -86,7 +88,10 @@ impl OwnSeries {
     /// Writes it where it is reported; the stars' own time is what is left unless it is known what
     /// they follow. `left` is the share of the before variance that is left.
     pub(crate) fn tell(&self, unattributed: &mut Unattributed, left: f64) {
-        if self.line_hz.is_none() && self.jump_s.is_none() {
+        // where the variables tell of a drift
+        let told = unattributed.depends_on.iter().any(is_beyond_chance);
+        let jump = self.jump_s.filter(|_| !(self.drifts && told));
+        if self.line_hz.is_none() && jump.is_none() {
             return;
         }
         // what the stars do may be in the mean of them, too: the same line is listed once
@@ -97,7 +102,7 @@ impl OwnSeries {
         lines.sort_by(f64::total_cmp);
         let jumps = &mut unattributed.jumps_s;
         let new = |t: &f64| jumps.iter().all(|s| (t - s).abs() > self.apart_s);
-        let jump = self.jump_s.filter(new);
+        let jump = jump.filter(new);
         jumps.extend(jump);
         jumps.sort_by(f64::total_cmp);
         if !unattributed.present {
@@ -120,26 +125,15 @@ impl OwnSeries {
     }
 }
 
-/// One star's series in units of its noise, both axes.
-struct Own {
-    t_s: Vec<f64>,
-    value: [Vec<f64>; 2],
-    /// Squares of its rows, both axes.
-    rows_squares: f64,
-    /// Rows that a point is the mean of: its variance is one over it.
-    count: Vec<f64>,
-    /// Sums of the rows, and of both axes over them, before each point.
-    before: Vec<f64>,
-    running: [Vec<f64>; 2],
-}
-
 /// Searches what every star has of its `own`: residuals (arcsec, per axis over all rows) less what
-/// its frames are known to have turned by; `alone` forms them less all that the stars of a frame share.
+/// its frames are known to have turned by; `alone` forms them less all that the stars of a frame share. `drift` says
+/// whether what is smooth takes more squares (in units of the noise) of the stars than so many.
 pub(crate) fn search(
     data: &StarData,
     own: &[Vec<f64>],
     alone: impl FnOnce() -> [Vec<f64>; 2],
     weight: &[f64],
+    drift: impl Fn(f64) -> bool,
 ) -> OwnSeries {
     if data.frames_are_unrelated() || data.stars.len() > MOST_STARS {
         return OwnSeries::default();
@@ -200,6 +194,8 @@ pub(crate) fn search(
         (_, Some(t)) => by_place(data, own, weight, |s| [f64::from(u8::from(s > t.at))]),
         _ => Vec::new(),
     };
+    out.drifts =
+        jump.is_some_and(|jump| jump.squares <= bent_squares(&series) || drift(jump.squares));
     out.line_hz = line.map(|l| l.at);
     out.jump_s = jump.map(|j| j.at);
     out
@@ -388,6 +384,13 @@ fn step_at(series: &[Own], freedom: Freedom, t: f64) -> Option<(f64, f64)> {
     Some((law.sf(square * freedom.all / WIDER), square - numbers))
 }
 
+/// Squares that a parabola in time takes of the stars, less those of its numbers: at least 3/4 of a ramp's are a step's,
+/// too, and no more than 4/5 of a step's a parabola's.
+fn bent_squares(series: &[Own]) -> f64 {
+    let bent = |s: &Own| s.sums(&s.parabola()).squares() - 4.0;
+    series.iter().map(bent).sum()
+}
+
 /// Whether the stars are less slow beside a step of each at `t`.
 fn is_no_wander(data: &StarData, own: &[Vec<f64>], t: f64) -> bool {
     let mut beside = own.to_vec();
@@ -411,134 +414,6 @@ fn is_no_wander(data: &StarData, own: &[Vec<f64>], t: f64) -> bool {
     slow(&beside) < LEFT_SLOW * slow(own)
 }
 
-/// Sums of two functions of time over the points of a star, and of their products with each axis.
-#[derive(Clone, Copy, Debug, Default)]
-struct Sums {
-    cc: f64,
-    cs: f64,
-    ss: f64,
-    score: [[f64; 2]; 2],
-}
-
-impl Sums {
-    /// Sizes of the two on each axis; none where they are not told apart.
-    fn sizes(&self) -> [[f64; 2]; 2] {
-        let determinant = self.cc * self.ss - self.cs * self.cs;
-        self.score.map(|[c, s]| {
-            let sizes = [self.ss * c - self.cs * s, self.cc * s - self.cs * c];
-            if determinant > 0.0 {
-                sizes.map(|size| size / determinant)
-            } else {
-                [0.0; 2]
-            }
-        })
-    }
-
-    /// Squares that the two take of both axes.
-    fn squares(&self) -> f64 {
-        let each = self.sizes().into_iter().zip(self.score);
-        each.map(|([a, b], [c, s])| a * c + b * s).sum()
-    }
-}
-
-impl Own {
-    /// With the sums of the rows.
-    fn of(t_s: Vec<f64>, value: [Vec<f64>; 2], count: Vec<f64>, rows_squares: f64) -> Self {
-        let sums = |of: &dyn Fn(usize) -> f64| -> Vec<f64> {
-            let mut all = vec![0.0];
-            for k in 0..count.len() {
-                all.push(all[k] + of(k));
-            }
-            all
-        };
-        Self {
-            before: sums(&|k| count[k]),
-            running: [0, 1].map(|a| sums(&|k| count[k] * value[a][k])),
-            t_s,
-            value,
-            rows_squares,
-            count,
-        }
-    }
-
-    /// Squares that a step at `t` takes of both axes, in units of the noise.
-    fn step_square(&self, t: f64) -> Option<f64> {
-        let at = self.t_s.partition_point(|v| *v < t);
-        if at < MIN_SIDE || at + MIN_SIDE > self.t_s.len() {
-            return None;
-        }
-        let (n, total) = (self.before[at], self.before[self.t_s.len()]);
-        let square = |running: &Vec<f64>| {
-            let low = running[at];
-            let change = (running[self.t_s.len()] - low) / (total - n) - low / n;
-            n * (total - n) / total * change * change
-        };
-        Some(self.running.iter().map(square).sum())
-    }
-
-    /// A cosine and a sine of this frequency, at the points.
-    fn phasors(&self, f: f64) -> Vec<[f64; 2]> {
-        let omega = std::f64::consts::TAU * f;
-        let each = self.t_s.iter().map(|t| omega * (t - self.t_s[0]));
-        each.map(|phase| [phase.cos(), phase.sin()]).collect()
-    }
-
-    /// Squares that a sinusoid of this frequency takes of both axes, in units of the noise.
-    fn power_at(&self, f: f64) -> f64 {
-        self.sums(&self.phasors(f)).squares()
-    }
-
-    /// Sums of two functions of time, at the points.
-    fn sums(&self, at: &[[f64; 2]]) -> Sums {
-        let [x, y] = &self.value;
-        let mut sums = Sums::default();
-        for (i, (&[c, s], n)) in at.iter().zip(&self.count).enumerate() {
-            let (nc, ns) = (n * c, n * s);
-            sums.cc += nc * c;
-            sums.cs += nc * s;
-            sums.ss += ns * s;
-            for (score, value) in sums.score.iter_mut().zip([x[i], y[i]]) {
-                score[0] += nc * value;
-                score[1] += ns * value;
-            }
-        }
-        sums
-    }
-
-    /// Less what two functions of time take of each axis.
-    fn beside(&self, basis: impl Fn(f64) -> [f64; 2]) -> Self {
-        let at: Vec<[f64; 2]> = self.t_s.iter().map(|t| basis(*t)).collect();
-        let sizes = self.sums(&at).sizes();
-        let mut value = self.value.clone();
-        for (value, [a, b]) in value.iter_mut().zip(sizes) {
-            for (v, [c, s]) in value.iter_mut().zip(&at) {
-                *v -= a * c + b * s;
-            }
-        }
-        Self::of(
-            self.t_s.clone(),
-            value,
-            self.count.clone(),
-            self.rows_squares,
-        )
-    }
-
-    /// Squares that a sinusoid takes of both axes, in units of the noise, at the frequencies of
-    /// `grid`. Phasors of all points are turned from one frequency to the next.
-    fn powers(&self, grid: &Grid) -> Vec<f64> {
-        let (mut at, by) = (self.phasors(grid.first_hz), self.phasors(grid.step_hz));
-        (0..grid.bins)
-            .map(|_| {
-                let squares = self.sums(&at).squares();
-                for ([c, s], [bc, bs]) in at.iter_mut().zip(&by) {
-                    (*c, *s) = (*c * bc - *s * bs, *s * bc + *c * bs);
-                }
-                squares
-            })
-            .collect()
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -546,6 +421,7 @@ mod tests {
     use rand_core::SeedableRng;
     use rand_distr::{Distribution, StandardNormal};
     use rand_xoshiro::Xoshiro256PlusPlus;
+    use telemetry::report::Dependence;
 
     /// What is found of six stars for 750 s that do this by themselves, of time and star, in units of their noise;
     /// `alike`: all the same, so that they turn the frame.
@@ -561,7 +437,7 @@ mod tests {
                 .collect()
         });
         let alone = if alike { noise } else { own.clone() };
-        search(&data, &own, || alone, &vec![1.0; rows])
+        search(&data, &own, || alone, &vec![1.0; rows], |_| false)
     }
 
     /// Beyond chance without what the stars share, and of a third of the size at least.
@@ -620,12 +496,45 @@ mod tests {
         }
     }
 
+    /// Stars that drift, each its own way, straight or bent, have no jump beside the variable that tells of it, however
+    /// strong that is: a parabola takes all of it, a step three quarters.
+    #[test]
+    fn a_drift_is_no_jump() {
+        for size in [0.3, 30.0] {
+            for bent in [false, true] {
+                let drift = |t: f64, star: f64| {
+                    let z = t / 750.0;
+                    size * (star - 2.5) * if bent { z * z } else { z }
+                };
+                let found = found(false, drift);
+                let told = |depends_on: &[Dependence]| {
+                    let mut left = Unattributed {
+                        depends_on: depends_on.to_vec(),
+                        ..Unattributed::default()
+                    };
+                    found.tell(&mut left, 1.0);
+                    left.jumps_s.len()
+                };
+                let time = Dependence {
+                    variable: "time".to_owned(),
+                    variance_explained: 0.1,
+                    p_value: 1e-9,
+                };
+                assert_eq!(told(&[time]), 0, "{size}, {bent}");
+                // a faint one is told as it looks where nothing else tells of it; a strong one is as slow beside a step
+                let faint = usize::from(size < 1.0);
+                assert_eq!(told(&[]), faint, "{size}, {bent}");
+            }
+        }
+    }
+
     /// Stars that have no noise have no line, and nothing to hold one against.
     #[test]
     fn stars_of_one_value_have_no_line() {
         let data = at_rest((0..1500).map(|k| 0.5 * f64::from(k)).collect());
         let still = [(); 2].map(|()| vec![0.0; data.t_s.len()]);
-        let found = search(&data, &still, || still.clone(), &vec![1.0; data.t_s.len()]);
+        let weight = vec![1.0; data.t_s.len()];
+        let found = search(&data, &still, || still.clone(), &weight, |_| false);
         assert_eq!((found.line_hz, found.jump_s), (None, None));
     }
 

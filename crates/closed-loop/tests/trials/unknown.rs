@@ -4,8 +4,8 @@ use rand_core::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use scenarios::simulate;
-use telemetry::Bundle;
 use telemetry::report::{Report, Verdict};
+use telemetry::{Bundle, Model};
 
 use crate::kit::{Case, Path, closed, star};
 
@@ -234,5 +234,43 @@ fn a_turn_with_the_time_is_no_orbit_of_unknown_speed() {
             let first = report.unattributed.depends_on.first();
             assert_eq!(first.map(|d| d.variable.as_str()), Some("time"), "{seed}");
         }
+    }
+}
+
+/// The bundle of a case, moved by what the effect `id` shifts times `share` of the time.
+fn moved_by(
+    case: &Case,
+    [id, parameters]: [&str; 2],
+    share: impl Fn(f64) -> f64,
+) -> (Model, Bundle) {
+    let (model, mut bundle) = case.make();
+    // random numbers do not depend on what acts
+    let (_, acting) = case.clone().with(id, parameters).make();
+    let (stars, acting) = (bundle.stars.as_mut(), acting.stars.expect("stars"));
+    let stars = stars.expect("stars");
+    assert_eq!(stars.star_id, acting.star_id);
+    for (row, t_s) in stars.t_of_rows_s().into_iter().enumerate() {
+        let share = share(t_s);
+        stars.x_px[row] += share * (acting.x_px[row] - stars.x_px[row]);
+        stars.y_px[row] += share * (acting.y_px[row] - stars.y_px[row]);
+    }
+    (model, bundle)
+}
+
+/// A clock whose error goes with a temperature: the frames turn to and fro, as those of a reference that errs for some
+/// tens of seconds do. Without the rate times the channel among the terms it was such an error, or nothing.
+#[test]
+fn a_clock_that_drifts_with_its_temperature_is_no_error_of_the_reference() {
+    for seed in 0..3 {
+        let case = Case::new(Path::Nods, 740 + seed);
+        let (model, bundle) = moved_by(&case, ["time_tag_offset", "offset_s = 0.02"], |t_s| {
+            (std::f64::consts::TAU * t_s / 300.0 + 40.0_f64.to_radians()).sin()
+        });
+        let report = closed(&model, &bundle).expect("the loop closes").report;
+        assert!(report.effects.is_empty(), "{seed}: {:?}", report.effects);
+        let first = report.unattributed.depends_on.first();
+        let first = first.map(|d| d.variable.as_str());
+        let wanted = Some("rate*housekeeping:optics_c");
+        assert_eq!(first, wanted, "{seed}: {:?}", report.unattributed);
     }
 }

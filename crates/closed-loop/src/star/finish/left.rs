@@ -119,7 +119,43 @@ fn own_series(f: &Finish<'_>, residual: &[Vec<f64>], turned: &Turned<'_>) -> Own
         [x, y] if free => [x.clone(), y.clone()],
         _ => turned.whole(),
     };
-    star_series::search(f.data, own, alone, &f.level.weight)
+    let drift = |squares| {
+        let smooth = smooth_squares(f);
+        smooth.is_ok_and(|smooth| smooth.is_some_and(|smooth| smooth > squares))
+    };
+    star_series::search(f.data, own, alone, &f.level.weight, drift)
+}
+
+/// Squares, in units of the noise, that the smooth terms of the description take of what the stars do by themselves, less
+/// those of its numbers; `None`: there are none.
+fn smooth_squares(f: &Finish<'_>) -> Result<Option<f64>, CloseError> {
+    let terms = f.described.smooth_terms_left();
+    if terms.is_empty() {
+        return Ok(None);
+    }
+    let numbers: usize = terms.iter().map(|t| t.coefficients().len()).sum();
+    let beside = f.level.keeping(&terms);
+    let found = f.found.refitted(&beside, f.folds)?;
+    let Some((plain, with)) =
+        noise_effects::in_sample(f.level, f.found).zip(noise_effects::in_sample(&beside, &found))
+    else {
+        return Ok(None);
+    };
+    let weight = &f.level.weight;
+    let squares = |residual: &[Vec<f64>]| -> [f64; 2] {
+        let turned = Turned::of(f.data, [&residual[0], &residual[1]], weight);
+        let own = if f.data.free_attitude {
+            residual
+        } else {
+            &turned.known
+        };
+        let square = |r: usize| (own[0][r].powi(2) + own[1][r].powi(2)) * weight[r].powi(2);
+        let rows = (0..f.data.t_s.len()).filter(|&r| !f.data.outlier[r]);
+        let known = rows.map(square).filter(|square| square.is_finite());
+        known.fold([0.0; 2], |[sum, n], square| [sum + square, n + 2.0])
+    };
+    let ([before, _], [after, count]) = (squares(&plain), squares(&with));
+    Ok(Some((before - after) * count / after - numbers as f64))
 }
 
 impl Left {
