@@ -36,6 +36,11 @@ const KNOWN: Known<'_> = Known {
 
 /// 14 stars of magnitude 3 to 5.5 through slews of up to 0.3 deg/s; sigma 2.5 arcsec, declared as 1.
 fn verdicts(seed: u64, frames: usize, truth: Truth) -> Verdicts {
+    verdicts_knowing(seed, frames, truth, KNOWN)
+}
+
+/// The same where this is known.
+fn verdicts_knowing(seed: u64, frames: usize, truth: Truth, known: Known<'_>) -> Verdicts {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
     let uniform = Uniform::new(0.0, 1.0).expect("bounds");
     let stars: Vec<[f64; 2]> = (0..STARS)
@@ -87,7 +92,7 @@ fn verdicts(seed: u64, frames: usize, truth: Truth) -> Verdicts {
             }
         }
     }
-    judge(&|_| rows.clone(), &folds, KNOWN).expect("enough rows")
+    judge(&|_| rows.clone(), &folds, known).expect("enough rows")
 }
 
 /// Claims of slope, rate, spikes.
@@ -524,4 +529,18 @@ fn every_declared_kind_of_spikes_counts() {
     are(2, [[0.02, 5.0], [0.01, 50.0]]);
     // (0.01 50^2 + 0.03 60^2) / 0.04
     are(3, [[0.02, 5.0], [0.04, 3325.0_f64.sqrt()]]);
+    // whichever is declared first, what is declared is not claimed again
+    let truth = Truth {
+        share: 0.01,
+        size: 60.0,
+        ..Truth::default()
+    };
+    let claimed = |outliers| {
+        let known = Known { outliers, ..KNOWN };
+        verdicts_knowing(5, 600, truth, known).outliers.stands
+    };
+    let (declared, others) = ([0.01, 60.0], [0.002, 20.0]);
+    assert!(claimed([[0.0; 2]; DECLARED]));
+    assert!(!claimed([declared, [0.0; 2]]) && !claimed([[0.0; 2], declared]));
+    assert!(!claimed([others, declared]));
 }
