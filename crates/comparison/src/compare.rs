@@ -128,15 +128,15 @@ pub fn compare(
         ));
     }
     let measured = Measured::of(&residual, &lost)?;
+    let against = Against {
+        measured: &measured,
+        draws: settings.draws,
+        progress,
+    };
     let mut flown = vec![];
     let mut compared = vec![];
     for ((flight, model), first) in flights.iter().zip(models.iter().copied()).zip(first) {
-        let by = Against {
-            measured: &measured,
-            draws: settings.draws,
-            progress,
-        };
-        let (figures, standing) = by.fly(flight, model, first, &mut notes)?;
+        let (figures, standing) = against.fly(flight, model, first, &mut notes)?;
         flown.push(figures);
         compared.push(standing);
     }

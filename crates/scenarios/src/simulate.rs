@@ -150,22 +150,13 @@ const INERTIAL: FrameGeometry = FrameGeometry {
 };
 
 fn camera(model: &Model) -> Result<Camera, ScenarioError> {
-    let tracker = &model.tracker;
-    let pixels = tracker.pixels.ok_or(ScenarioError::Missing {
-        name: "tracker.pixels",
-    })?;
-    let camera = match (tracker.fov_deg, tracker.focal_length_px) {
-        (Some(fov_deg), _) => Camera::from_fov_deg(pixels, fov_deg)?,
-        (None, Some(focal_px)) => Camera::from_focal_length_px(pixels, focal_px)?,
-        (None, None) => {
-            return Err(ScenarioError::Missing {
-                name: "tracker.fov_deg or tracker.focal_length_px",
-            });
-        }
-    };
-    Ok(match tracker.pixel_centre {
-        Some(pixel_centre) => camera.with_pixel_centre(pixel_centre)?,
-        None => camera,
+    if model.tracker.pixels.is_none() {
+        return Err(ScenarioError::Missing {
+            name: "tracker.pixels",
+        });
+    }
+    model.camera()?.ok_or(ScenarioError::Missing {
+        name: "tracker.fov_deg or tracker.focal_length_px",
     })
 }
 

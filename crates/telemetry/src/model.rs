@@ -202,13 +202,7 @@ impl Model {
     ///
     /// Values that were changed after reading and no longer make a camera.
     pub fn camera(&self) -> Result<Option<Camera>, CameraError> {
-        camera(&TrackerMeta {
-            pixels: self.tracker.pixels,
-            focal_length_px: self.tracker.focal_length_px,
-            fov_deg: self.tracker.fov_deg,
-            exposure_s: None,
-            pixel_centre: self.tracker.pixel_centre,
-        })
+        self.camera_over(&TrackerMeta::default())
     }
 
     /// The camera of this model over a bundle that describes itself as `meta`: what the model leaves out is the

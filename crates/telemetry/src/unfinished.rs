@@ -41,23 +41,23 @@ impl Unfinished {
     }
 
     /// It stands where it belongs.
-    pub(crate) fn finish(mut self) {
+    pub(crate) fn finish(self) {
         self.forget();
-        self.0 = Remains {
-            partial: PathBuf::new(),
-            made: Vec::new(),
-        };
     }
 
-    fn forget(&self) {
-        all().retain(|other| *other != self.0);
+    /// Whether it was unfinished until now.
+    fn forget(&self) -> bool {
+        let mut all = all();
+        let at = all.iter().position(|other| *other == self.0);
+        at.map(|at| all.swap_remove(at)).is_some()
     }
 }
 
 impl Drop for Unfinished {
     fn drop(&mut self) {
-        self.forget();
-        self.0.remove();
+        if self.forget() {
+            self.0.remove();
+        }
     }
 }
 

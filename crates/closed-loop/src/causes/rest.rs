@@ -41,16 +41,18 @@ impl Described {
 
     /// All of it as terms; none where nothing does.
     pub(crate) fn terms_left(&self) -> Vec<Arc<dyn Candidate>> {
-        let terms = self.rest().map(|(_, parts)| whole(self, parts.clone()));
-        terms.unwrap_or_default()
+        self.terms_left_that(|_| true)
     }
 
     /// The same without what stands at an instant or a place that was looked for.
     pub(crate) fn smooth_terms_left(&self) -> Vec<Arc<dyn Candidate>> {
-        let smooth = |(k, _): &Part| !self.terms[*k].term.is_looked_for();
-        let parts = self.rest().map(|(_, parts)| parts.clone());
-        let parts: Vec<Part> = parts.into_iter().flatten().filter(smooth).collect();
-        whole(self, parts)
+        self.terms_left_that(|term| !term.is_looked_for())
+    }
+
+    fn terms_left_that(&self, may: impl Fn(&Empirical) -> bool) -> Vec<Arc<dyn Candidate>> {
+        let parts = self.rest().into_iter().flat_map(|(_, parts)| parts);
+        let parts = parts.filter(|(k, _)| may(&self.terms[*k].term));
+        whole(self, parts.cloned().collect())
     }
 
     /// Whether these are of the time alone.

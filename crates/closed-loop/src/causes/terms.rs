@@ -41,8 +41,7 @@ type Ranged = (Variable, [f64; 2]);
 /// What an effect may change with.
 pub(crate) fn ways(situation: &Situation<'_>, data: &StarData) -> Vec<Way> {
     let range = |values: &[f64]| range(values.iter().copied());
-    let [vx, vy] = &data.velocity;
-    let rate: Vec<f64> = vx.iter().zip(vy).map(|(x, y)| x.hypot(*y)).collect();
+    let rate: Vec<f64> = sizes(&data.velocity).collect();
     let mut ways = vec![
         Way::With(Variable::Time, range(&data.t_s)),
         Way::Bent(Variable::Time, range(&data.t_s)),
@@ -79,8 +78,7 @@ pub(crate) fn of_noise(situation: &Situation<'_>, data: &StarData) -> Vec<Ranged
             Way::With(variable, range) => Some((variable, range)),
         })
         .collect();
-    let [ax, ay] = &data.acceleration;
-    let size = range(ax.iter().zip(ay).map(|(x, y)| x.hypot(*y)));
+    let size = range(sizes(&data.acceleration));
     if size[1] > size[0] {
         list.push((Variable::Acceleration, size));
     }
@@ -183,11 +181,7 @@ impl<'a> Given<'a> {
             flux,
             light,
             rate: motion(Variable::Rate, &data.velocity),
-            speed: moves.then(|| {
-                let [x, y] = &data.velocity;
-                let sizes = x.iter().zip(y).map(|(x, y)| x.hypot(*y));
-                (Variable::Rate, about_mean(sizes))
-            }),
+            speed: moves.then(|| (Variable::Rate, about_mean(sizes(&data.velocity)))),
             acceleration: motion(Variable::Acceleration, &data.acceleration)
                 .filter(|_| acceleration),
             channels: channels.collect(),
@@ -277,12 +271,16 @@ impl<'a> Given<'a> {
     }
 }
 
+/// How large a motion is, row by row.
+fn sizes([x, y]: &[Vec<f64>; 2]) -> impl Iterator<Item = f64> + Clone + '_ {
+    x.iter().zip(y).map(|(x, y)| x.hypot(*y))
+}
+
 /// What a motion runs over: about its mean size, where that is steady.
-fn motion([x, y]: &[Vec<f64>; 2]) -> [f64; 2] {
-    let [low, high] = range(x.iter().chain(y).copied());
+fn motion(of: &[Vec<f64>; 2]) -> [f64; 2] {
+    let [low, high] = range(of.iter().flatten().copied());
     let largest = low.abs().max(high.abs());
-    let sizes = x.iter().zip(y).map(|(x, y)| x.hypot(*y));
-    let [count, sum, squares] = sizes
+    let [count, sum, squares] = sizes(of)
         .filter(|size| size.is_finite())
         .fold([0.0, 0.0, 0.0], |[n, sum, squares], v| {
             [n + 1.0, sum + v, squares + v * v]

@@ -387,8 +387,7 @@ fn step_at(series: &[Own], freedom: Freedom, t: f64) -> Option<(f64, f64)> {
 /// Squares that a parabola in time takes of the stars, less those of its numbers: at least 3/4 of a ramp's are a step's,
 /// too, and no more than 4/5 of a step's a parabola's.
 fn bent_squares(series: &[Own]) -> f64 {
-    let bent = |s: &Own| s.sums(&s.parabola()).squares() - 4.0;
-    series.iter().map(bent).sum()
+    series.iter().map(|s| s.parabola_square() - 4.0).sum()
 }
 
 /// Whether the stars are less slow beside a step of each at `t`.

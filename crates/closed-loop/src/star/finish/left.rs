@@ -2,6 +2,9 @@
 //!
 //! Not physics: the order of the report.
 
+use std::sync::Arc;
+
+use effects::Candidate;
 use telemetry::report::Unattributed;
 
 use crate::causes::commonness::Slow;
@@ -97,13 +100,32 @@ fn noise_and_slow(
 
 /// What the chosen effects leave in sample beside the description of it, where there is one, arcsec.
 fn beside_description(f: &Finish<'_>) -> Result<Option<Vec<Vec<f64>>>, CloseError> {
-    let terms = f.described.terms_left();
-    if terms.is_empty() || f.level.learned() {
+    if f.level.learned() {
         return Ok(None);
     }
-    let beside = f.level.keeping(&terms);
-    let found = f.found.refitted(&beside, f.folds)?;
-    Ok(noise_effects::in_sample(&beside, &found))
+    beside(f, &f.described.terms_left())
+}
+
+/// The same beside these `terms`, if there are any.
+fn beside(
+    f: &Finish<'_>,
+    terms: &[Arc<dyn Candidate>],
+) -> Result<Option<Vec<Vec<f64>>>, CloseError> {
+    if terms.is_empty() {
+        return Ok(None);
+    }
+    let level = f.level.keeping(terms);
+    let found = f.found.refitted(&level, f.folds)?;
+    Ok(noise_effects::in_sample(&level, &found))
+}
+
+/// A residual less what its frames are known to have turned by: those whose attitudes are free have turned already.
+fn own_of<'r>(f: &Finish<'_>, residual: &'r [Vec<f64>], turned: &'r Turned<'_>) -> &'r [Vec<f64>] {
+    if f.data.free_attitude {
+        residual
+    } else {
+        &turned.known
+    }
 }
 
 /// Lines and jumps that single stars have; `turned` is the residual less its frames' rotations.
@@ -112,49 +134,36 @@ fn own_series(f: &Finish<'_>, residual: &[Vec<f64>], turned: &Turned<'_>) -> Own
     if f.level.learned() {
         return OwnSeries::default();
     }
-    // frames whose attitudes are free have turned already
-    let free = f.data.free_attitude;
-    let own = if free { residual } else { &turned.known };
+    let own = own_of(f, residual, turned);
     let alone = || match residual {
-        [x, y] if free => [x.clone(), y.clone()],
+        [x, y] if f.data.free_attitude => [x.clone(), y.clone()],
         _ => turned.whole(),
     };
     let drift = |squares| {
-        let smooth = smooth_squares(f);
-        smooth.is_ok_and(|smooth| smooth.is_some_and(|smooth| smooth > squares))
+        let smooth = smooth_squares(f, own).ok().flatten();
+        smooth.is_some_and(|smooth| smooth > squares)
     };
     star_series::search(f.data, own, alone, &f.level.weight, drift)
 }
 
-/// Squares, in units of the noise, that the smooth terms of the description take of what the stars do by themselves, less
-/// those of its numbers; `None`: there are none.
-fn smooth_squares(f: &Finish<'_>) -> Result<Option<f64>, CloseError> {
+/// Squares, in units of the noise, that the smooth terms of the description take of what the stars do by themselves, which
+/// is `own`, less those of its numbers; `None`: there are none.
+fn smooth_squares(f: &Finish<'_>, own: &[Vec<f64>]) -> Result<Option<f64>, CloseError> {
     let terms = f.described.smooth_terms_left();
-    if terms.is_empty() {
-        return Ok(None);
-    }
-    let numbers: usize = terms.iter().map(|t| t.coefficients().len()).sum();
-    let beside = f.level.keeping(&terms);
-    let found = f.found.refitted(&beside, f.folds)?;
-    let Some((plain, with)) =
-        noise_effects::in_sample(f.level, f.found).zip(noise_effects::in_sample(&beside, &found))
-    else {
+    let Some(with) = beside(f, &terms)? else {
         return Ok(None);
     };
     let weight = &f.level.weight;
-    let squares = |residual: &[Vec<f64>]| -> [f64; 2] {
-        let turned = Turned::of(f.data, [&residual[0], &residual[1]], weight);
-        let own = if f.data.free_attitude {
-            residual
-        } else {
-            &turned.known
-        };
+    let turned = Turned::of(f.data, [&with[0], &with[1]], weight);
+    let with = own_of(f, &with, &turned);
+    let squares = |own: &[Vec<f64>]| -> [f64; 2] {
         let square = |r: usize| (own[0][r].powi(2) + own[1][r].powi(2)) * weight[r].powi(2);
         let rows = (0..f.data.t_s.len()).filter(|&r| !f.data.outlier[r]);
         let known = rows.map(square).filter(|square| square.is_finite());
         known.fold([0.0; 2], |[sum, n], square| [sum + square, n + 2.0])
     };
-    let ([before, _], [after, count]) = (squares(&plain), squares(&with));
+    let ([before, _], [after, count]) = (squares(own), squares(with));
+    let numbers: usize = terms.iter().map(|t| t.coefficients().len()).sum();
     Ok(Some((before - after) * count / after - numbers as f64))
 }
 

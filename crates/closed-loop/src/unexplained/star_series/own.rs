@@ -20,7 +20,7 @@ pub(super) struct Own {
 
 /// Sums of two functions of time over the points of a star, and of their products with each axis.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Sums {
+struct Sums {
     cc: f64,
     cs: f64,
     ss: f64,
@@ -42,7 +42,7 @@ impl Sums {
     }
 
     /// Squares that the two take of both axes.
-    pub(super) fn squares(&self) -> f64 {
+    fn squares(&self) -> f64 {
         let each = self.sizes().into_iter().zip(self.score);
         each.map(|([a, b], [c, s])| a * c + b * s).sum()
     }
@@ -95,8 +95,13 @@ impl Own {
         each.map(|phase| [phase.cos(), phase.sin()]).collect()
     }
 
+    /// Squares that a parabola in time takes of both axes, in units of the noise.
+    pub(super) fn parabola_square(&self) -> f64 {
+        self.sums(&self.parabola()).squares()
+    }
+
     /// A line and a parabola in time about their means, at the points.
-    pub(super) fn parabola(&self) -> Vec<[f64; 2]> {
+    fn parabola(&self) -> Vec<[f64; 2]> {
         let all: f64 = self.count.iter().sum();
         let mean = |of: &dyn Fn(usize) -> f64| {
             let weighed = self.count.iter().enumerate().map(|(k, n)| n * of(k));
@@ -119,7 +124,7 @@ impl Own {
     }
 
     /// Sums of two functions of time, at the points.
-    pub(super) fn sums(&self, at: &[[f64; 2]]) -> Sums {
+    fn sums(&self, at: &[[f64; 2]]) -> Sums {
         let [x, y] = &self.value;
         let mut sums = Sums::default();
         for (i, (&[c, s], n)) in at.iter().zip(&self.count).enumerate() {
