@@ -22,9 +22,11 @@ mod quick;
 mod rate_by_star;
 mod rivals;
 mod rows;
+mod shared;
 mod squares;
 #[cfg(test)]
 mod tests;
+mod turning;
 mod variance;
 
 use std::collections::BTreeMap;
@@ -50,6 +52,7 @@ pub(crate) use follows::{NoiseFollows, noise_follows};
 use judge::{Judged, Known, judge};
 use quick::Quick;
 use rows::{Row, Source, squared_rates};
+pub(crate) use turning::{Motion, Turning, Varies};
 
 /// Identities in the catalogue.
 const MAGNITUDE: &str = "magnitude_noise";

@@ -336,8 +336,10 @@ fn leftover(out: &mut String, report: &Report) {
     if !left.present {
         return;
     }
-    let noise = &left.noise_depends_on;
-    if left.depends_on.iter().any(is_beyond_chance) && left.depends_on != *noise {
+    let (noise, shared) = (&left.noise_depends_on, &left.shared_noise_depends_on);
+    let of_noise = |d: &Dependence| noise.contains(d) || shared.contains(d);
+    let mut told = left.depends_on.iter().filter(|d| is_beyond_chance(d));
+    if told.any(|d| !of_noise(d)) {
         line!(
             out,
             "What is left follows (share of its variance, out of fold):"
@@ -348,6 +350,13 @@ fn leftover(out: &mut String, report: &Report) {
     if !noise.is_empty() {
         line!(out, "The noise level follows (rms change of its variance):");
         follows(out, noise.iter().collect());
+    }
+    if !shared.is_empty() {
+        line!(
+            out,
+            "The noise that all stars of a frame share follows (rms change of its variance):"
+        );
+        follows(out, shared.iter().collect());
     }
     let list = |values: &[f64]| -> String {
         let texts: Vec<String> = values.iter().copied().map(number).collect();

@@ -182,6 +182,11 @@ fn findings(stars: bool, attitude: bool) -> Report {
                 variance_explained: 0.33,
                 p_value: 2e-7,
             }],
+            shared_noise_depends_on: vec![Dependence {
+                variable: "rate".to_owned(),
+                variance_explained: 0.44,
+                p_value: 3e-8,
+            }],
         },
     }
 }

@@ -346,6 +346,9 @@ pub struct Unattributed {
     /// What the noise level follows, most certain first; shares are rms changes of its variance.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub noise_depends_on: Vec<Dependence>,
+    /// The same of the noise that all stars of a frame share: the reference's, or that of time tags.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub shared_noise_depends_on: Vec<Dependence>,
 }
 
 /// A variable that the leftover follows.

@@ -1,8 +1,9 @@
 //! From what was found at attitude level to the report.
 //!
 //! ```text
-//! added        what each effect explains, and what stands beside it
-//! to_explain   what one effect would have to explain
+//! added          what each effect explains, and what stands beside it
+//! to_explain     what one effect would have to explain
+//! noise_follows  what the noise of what is left follows
 //! ```
 //!
 //! Not physics: the order of the report.
@@ -21,6 +22,7 @@ use crate::error::CloseError;
 use crate::evidence::Residuals;
 use crate::findings;
 use crate::follows;
+use crate::motion::Around;
 use crate::outcome::{Closed, Rival};
 use crate::questions::hypothesis::{self, Grounds};
 use crate::questions::needed::ToExplain;
@@ -31,8 +33,10 @@ use crate::search::refusal::Refused;
 use crate::situation::Situation;
 use crate::unexplained::leftover::Series;
 use added::{Added, power};
+use noise_follows::noise_follows;
 
 mod added;
+mod noise_follows;
 mod to_explain;
 
 /// A slow error of so many times the declared is as declared: over a few correlation times its size is known to
@@ -44,8 +48,7 @@ pub(super) struct Finish<'a> {
     pub(super) situation: &'a Situation<'a>,
     /// Under the noise that suits what was found.
     pub(super) evidence: AttitudeEvidence<'a>,
-    /// Whether the motion is known between the samples.
-    pub(super) resolved: bool,
+    pub(super) motion: &'a Around,
     pub(super) folds: &'a Folds,
     pub(super) found: &'a Found,
     pub(super) refused: &'a Refused,
@@ -102,12 +105,16 @@ pub(super) fn finish(
     } = Added::of(f, &plain, &power, &unattributed)?;
     let mut model = situation.model.clone();
     model.effects.extend(entries);
-    tell_slow(f, &plain, described, share, &mut unattributed);
+    let inside = beside(f, described);
+    let left = inside.as_ref().unwrap_or(&plain);
+    tell_slow(f, left, share, &mut unattributed);
+    let noise = noise_follows(f, left);
     let series = series.unwrap_or_else(|| tracks(data, &plain, f.changes));
     let surroundings = situation.surroundings();
     let reference = situation.reference.as_ref().zip(series.across());
     let look = reference.and_then(|(path, tracks)| Look::at(&surroundings, path, tracks));
     series.describe().tell(&mut unattributed);
+    noise.tell(&mut unattributed);
 
     let lengths = to_explain::column_lengths(&f.evidence, found);
     let [left, alone] = to_explain::squares(f, &plain, &unattributed);
@@ -128,7 +135,7 @@ pub(super) fn finish(
             to_explain: &to_explain,
             something_left: unattributed.present,
             noise_ratio: None,
-            resolved: f.resolved,
+            resolved: f.motion.resolved(),
             unusable: None,
             effects: &effects,
             considered: &considered,
@@ -165,22 +172,19 @@ pub(super) fn finish(
     })
 }
 
-/// Tells what is slow of what is left beside the chosen and the term that it is `described` by.
-fn tell_slow(
-    f: &Finish<'_>,
-    plain: &Residuals,
-    described: Option<usize>,
-    share: f64,
-    unattributed: &mut Unattributed,
-) {
+/// What is left in sample beside the chosen and the term that it is `described` by: what acts in one fold alone is
+/// predicted by no other, and would be slow noise out of fold.
+fn beside(f: &Finish<'_>, described: Option<usize>) -> Option<Residuals> {
+    let told: Vec<usize> = f.chosen().iter().copied().chain(described).collect();
+    f.in_sample(&told)
+}
+
+/// Tells what is slow of what is `left`.
+fn tell_slow(f: &Finish<'_>, left: &Residuals, share: f64, unattributed: &mut Unattributed) {
     let declared = match &f.situation.model.hem {
         Some(hem) => [&hem.x, &hem.y, &hem.z].map(|axis| WIDER * axis.sigma_hsf_arcsec),
         None => f.own_slow(),
     };
-    // what acts in one fold alone is predicted by no other, and would be slow noise out of fold
-    let told: Vec<usize> = f.chosen().iter().copied().chain(described).collect();
-    let inside = f.in_sample(&told);
-    let left = inside.as_ref().unwrap_or(plain);
     slow_leftover(f.data(), left, declared, unattributed, share);
 }
 

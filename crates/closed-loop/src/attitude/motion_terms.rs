@@ -27,6 +27,7 @@ use focal_plane::{ARCSEC_PER_RAD, AttitudeSource, Camera, PointsMut, VectorsMut}
 use nalgebra::Vector3;
 
 use crate::motion::Around;
+use crate::noise_effects;
 use crate::search::empirical::EMPIRICAL;
 
 /// Share of the largest rate below which a direction fades: it has none at rest.
@@ -105,6 +106,25 @@ pub(super) fn terms(around: &Around, t_s: &[f64]) -> Vec<Arc<dyn Candidate>> {
         }));
     }
     terms
+}
+
+/// Rate and acceleration at `t_s`, arcsec/s and arcsec/s^2; NaN where they are not known.
+pub(super) fn motions(around: &Around, t_s: &[f64]) -> [(&'static str, noise_effects::Motion); 2] {
+    let step_s = around.step_s();
+    [(Motion::Rate, 1), (Motion::Acceleration, 2)].map(|(motion, order)| {
+        let at = |&t: &f64| motion.at(around, t, BENT_OVER * step_s);
+        let known = t_s.iter().map(at);
+        let all: Vec<_> = known
+            .map(|m| m.unwrap_or_else(|| Vector3::repeat(f64::NAN)) * ARCSEC_PER_RAD)
+            .collect();
+        let of_attitudes = if around.by_rates() {
+            0.0
+        } else {
+            noise_effects::Motion::error(order, step_s)
+        };
+        let axes = std::array::from_fn(|a| all.iter().map(|m| m[a]).collect());
+        (motion.name(), noise_effects::Motion { axes, of_attitudes })
+    })
 }
 
 /// Whether it is one of these terms.

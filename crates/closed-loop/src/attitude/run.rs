@@ -102,7 +102,7 @@ pub(crate) fn run(
     let whole = Finish {
         situation,
         evidence,
-        resolved: motion.resolved(),
+        motion,
         folds: &folds,
         found,
         refused: &searched.refused,

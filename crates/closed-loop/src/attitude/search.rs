@@ -31,7 +31,7 @@ use crate::attitude::spatial_errors::SpatialErrors;
 use crate::error::CloseError;
 use crate::evidence::Evidence;
 use crate::residual_size;
-use crate::search::empirical::EMPIRICAL;
+use crate::search::empirical::{CHANNEL, EMPIRICAL};
 use crate::search::group::open_beside;
 use crate::search::refusal::{Refusal, Refused};
 use crate::search::selection::{Judgement, Selection, costs, price};
@@ -146,7 +146,7 @@ pub(crate) fn search<'d>(
 pub(crate) fn is_a_channel(candidate: &dyn Candidate) -> bool {
     let selectors = candidate.selectors();
     let variable = selectors.get("variable");
-    candidate.id() == EMPIRICAL && variable.is_some_and(|v| v.starts_with("housekeeping:"))
+    candidate.id() == EMPIRICAL && variable.is_some_and(|v| v.starts_with(CHANNEL))
 }
 
 /// Whether it describes at its own best noise: a channel, or a motion.

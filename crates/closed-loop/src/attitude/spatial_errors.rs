@@ -66,19 +66,18 @@ impl SpatialErrors {
         let star = (noise.distortion_arcsec.unwrap_or(0.0).powi(2) / 2.0
             + noise.centroid_arcsec.unwrap_or(0.0).powi(2) / 3.0)
             .sqrt();
-        let n = f64::from(model.tracker.max_stars.unwrap_or(USUAL_STARS));
+        let n = stars(situation);
         let [x, y] = situation.camera.half_size_px();
-        let half = x.max(y) / situation.camera.focal_length_px()[0];
+        let half = half_field_rad(situation);
         let jump = WIDER * std::f64::consts::SQRT_2 * star / n;
         let error = WIDER * star / n.sqrt();
-        let moved = STRETCHES.map(|stretches| moved(reference, t_s, stretches, half));
-        let moved = moved.into_iter().fold(0.0, f64::max);
-        let crossed = moved * 2.0 * x.max(y) > 1.0;
+        let expected = changes_of_stars(situation, t_s);
+        let crossed = expected / n * 2.0 * x.max(y) > 1.0;
         let slow_arcsec = [error, error, error / (half * (2.0_f64 / 3.0).sqrt())];
         (star > 0.0).then_some(Self {
             sigma_arcsec: [jump, jump, jump / (2.0 / 3.0 * half)],
             slow_arcsec: if crossed { slow_arcsec } else { [0.0; 3] },
-            expected: n * moved,
+            expected,
             imagined: Self::imagine(situation, reference, t_s),
         })
     }
@@ -148,6 +147,25 @@ impl SpatialErrors {
         let one = ChiSquared::new(freedom).map_or(1.0, |law| law.sf(square));
         (one * self.expected).min(1.0)
     }
+}
+
+/// How many stars the declared tracker changes for others along the reference; 0 without one.
+pub(crate) fn changes_of_stars(situation: &Situation<'_>, t_s: &[f64]) -> f64 {
+    let Some(reference) = situation.reference.as_ref().filter(|_| t_s.len() > 1) else {
+        return 0.0;
+    };
+    let half = half_field_rad(situation);
+    let moved = STRETCHES.map(|stretches| moved(reference, t_s, stretches, half));
+    stars(situation) * moved.into_iter().fold(0.0, f64::max)
+}
+
+fn stars(situation: &Situation<'_>) -> f64 {
+    f64::from(situation.model.tracker.max_stars.unwrap_or(USUAL_STARS))
+}
+
+fn half_field_rad(situation: &Situation<'_>) -> f64 {
+    let [x, y] = situation.camera.half_size_px();
+    x.max(y) / situation.camera.focal_length_px()[0]
 }
 
 /// By how many fields, of this half size in rad, stars move from stretch to stretch.

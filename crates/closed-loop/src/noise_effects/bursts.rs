@@ -14,8 +14,7 @@ use std::collections::BTreeMap;
 
 use rayon::prelude::*;
 
-use super::rows::Row;
-use super::squares::{Judged, Scores, Table, both};
+use super::squares::{Judged, Place, Scores, Table, both};
 
 /// Fortieths that a burst may last: a fifth, a tenth, a twentieth. Each begins at every half of its length.
 const LENGTHS: [usize; 3] = [8, 4, 2];
@@ -24,10 +23,11 @@ const CELLS: usize = 40;
 /// Rows, and the sum of their z.
 type Sum = (usize, f64);
 
-/// The stretch with the least chance, which pays for all that are tried.
+/// The stretch with the least chance, which pays for all that are tried: in one table, or in all residuals and their
+/// changes.
 pub(super) fn burst(
-    tables: [&Table; 2],
-    t_s: impl Fn(&Row) -> f64,
+    tables: &[&Table],
+    t_s: impl Fn(&Place) -> f64,
     [from, to]: [f64; 2],
 ) -> Option<Judged> {
     let lengths = LENGTHS.iter();
@@ -37,14 +37,15 @@ pub(super) fn burst(
     let edges: Vec<f64> = (1..CELLS)
         .map(|k| from + (to - from) * k as f64 / CELLS as f64)
         .collect();
-    let cell = |row: &Row| {
+    let cell = |row: &Place| {
         let t = t_s(row);
         edges.partition_point(|edge| *edge <= t)
     };
-    let [all, fast] = tables.map(|table| Cells::of(table, cell));
-    let judged = stretches
-        .par_iter()
-        .filter_map(|stretch| both(all.judge(*stretch), fast.judge(*stretch)));
+    let cells: Vec<Cells<'_>> = tables.iter().map(|table| Cells::of(table, cell)).collect();
+    let judged = stretches.par_iter().filter_map(|stretch| {
+        let each = cells.iter().map(|cells| cells.judge(*stretch));
+        each.reduce(both)?
+    });
     let [p, share] = judged.min_by(|a, b| a[0].total_cmp(&b[0]))?;
     Some([(p * stretches.len() as f64).min(1.0), share])
 }
@@ -56,7 +57,7 @@ struct Cells<'a> {
 }
 
 impl<'a> Cells<'a> {
-    fn of(table: &'a Table, cell: impl Fn(&Row) -> usize) -> Self {
+    fn of(table: &'a Table, cell: impl Fn(&Place) -> usize) -> Self {
         let mut sums = BTreeMap::new();
         for (row, z) in table.rows.iter().zip(&table.relative) {
             let sum: &mut Sum = sums.entry((row.block, row.star, cell(row))).or_default();
@@ -101,8 +102,8 @@ mod tests {
                     1.0
                 }
             });
-            let time = |row: &Row| row.at as f64 / 1200.0 - 1.0;
-            burst([&table, &table], time, [-1.0, 1.0]).unwrap()[0]
+            let time = |row: &Place| row.at as f64 / 1200.0 - 1.0;
+            burst(&[&table, &table], time, [-1.0, 1.0]).unwrap()[0]
         };
         assert!(chance(1.0) < 1e-6, "{}", chance(1.0));
         assert!(chance(0.0) > 0.01, "{}", chance(0.0));
@@ -116,7 +117,7 @@ mod tests {
         let cells = Cells::of(&table, |row| row.at / 60);
         for stretch in [[0, 8], [22, 26], [38, 40]] {
             let rows = 60 * stretch[0]..60 * stretch[1];
-            let column = |row: &Row| [f64::from(u8::from(rows.contains(&row.at))), 0.0];
+            let column = |row: &Place| [f64::from(u8::from(rows.contains(&row.at))), 0.0];
             let known = table.within(&Columns::of(&table, column), 1).unwrap();
             let judged = cells.judge(stretch).unwrap();
             for (judged, known) in judged.iter().zip(known) {

@@ -16,8 +16,9 @@ use telemetry::report::{Dependence, Unattributed};
 
 use super::bursts::burst;
 use super::quick::Quick;
-use super::rows::{Row, Source, squared_rates};
-use super::squares::{Columns, Judged, MIN_ROWS, Table, both};
+use super::rows::{Source, squared_rates};
+use super::shared::shared_noise;
+use super::squares::{Columns, Judged, MIN_ROWS, Place, Table, both};
 use super::{NoiseEffects, declared_variance};
 use crate::error::CloseError;
 use crate::follows::first_of_each;
@@ -34,22 +35,35 @@ const SAYS: f64 = 0.05;
 /// Fewest stars that a slot is told from.
 const FEWEST_IN_A_SLOT: usize = 3;
 
-/// What the noise follows, most certain first.
+/// What the noise follows, most certain first: that of single stars, and that which all stars of a frame share.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct NoiseFollows(Vec<Dependence>);
+pub(crate) struct NoiseFollows {
+    own: Vec<Dependence>,
+    shared: Vec<Dependence>,
+}
 
 impl NoiseFollows {
+    /// Of rotations alone, not yet paid for.
+    pub(crate) fn of_attitudes(judged: Vec<(String, Judged)>) -> Self {
+        Self {
+            own: told_of_turning(judged),
+            shared: Vec::new(),
+        }
+    }
+
     /// Writes it where it is reported; where the residuals themselves follow nothing, it is
     /// what is left.
     pub(crate) fn tell(self, unattributed: &mut Unattributed) {
-        if self.0.is_empty() {
+        if self.own.is_empty() && self.shared.is_empty() {
             return;
         }
         if !unattributed.present {
-            unattributed.depends_on.clone_from(&self.0);
+            let all = self.own.iter().chain(&self.shared).cloned().collect();
+            unattributed.depends_on = first_of_each(all, |d| &d.variable);
         }
         unattributed.present = true;
-        unattributed.noise_depends_on = self.0;
+        unattributed.noise_depends_on = self.own;
+        unattributed.shared_noise_depends_on = self.shared;
     }
 }
 
@@ -72,7 +86,7 @@ fn of_slots(data: &StarData, [all, fast]: [&Table; 2]) -> Vec<Judged> {
     };
     let slots: Vec<i32> = stars.iter().filter(|s| passed(s.1)).map(|s| *s.0).collect();
     let each = slots.par_iter().flat_map_iter(|&slot| {
-        let column = |row: &Row| [f64::from(u8::from(data.frames.slot[row.at] == slot)), 0.0];
+        let column = |row: &Place| [f64::from(u8::from(data.frames.slot[row.at] == slot)), 0.0];
         let columns = [all, fast].map(|t| Columns::of(t, column));
         let within = both(all.within(&columns[0], 1), fast.within(&columns[1], 1));
         let among = both(all.between(&columns[0], 0), fast.between(&columns[1], 0));
@@ -90,7 +104,7 @@ fn of_variable(
 ) -> Vec<Judged> {
     let rows = data.rows(0..data.t_s.len(), None, None);
     let scale = Scale::new(*range);
-    let column = |row: &Row| -> [f64; 2] {
+    let column = |row: &Place| -> [f64; 2] {
         if let Variable::Phase(axis) = variable {
             let at = data.landed()[*axis][row.at];
             let (s, c) = data.camera.phase_rad(at).sin_cos();
@@ -111,32 +125,21 @@ fn of_variable(
         judged.extend(among);
     }
     if matches!(variable, Variable::Time) {
-        judged.push(burst([all, fast], |row| data.t_s[row.at], *range));
+        judged.push(burst(&[all, fast], |row| data.t_s[row.at], *range));
     }
     judged.into_iter().flatten().collect()
 }
 
-/// The squares of `residual`, and of what of it changes from frame to frame, over what is declared and `claimed`; `None`:
-/// there are too few.
+/// The squares of `residual`, and of what of it changes from frame to frame, over what is `declared`; `None`: there are
+/// too few.
 fn tables(
-    situation: &Situation<'_>,
     data: &StarData,
     residual: &[Vec<f64>],
     folds: &Folds,
-    claimed: &NoiseEffects,
-) -> Result<Option<[Table; 2]>, CloseError> {
-    let mut declared = declared_variance(situation, data)?;
+    declared: &[f64],
+) -> Option<[Table; 2]> {
     let rate = squared_rates(data);
-    // a rate adds to the level that there is, whatever is declared
-    let there = claimed.level.unwrap_or(1.0);
-    for (v, rate) in declared.iter_mut().zip(&rate) {
-        *v *= there;
-        let more = claimed.rate.powi(2) * rate;
-        if more.is_finite() {
-            *v += more;
-        }
-    }
-    let quick = Quick::of(data, residual, [&declared, &rate]);
+    let quick = Quick::of(data, residual, [declared, &rate]);
     let [its_declared, its_rate] = &quick.squares;
     let table = |residual, declared, rate| {
         Table::new(&Source {
@@ -148,78 +151,116 @@ fn tables(
         })
     };
     let (all, fast) = rayon::join(
-        || table(residual, &declared, &rate),
+        || table(residual, declared, &rate),
         || table(&quick.residual, its_declared, its_rate),
     );
-    Ok(all.zip(fast).map(|(all, fast)| [all, fast]))
+    Some([all?, fast?])
 }
 
-/// Looks at the squares of `residual`, which the stars leave at `level` beside `claimed`.
+/// Declared variance of every row beside what is `claimed` of it, arcsec^2.
+fn known_variance(
+    situation: &Situation<'_>,
+    data: &StarData,
+    claimed: &NoiseEffects,
+) -> Result<Vec<f64>, CloseError> {
+    let mut declared = declared_variance(situation, data)?;
+    // a rate adds to the level that there is, whatever is declared
+    let there = claimed.level.unwrap_or(1.0);
+    for (v, rate) in declared.iter_mut().zip(squared_rates(data)) {
+        *v *= there;
+        let more = claimed.rate.powi(2) * rate;
+        if more.is_finite() {
+            *v += more;
+        }
+    }
+    Ok(declared)
+}
+
+/// Looks at the squares of `residual`, which the stars leave at `level` beside `claimed`, and at those of what all stars
+/// of a frame share in what is left `beside` the description of it.
 pub(crate) fn noise_follows(
     situation: &Situation<'_>,
     level: &StarEvidence<'_>,
-    residual: &[Vec<f64>],
+    [residual, beside]: [&[Vec<f64>]; 2],
     folds: &Folds,
     claimed: &NoiseEffects,
     variables: &[(Variable, [f64; 2])],
 ) -> Result<NoiseFollows, CloseError> {
     let data = level.data;
-    let Some(tables) = tables(situation, data, residual, folds, claimed)? else {
+    let mut variance = known_variance(situation, data, claimed)?;
+    let Some(tables) = tables(data, residual, folds, &variance) else {
         return Ok(NoiseFollows::default());
     };
-    let tables = tables.each_ref();
+    let own = of_stars(data, tables.each_ref(), variables);
+    let [all, _] = tables;
+    for (v, star) in variance.iter_mut().zip(&data.star) {
+        let known = all.stars[*star].level;
+        *v *= if known > 0.0 { known } else { 1.0 };
+    }
+    let shared = shared_noise(situation, level, [&beside[0], &beside[1]], &variance, folds);
+    let mut shared = told_of_turning(shared);
+    // a noise of the stars turns their frames as well
+    shared.retain(|d| own.iter().all(|o| o.variable != d.variable));
+    Ok(NoiseFollows { own, shared })
+}
+
+/// What the noise of single stars follows.
+fn of_stars(
+    data: &StarData,
+    tables: [&Table; 2],
+    variables: &[(Variable, [f64; 2])],
+) -> Vec<Dependence> {
     let [all, fast] = tables;
-    let judged: Vec<Vec<Judged>> = variables
+    let mut judged: Vec<(String, Judged)> = variables
         .par_iter()
-        .map(|variable| of_variable(data, tables, variable))
+        .flat_map_iter(|variable| {
+            let judged = of_variable(data, tables, variable).into_iter();
+            judged.map(|judged| (variable.0.name(), judged))
+        })
         .collect();
-    let of_variables = variables
-        .iter()
-        .zip(judged)
-        .flat_map(|((variable, _), judged)| {
-            let name = variable.name();
-            judged.into_iter().map(move |j| (name.clone(), j))
-        });
-    let of_stars = both(all.odd_star(), fast.odd_star()).map(|j| ("star".to_owned(), j));
+    let odd = both(all.odd_star(), fast.odd_star());
+    judged.extend(odd.map(|j| ("star".to_owned(), j)));
     let of_slots = of_slots(data, tables).into_iter();
-    let of_slots = of_slots.map(|j| ("slot".to_owned(), j));
-    let found = of_variables.chain(of_stars).chain(of_slots);
-    let found = found.map(|(variable, judged)| dependence(variable, judged));
+    judged.extend(of_slots.map(|j| ("slot".to_owned(), j)));
     // stars that differ all over
-    let differ = || both(all.scatter(), fast.scatter());
-    let found = certain(found.collect(), differ);
-    Ok(NoiseFollows(first_of_each(found, |d| &d.variable)))
+    let told = told(judged, || both(all.scatter(), fast.scatter()));
+    first_of_each(told, |d| &d.variable)
 }
 
-fn dependence(variable: String, [p_value, share]: Judged) -> Dependence {
-    Dependence {
-        variable,
-        variance_explained: share,
-        p_value,
-    }
+/// Of what the noise of rotations may follow, what is certain: what explains most first. A slew has its rate and its
+/// acceleration, both beyond chance, and which of them a dozen blocks are surer of is chance.
+fn told_of_turning(judged: Vec<(String, Judged)>) -> Vec<Dependence> {
+    let mut told = told(judged, || None);
+    told.sort_by(|a, b| b.variance_explained.total_cmp(&a.variance_explained));
+    first_of_each(told, |d| &d.variable)
 }
 
-/// Of what was `found`, each paid for by how many were tried, what is certain, most so first; where nothing is and stars
+/// Of what was `judged`, each paid for by how many were tried, what is certain, most so first; where nothing is and stars
 /// `differ`, what says by what they do.
-fn certain(mut found: Vec<Dependence>, differ: impl FnOnce() -> Option<Judged>) -> Vec<Dependence> {
-    let tried = found.len();
-    for d in &mut found {
-        d.p_value = (d.p_value * tried as f64).min(1.0);
-    }
+fn told(judged: Vec<(String, Judged)>, differ: impl FnOnce() -> Option<Judged>) -> Vec<Dependence> {
+    let tried = judged.len();
+    let mut found: Vec<Dependence> = judged
+        .into_iter()
+        .map(|(variable, [p, share])| Dependence {
+            variable,
+            variance_explained: share,
+            p_value: (p * tried as f64).min(1.0),
+        })
+        .collect();
     found.sort_by(|a, b| a.p_value.total_cmp(&b.p_value));
     let below = |p: f64| found.iter().take_while(|d| d.p_value < p).count();
     let certain = below(ALPHA);
-    let paid = |[p, share]: Judged| [p * (tried + 1) as f64, share];
-    let differ = if certain == 0 {
-        differ().map(paid)
+    let differ = if certain == 0 { differ() } else { None };
+    let differ = differ.map(|[p, share]| Dependence {
+        variable: "star".to_owned(),
+        variance_explained: share,
+        p_value: p * (tried + 1) as f64,
+    });
+    if let Some(differ) = differ.filter(|d| d.p_value < ALPHA) {
+        found.truncate(below(SAYS));
+        found.push(differ);
     } else {
-        None
-    };
-    let Some(differ) = differ.filter(|[p, _]| *p < ALPHA) else {
         found.truncate(certain);
-        return found;
-    };
-    found.truncate(below(SAYS));
-    found.push(dependence("star".to_owned(), differ));
+    }
     found
 }

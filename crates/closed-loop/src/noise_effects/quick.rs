@@ -15,8 +15,8 @@ use rayon::prelude::*;
 use crate::star::data::StarData;
 
 /// What a row counts with in the square of its difference, and each neighbour.
-const OWN: f64 = 2.0 / 3.0;
-const NEIGHBOUR: f64 = 1.0 / 6.0;
+pub(super) const OWN: f64 = 2.0 / 3.0;
+pub(super) const NEIGHBOUR: f64 = 1.0 / 6.0;
 
 /// Each row of a star less the mean of its neighbours, at the same white noise.
 pub(super) struct Quick {

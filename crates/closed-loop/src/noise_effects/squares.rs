@@ -45,9 +45,29 @@ pub(super) fn both(all: Option<Judged>, fast: Option<Judged>) -> Option<Judged> 
     Some([all[0].max(fast[0].powf(OF_CHANGES)), all[1]])
 }
 
+/// Whose square it is, and when.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Place {
+    /// Its place among all rows.
+    pub(super) at: usize,
+    /// The star, or whatever else has a level of its own.
+    pub(super) star: usize,
+    pub(super) block: usize,
+}
+
+impl From<&Row> for Place {
+    fn from(row: &Row) -> Self {
+        Self {
+            at: row.at,
+            star: row.star,
+            block: row.block,
+        }
+    }
+}
+
 /// Squares over their usual size.
 pub(super) struct Table {
-    pub(super) rows: Vec<Row>,
+    pub(super) rows: Vec<Place>,
     /// Of each row, over the level of its star.
     pub(super) relative: Vec<f64>,
     pub(super) stars: Vec<StarLevel>,
@@ -66,6 +86,15 @@ pub(super) struct StarLevel {
     pub(super) mag: f64,
 }
 
+impl StarLevel {
+    pub(super) const UNSEEN: Self = Self {
+        level: 0.0,
+        rows: 0,
+        scatter: 0.0,
+        mag: f64::NAN,
+    };
+}
+
 /// A variable in the rows of a table.
 pub(super) struct Columns {
     pub(super) rows: Vec<[f64; 2]>,
@@ -74,7 +103,7 @@ pub(super) struct Columns {
 }
 
 impl Columns {
-    pub(super) fn of(table: &Table, column: impl Fn(&Row) -> [f64; 2]) -> Self {
+    pub(super) fn of(table: &Table, column: impl Fn(&Place) -> [f64; 2]) -> Self {
         let rows: Vec<[f64; 2]> = table.rows.iter().map(column).collect();
         let mut mean = vec![[0.0; 2]; table.stars.len()];
         for (row, f) in table.rows.iter().zip(&rows) {
@@ -161,13 +190,7 @@ impl Table {
             let sound = |level: f64| level > 0.0 && r.square < SPIKE * r.declared * level;
             !r.marked && shown[r.star].level.is_some_and(sound)
         });
-        let unseen = StarLevel {
-            level: 0.0,
-            rows: 0,
-            scatter: 0.0,
-            mag: f64::NAN,
-        };
-        let mut sums = vec![unseen; stars];
+        let mut sums = vec![StarLevel::UNSEEN; stars];
         for row in &rows {
             let sum = &mut sums[row.star];
             sum.level += 0.5 * row.square / row.declared;
@@ -186,7 +209,7 @@ impl Table {
             relative,
             stars: sums,
             blocks: rows.iter().map(|r| r.block + 1).max()?,
-            rows,
+            rows: rows.iter().map(Place::from).collect(),
         })
     }
 
@@ -279,17 +302,10 @@ pub(super) mod tests {
                 .wrapping_add(1);
             let uniform = ((state >> 11) as f64 + 0.5) / (1_u64 << 53) as f64;
             let t = k as f64 / 1200.0 - 1.0;
-            table.rows.push(Row {
-                square: 0.0,
-                shows: 1.0,
-                alike: 0.0,
-                declared: 1.0,
-                mag: 0.0,
-                rate: 0.0,
+            table.rows.push(Place {
                 at: k,
                 star: 0,
                 block: k / 200,
-                marked: false,
             });
             // half a square of two axes is exponential
             table.relative.push(-uniform.ln() * level(t) - 1.0);

@@ -38,7 +38,7 @@ use focal_plane::{Camera, PointsMut, Series, VectorsMut};
 use crate::search::LEADING;
 use fields::Columns;
 use variable::orders;
-pub(crate) use variable::{Scale, Variable, about_mean, flux_of, range};
+pub(crate) use variable::{CHANNEL, Scale, Variable, about_mean, flux_of, range};
 
 mod fields;
 mod variable;

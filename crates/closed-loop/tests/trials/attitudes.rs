@@ -224,3 +224,28 @@ fn a_motion_that_moves_nothing_is_not_followed() {
         );
     }
 }
+
+/// Ten minutes at rest under 1 arcsec an axis, which a channel raises by a half at its warm end: by -0.25 to 0.25 of the
+/// variance about its mean, known to 0.03 from 3600 squares. Of one that stays as it is nothing is told.
+#[test]
+fn noise_of_attitudes_follows_a_channel() {
+    let channel: Vec<f64> = (0..1200).map(|k| (f64::from(k) / 120.0).sin()).collect();
+    for (grows, seed) in [(0.25, 0), (0.25, 1), (0.0, 2), (0.0, 3)] {
+        let mut one = noise(seed);
+        let errors: Vec<Vector3<f64>> = channel
+            .iter()
+            .map(|c| Vector3::new(one(), one(), 5.0 * one()) * (1.25 + grows * c))
+            .collect();
+        let warm: Vec<f64> = channel.iter().map(|c| 20.0 + 3.0 * c).collect();
+        let bundle = bundle(0.5, |_| Vector3::zeros(), &errors, Some(("warm_c", &warm)));
+        let report = report(&model(""), &bundle);
+        let told = &report.unattributed.noise_depends_on;
+        if grows > 0.0 {
+            assert_eq!(report.verdict, Verdict::Unexplained, "{seed}");
+            assert_eq!(told[0].variable, "housekeeping:warm_c", "{told:?}");
+            assert_eq!(&report.unattributed.depends_on, told);
+        } else {
+            assert_eq!(report.verdict, Verdict::Consistent, "{told:?}");
+        }
+    }
+}

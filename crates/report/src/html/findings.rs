@@ -399,6 +399,7 @@ pub(super) fn leftover(page: &mut Page, report: &Report) {
             )
         });
         let follows = left.depends_on.iter().chain(&left.noise_depends_on);
+        let follows = follows.chain(&left.shared_noise_depends_on);
         let first = match (left.present, follows.clone().any(is_beyond_chance)) {
             (true, true) => "Something is left that follows a variable and that no effect explains.",
             (true, false) => "Something is left in time that follows no variable and that no effect explains.",
@@ -431,6 +432,13 @@ pub(super) fn leftover(page: &mut Page, report: &Report) {
                 "What the noise level follows: squares of what is left, beside the effects on the noise.",
                 &["follows", "rms change of the variance, %", "p"],
                 dependences("noise_depends_on", &left.noise_depends_on),
+            );
+        }
+        if !left.shared_noise_depends_on.is_empty() {
+            page.table(
+                "What the noise follows that all stars of a frame share: that of the reference, or of time tags.",
+                &["follows", "rms change of the variance, %", "p"],
+                dependences("shared_noise_depends_on", &left.shared_noise_depends_on),
             );
         }
         let list = |name: &str, values: &[f64], shown: fn(f64) -> String| {

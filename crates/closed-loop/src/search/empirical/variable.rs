@@ -11,6 +11,9 @@ use focal_plane::Series;
 
 use super::ORDERS;
 
+/// What the names of channels begin with.
+pub(crate) const CHANNEL: &str = "housekeeping:";
+
 /// A variable that a leftover may follow.
 #[derive(Clone, Debug)]
 pub(crate) enum Variable {
@@ -85,7 +88,7 @@ impl Variable {
             Self::Star(_) => "star".into(),
             Self::Slot(_) => "slot".into(),
             Self::Window => "window".into(),
-            Self::Housekeeping(channel, _) => format!("housekeeping:{channel}"),
+            Self::Housekeeping(channel, _) => format!("{CHANNEL}{channel}"),
         }
     }
 }

@@ -56,7 +56,11 @@ pub(super) fn look(
         },
     );
     drop(turned);
-    let (mut effects, slow) = noise?;
+    let NoiseAndSlow {
+        mut effects,
+        slow,
+        beside,
+    } = noise?;
     if f.image.is_some_and(ImageLevel::new_noise) {
         effects = effects.without_magnitude();
     }
@@ -65,7 +69,7 @@ pub(super) fn look(
         noise = noise_effects::noise_follows(
             f.situation,
             f.level,
-            residual,
+            [residual, beside.as_deref().unwrap_or(residual)],
             f.folds,
             &effects,
             &variables,
@@ -81,12 +85,19 @@ pub(super) fn look(
     Ok((effects, left))
 }
 
-/// Effects on the noise level, and slow noise of the stars.
+/// Effects on the noise level, slow noise of the stars, and the residual that they are found in where something is
+/// described.
+struct NoiseAndSlow {
+    effects: NoiseEffects,
+    slow: Option<Slow>,
+    beside: Option<Vec<Vec<f64>>>,
+}
+
 fn noise_and_slow(
     f: &Finish<'_>,
     residual: &[Vec<f64>],
     variables: &[(Variable, [f64; 2])],
-) -> Result<(NoiseEffects, Option<Slow>), CloseError> {
+) -> Result<NoiseAndSlow, CloseError> {
     // what is described is no noise
     let beside = beside_description(f)?;
     let slow = match &beside {
@@ -94,8 +105,12 @@ fn noise_and_slow(
         None => f.slow,
     };
     let residual = beside.as_deref().unwrap_or(residual);
-    let noise = noise_effects::claim(f.situation, f.level, residual, f.folds, variables)?;
-    Ok((noise, slow))
+    let effects = noise_effects::claim(f.situation, f.level, residual, f.folds, variables)?;
+    Ok(NoiseAndSlow {
+        effects,
+        slow,
+        beside,
+    })
 }
 
 /// What the chosen effects leave in sample beside the description of it, where there is one, arcsec.
