@@ -2,15 +2,15 @@
 //!
 //! A clamp that opens at a temperature moves nothing below it, walls that lag behind one another bend by its slope in time,
 //! and what has play follows late. No polynomial has any of these. Of what the frames share, residuals r about each axis
-//! and in scale, that form is looked for which takes most together with a straight line z in the channel,
+//! and in scale, that form is looked for which takes most beside a straight line z in the channel,
 //!
 //! ```text
 //! max(v - v_0, 0);   dv/dt, v(t - d), play of a width;   z z' of two channels
 //! u = sum w f r      N = sum w f^2      sum of u^2 / N most      f less what 1 and z take of it
 //! ```
 //!
-//! with `v_0` at every eighth of the frames, and has a term if it takes more than each of the channel's own polynomials,
-//! alone or beside that line, where it is of one.
+//! with `v_0` at every eighth of the frames, and has a term if it takes more than each of the channel's own
+//! polynomials, where it is of one.
 //!
 //! Source: least squares; Krasnosel'skii & Pokrovskii 1989 (play, an operator of hysteresis).
 
@@ -55,22 +55,22 @@ pub(super) fn channel_forms(
         let lines: Vec<&[f64]> = lines.iter().map(|c| c.scaled.as_slice()).collect();
         tracks.iter().map(|track| track.power(&lines, values)).sum()
     };
+    let own: Vec<f64> = channels
+        .iter()
+        .map(|c| {
+            c.bends()
+                .map(|bend| power(&[c], &bend))
+                .fold(LEAST, f64::max)
+        })
+        .collect();
     let mut thresholds = Vec::new();
     let mut memories = Vec::new();
-    for channel in channels.iter().filter(|c| c.is_bent) {
-        let line = power(&[], &channel.scaled);
-        let most = |lines: &[&Channel<'_>], least: f64| {
-            let bends = channel.bends().map(|bend| power(lines, &bend));
-            bends.fold(least.max(LEAST), f64::max)
-        };
-        // alone, and beside the line
-        let own = [most(&[], line), most(&[channel], 0.0)];
+    for (channel, own) in channels.iter().zip(&own).filter(|(c, _)| c.is_bent) {
         let form = |form: Series| {
-            let values = form.at_all(&data.frames.t_s);
-            let [alone, beside] = [power(&[], &values), power(&[channel], &values)];
-            let takes_more = alone > own[0] || beside > own[1];
-            let term = takes_more.then(|| channel.by_form(data, form)).flatten();
-            Some((line + beside, term?))
+            let power = power(&[channel], &form.at_all(&data.frames.t_s));
+            (power > *own)
+                .then(|| Some((power, channel.by_form(data, form)?)))
+                .flatten()
         };
         let each = eighths(&channel.values).into_iter();
         thresholds.extend(
@@ -136,7 +136,8 @@ impl<'a> Channel<'a> {
 
     /// Its polynomials that are no straight line.
     fn bends(&self) -> impl Iterator<Item = Vec<f64>> + '_ {
-        (1..3).map(|k| self.scaled.iter().map(|z| legendre(*z)[k]).collect())
+        let orders = if self.is_bent { 1..3 } else { 0..0 };
+        orders.map(|k| self.scaled.iter().map(|z| legendre(*z)[k]).collect())
     }
 
     fn by_form(&self, data: &StarData, form: Series) -> Option<Empirical> {
