@@ -117,11 +117,8 @@ pub(super) fn motions(around: &Around, t_s: &[f64]) -> [(&'static str, noise_eff
         let all: Vec<_> = known
             .map(|m| m.unwrap_or_else(|| Vector3::repeat(f64::NAN)) * ARCSEC_PER_RAD)
             .collect();
-        let of_attitudes = if around.by_rates() {
-            0.0
-        } else {
-            noise_effects::Motion::error(order, step_s)
-        };
+        // rates that come along may be made of the same attitudes
+        let of_attitudes = noise_effects::Motion::error(order, step_s);
         let axes = std::array::from_fn(|a| all.iter().map(|m| m[a]).collect());
         (motion.name(), noise_effects::Motion { axes, of_attitudes })
     })

@@ -61,7 +61,8 @@ fn variables(situation: &Situation<'_>, level: &StarEvidence<'_>) -> Vec<(String
             ("rate", 1, &data.velocity),
             ("acceleration", 2, &data.acceleration),
         ];
-        let path = situation.reference.as_ref().filter(|_| level.own_paths);
+        // rates that come along may be made of the same attitudes
+        let path = situation.reference.as_ref();
         let step_s = path.and_then(|path| median_step(path.t_s()));
         for (name, order, motion) in motions {
             let motion = Motion {

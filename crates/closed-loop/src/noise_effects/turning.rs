@@ -85,7 +85,7 @@ impl Varies {
 pub(crate) struct Motion {
     /// arcsec/s, or arcsec/s^2.
     pub(crate) axes: [Vec<f64>; 3],
-    /// What it errs by for each arcsec that attitudes err by, 1/s or 1/s^2: 0 where it was measured by itself.
+    /// What it errs by for each arcsec that attitudes err by, 1/s or 1/s^2.
     pub(crate) of_attitudes: f64,
 }
 
