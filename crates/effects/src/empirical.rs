@@ -39,7 +39,8 @@ const NAMES: [&str; MOST] = [
     "c0", "c1", "c2", "c3", "c4", "c5", "c6", "c7", "c8", "c9", "c10", "c11", "c12", "c13", "c14",
     "c15",
 ];
-const CHANNEL: &str = "housekeeping:";
+/// What the names of channels begin with, where they stand for a variable.
+pub const CHANNEL: &str = "housekeeping:";
 
 /// The kind; it has no candidates of its own.
 #[derive(Debug)]

@@ -51,7 +51,7 @@ mod warm_pixels;
 pub use candidate::{AttitudeRows, Candidate, Coefficient, Nonlinear, StarRows, Twin, reported};
 pub use catalogue::{build, catalogue, kind};
 pub use effect::{ActsOn, Effect, EffectKind, ReferenceWander};
-pub use empirical::empirical_parameters;
+pub use empirical::{CHANNEL, empirical_parameters};
 pub use error::EffectError;
 pub use exposure_smear::longest_exposure_s;
 pub use hot_pixel::hot_pixel_at;

@@ -338,14 +338,14 @@ fn leftover(out: &mut String, report: &Report) {
     }
     let (noise, shared) = (&left.noise_depends_on, &left.shared_noise_depends_on);
     let of_noise = |d: &Dependence| noise.contains(d) || shared.contains(d);
-    let mut told = left.depends_on.iter().filter(|d| is_beyond_chance(d));
-    if told.any(|d| !of_noise(d)) {
+    let told = left.depends_on.iter().filter(|d| is_beyond_chance(d));
+    let told: Vec<&Dependence> = told.collect();
+    if told.iter().any(|d| !of_noise(d)) {
         line!(
             out,
             "What is left follows (share of its variance, out of fold):"
         );
-        let told = left.depends_on.iter().filter(|d| is_beyond_chance(d));
-        follows(out, told.collect());
+        follows(out, told);
     }
     if !noise.is_empty() {
         line!(out, "The noise level follows (rms change of its variance):");

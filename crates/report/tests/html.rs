@@ -170,25 +170,21 @@ fn findings(stars: bool, attitude: bool) -> Report {
         unattributed: Unattributed {
             present: true,
             variance_fraction: Some(0.017),
-            depends_on: vec![Dependence {
-                variable: format!("housekeeping:{HOSTILE}"),
-                variance_explained: 0.21,
-                p_value: 3e-4,
-            }],
+            depends_on: follows(&format!("housekeeping:{HOSTILE}"), 0.21, 3e-4),
             lines_hz: vec![0.0123, 0.31],
             jumps_s: vec![1234.5, 2345.5],
-            noise_depends_on: vec![Dependence {
-                variable: "time".to_owned(),
-                variance_explained: 0.33,
-                p_value: 2e-7,
-            }],
-            shared_noise_depends_on: vec![Dependence {
-                variable: "rate".to_owned(),
-                variance_explained: 0.44,
-                p_value: 3e-8,
-            }],
+            noise_depends_on: follows("time", 0.33, 2e-7),
+            shared_noise_depends_on: follows("rate", 0.44, 3e-8),
         },
     }
+}
+
+fn follows(variable: &str, variance_explained: f64, p_value: f64) -> Vec<Dependence> {
+    vec![Dependence {
+        variable: variable.to_owned(),
+        variance_explained,
+        p_value,
+    }]
 }
 
 fn closed(stars: Option<StarResiduals>, attitude: Option<AttitudeResiduals>) -> Closed {

@@ -21,7 +21,7 @@ use std::sync::Arc;
 
 use block_regression::Folds;
 use coloured_noise::{Coloured, Foreknown};
-use effects::Candidate;
+use effects::{CHANNEL, Candidate};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
@@ -31,7 +31,7 @@ use crate::attitude::spatial_errors::SpatialErrors;
 use crate::error::CloseError;
 use crate::evidence::Evidence;
 use crate::residual_size;
-use crate::search::empirical::{CHANNEL, EMPIRICAL};
+use crate::search::empirical::EMPIRICAL;
 use crate::search::group::open_beside;
 use crate::search::refusal::{Refusal, Refused};
 use crate::search::selection::{Judgement, Selection, costs, price};

@@ -22,7 +22,7 @@ use super::squares::{Columns, Judged, MIN_ROWS, Place, Table, both};
 use super::{NoiseEffects, declared_variance};
 use crate::error::CloseError;
 use crate::follows::first_of_each;
-use crate::search::empirical::{Scale, Variable};
+use crate::search::empirical::{Scale, Variable, legendre};
 use crate::situation::Situation;
 use crate::star::data::StarData;
 use crate::star::evidence::StarEvidence;
@@ -110,8 +110,8 @@ fn of_variable(
             let (s, c) = data.camera.phase_rad(at).sin_cos();
             return [s, c];
         }
-        let z = scale.of(variable.value(&rows, row.at));
-        [z, 1.5 * z * z - 0.5]
+        let [line, bend, _] = legendre(scale.of(variable.value(&rows, row.at)));
+        [line, bend]
     };
     let columns = [all, fast].map(|t| Columns::of(t, column));
     let within = |k: usize| both(all.within(&columns[0], k), fast.within(&columns[1], k));
@@ -136,10 +136,9 @@ fn tables(
     data: &StarData,
     residual: &[Vec<f64>],
     folds: &Folds,
-    declared: &[f64],
+    [declared, rate]: [&[f64]; 2],
 ) -> Option<[Table; 2]> {
-    let rate = squared_rates(data);
-    let quick = Quick::of(data, residual, [declared, &rate]);
+    let quick = Quick::of(data, residual, [declared, rate]);
     let [its_declared, its_rate] = &quick.squares;
     let table = |residual, declared, rate| {
         Table::new(&Source {
@@ -151,7 +150,7 @@ fn tables(
         })
     };
     let (all, fast) = rayon::join(
-        || table(residual, declared, &rate),
+        || table(residual, declared, rate),
         || table(&quick.residual, its_declared, its_rate),
     );
     Some([all?, fast?])
@@ -162,11 +161,12 @@ fn known_variance(
     situation: &Situation<'_>,
     data: &StarData,
     claimed: &NoiseEffects,
+    rate: &[f64],
 ) -> Result<Vec<f64>, CloseError> {
     let mut declared = declared_variance(situation, data)?;
     // a rate adds to the level that there is, whatever is declared
     let there = claimed.level.unwrap_or(1.0);
-    for (v, rate) in declared.iter_mut().zip(squared_rates(data)) {
+    for (v, rate) in declared.iter_mut().zip(rate) {
         *v *= there;
         let more = claimed.rate.powi(2) * rate;
         if more.is_finite() {
@@ -187,8 +187,9 @@ pub(crate) fn noise_follows(
     variables: &[(Variable, [f64; 2])],
 ) -> Result<NoiseFollows, CloseError> {
     let data = level.data;
-    let mut variance = known_variance(situation, data, claimed)?;
-    let Some(tables) = tables(data, residual, folds, &variance) else {
+    let rate = squared_rates(data);
+    let mut variance = known_variance(situation, data, claimed, &rate)?;
+    let Some(tables) = tables(data, residual, folds, [&variance, &rate]) else {
         return Ok(NoiseFollows::default());
     };
     let own = of_stars(data, tables.each_ref(), variables);

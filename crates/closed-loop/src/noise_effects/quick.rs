@@ -44,12 +44,22 @@ impl Quick {
     }
 }
 
+/// `own` of the value in the middle and `neighbour` of the ones before and after it.
+pub(super) fn of_three(
+    values: &[f64],
+    [before, at, after]: [usize; 3],
+    own: f64,
+    neighbour: f64,
+) -> f64 {
+    own * values[at] + neighbour * (values[before] + values[after])
+}
+
 /// `own` of every value and `neighbour` of the ones before and after it among the rows of its star; NaN where one is
 /// missing.
 fn mixed(of_star: &[Vec<usize>], values: &[f64], own: f64, neighbour: f64) -> Vec<f64> {
     let mut out = vec![f64::NAN; values.len()];
     for w in of_star.iter().flat_map(|rows| rows.windows(3)) {
-        out[w[1]] = own * values[w[1]] + neighbour * (values[w[0]] + values[w[2]]);
+        out[w[1]] = of_three(values, [w[0], w[1], w[2]], own, neighbour);
     }
     out
 }

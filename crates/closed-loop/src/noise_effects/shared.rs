@@ -19,7 +19,7 @@ use super::turning::{Motion, Turning, Varies};
 use crate::situation::Situation;
 use crate::star::data::StarData;
 use crate::star::evidence::StarEvidence;
-use crate::star::frame_rotation::{Turns, rotation_of};
+use crate::star::frame_rotation::{Turns, rotations_of};
 
 /// The chances of what the noise that frames share may follow, not yet paid for; `residual` per row and axis, arcsec,
 /// whose stars have this `variance`, arcsec^2.
@@ -57,18 +57,14 @@ fn variables(situation: &Situation<'_>, level: &StarEvidence<'_>) -> Vec<(String
     let data = level.data;
     let mut out = vec![("time".to_owned(), Varies::Time)];
     if level.resolved {
-        let motions = [
-            ("rate", 1, &data.velocity),
-            ("acceleration", 2, &data.acceleration),
-        ];
         // rates that come along may be made of the same attitudes
         let path = situation.reference.as_ref();
         let step_s = path.and_then(|path| median_step(path.t_s()));
-        for (name, order, motion) in motions {
-            let motion = Motion {
-                axes: about_axes(data, motion),
-                of_attitudes: step_s.map_or(0.0, |step_s| Motion::error(order, step_s)),
-            };
+        let motions = about_axes(data, [&data.velocity, &data.acceleration]);
+        let kinds = [("rate", 1), ("acceleration", 2)];
+        for ((name, order), axes) in kinds.into_iter().zip(motions) {
+            let of_attitudes = step_s.map_or(0.0, |step_s| Motion::error(order, step_s));
+            let motion = Motion { axes, of_attitudes };
             out.push((name.to_owned(), Varies::Motion(motion)));
         }
     }
@@ -76,18 +72,20 @@ fn variables(situation: &Situation<'_>, level: &StarEvidence<'_>) -> Vec<(String
     out
 }
 
-/// The rotation that a motion of the stars, px/s or px/s^2, amounts to frame by frame, arcsec/s or arcsec/s^2; NaN where
-/// too few tell it.
-fn about_axes(data: &StarData, motion: &[Vec<f64>; 2]) -> [Vec<f64>; 3] {
+/// The rotations that motions of the stars, px/s and px/s^2, amount to frame by frame, arcsec/s and arcsec/s^2; NaN where
+/// too few tell them.
+fn about_axes(data: &StarData, motions: [&[Vec<f64>; 2]; 2]) -> [[Vec<f64>; 3]; 2] {
     let scale = data.camera.arcsec_per_px();
-    let shift: Vec<Vec<f64>> = motion
-        .iter()
-        .zip(scale)
-        .map(|(axis, scale)| axis.iter().map(|v| v * scale).collect())
-        .collect();
-    let each: Vec<Vector3<f64>> = (0..data.frames.frames())
+    let shifts = motions.map(|motion| -> Vec<Vec<f64>> {
+        let axes = motion.iter().zip(scale);
+        axes.map(|(axis, scale)| axis.iter().map(|v| v * scale).collect())
+            .collect()
+    });
+    let shifts = shifts.each_ref().map(Vec::as_slice);
+    let unknown = [Vector3::repeat(f64::NAN); 2];
+    let each: Vec<[Vector3<f64>; 2]> = (0..data.frames.frames())
         .into_par_iter()
-        .map(|k| rotation_of(data, k, &shift).unwrap_or_else(|| Vector3::repeat(f64::NAN)))
+        .map(|k| rotations_of(data, k, shifts).unwrap_or(unknown))
         .collect();
-    std::array::from_fn(|a| each.iter().map(|turn| turn[a]).collect())
+    [0, 1].map(|m| std::array::from_fn(|a| each.iter().map(|turns| turns[m][a]).collect()))
 }

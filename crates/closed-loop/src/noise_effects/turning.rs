@@ -20,15 +20,16 @@ use std::collections::BTreeMap;
 
 use block_regression::Folds;
 use coloured_noise::Coloured;
+use effects::CHANNEL;
 use focal_plane::Series;
 use rayon::prelude::*;
 use spectra::robust::median;
 
 use super::bursts::burst;
-use super::quick::{NEIGHBOUR, OWN};
+use super::quick::{NEIGHBOUR, OWN, of_three};
 use super::squares::{Columns, Judged, MIN_ROWS, Place, StarLevel, Table, both};
 use crate::gaps::longest_step;
-use crate::search::empirical::{CHANNEL, Scale, range};
+use crate::search::empirical::{Scale, legendre, range};
 use crate::situation::channels_of_interest;
 
 /// Median of chi-squared of one degree.
@@ -144,8 +145,8 @@ impl Turning<'_> {
         let smooth = |values: &[f64]| {
             let scale = Scale::new(range(values.iter().copied()));
             let column = |place: &Place| {
-                let z = scale.of(values[place.at]);
-                [z, 1.5 * z * z - 0.5]
+                let [line, bend, _] = legendre(scale.of(values[place.at]));
+                [line, bend]
             };
             within(&column, &[1, 2])
         };
@@ -163,7 +164,7 @@ impl Turning<'_> {
                 let [_, largest] = range(sizes.iter().copied());
                 let count = tables.iter().map(|t| t.rows.len()).max().unwrap_or(0);
                 let least = MOVES * (count as f64).sqrt() * motion.of_attitudes;
-                if least > 0.0 && largest < least * error_at_rest(axes, &sizes) {
+                if largest < least * error_at_rest(axes, &sizes) {
                     return Vec::new();
                 }
                 let own = |place: &Place| {
@@ -219,9 +220,15 @@ impl Turning<'_> {
             unpredicted: Vec::new(),
             squares,
         };
-        if self.t_s.len() > MOST_PREDICTED || out.squares.is_empty() {
-            return out;
+        if self.t_s.len() <= MOST_PREDICTED && !out.squares.is_empty() {
+            out.unpredicted = self.unpredicted(axis, more, &standing_out);
         }
+        out
+    }
+
+    /// Squares of what the frames before do not predict about an axis, over their variance; what stands out does not say
+    /// what the noise is.
+    fn unpredicted(&self, axis: usize, more: f64, standing_out: &[usize]) -> Vec<(Place, f64)> {
         let (theta, known) = (&self.theta[axis], &self.known[axis]);
         let counts = |k: usize| theta[k].is_finite() && known[k] + more > 0.0;
         let mut count: Vec<f64> = (0..theta.len())
@@ -243,6 +250,7 @@ impl Turning<'_> {
         let mut left: Vec<f64> = (0..theta.len()).map(about).collect();
         let noise = Coloured::fit(self.t_s, &left, &usual);
         noise.whiten(self.t_s, &count, &mut [&mut left]);
+        let mut out = Vec::new();
         for (block, frames) in self.folds.blocks.iter().enumerate() {
             for at in frames.clone().filter(|&k| count[k] > 0.0) {
                 let place = Place {
@@ -251,7 +259,7 @@ impl Turning<'_> {
                     block,
                 };
                 let square = (left[at] * left[at]).min(MOST_OF_A_SQUARE);
-                out.unpredicted.push((place, square));
+                out.push((place, square));
             }
         }
         out
@@ -264,10 +272,8 @@ impl Turning<'_> {
         let mut all = Vec::new();
         for (block, frames) in self.folds.blocks.iter().enumerate() {
             for k in frames.clone().filter(|k| (1..t_s.len() - 1).contains(k)) {
-                let mixed = |values: &[f64], own: f64, neighbour: f64| {
-                    own * values[k] + neighbour * (values[k - 1] + values[k + 1])
-                };
-                let difference = mixed(theta, OWN.sqrt(), -NEIGHBOUR.sqrt());
+                let around = [k - 1, k, k + 1];
+                let difference = of_three(theta, around, OWN.sqrt(), -NEIGHBOUR.sqrt());
                 if difference.is_finite() && t_s[k + 1] - t_s[k - 1] <= longest {
                     all.push(Square {
                         place: Place {
@@ -276,7 +282,7 @@ impl Turning<'_> {
                             block,
                         },
                         square: difference * difference,
-                        known: mixed(known, OWN, NEIGHBOUR),
+                        known: of_three(known, around, OWN, NEIGHBOUR),
                     });
                 }
             }

@@ -38,7 +38,7 @@ use focal_plane::{Camera, PointsMut, Series, VectorsMut};
 use crate::search::LEADING;
 use fields::Columns;
 use variable::orders;
-pub(crate) use variable::{CHANNEL, Scale, Variable, about_mean, flux_of, range};
+pub(crate) use variable::{Scale, Variable, about_mean, flux_of, range};
 
 mod fields;
 mod variable;
@@ -376,7 +376,7 @@ fn coefficients(count: usize) -> Vec<Coefficient> {
 }
 
 /// Legendre polynomials `P_1`..`P_3`.
-fn legendre(z: f64) -> [f64; ORDERS] {
+pub(crate) fn legendre(z: f64) -> [f64; ORDERS] {
     [z, 1.5 * z * z - 0.5, z * (2.5 * z * z - 1.5)]
 }
 

@@ -56,15 +56,26 @@ pub(crate) fn rotation_of(
     frame: usize,
     shift: &[Vec<f64>],
 ) -> Option<Vector3<f64>> {
+    rotations_of(data, frame, [shift]).map(|[theta]| theta)
+}
+
+/// The rotations that several shifts of the same stars amount to.
+pub(crate) fn rotations_of<const N: usize>(
+    data: &StarData,
+    frame: usize,
+    shifts: [&[Vec<f64>]; N],
+) -> Option<[Vector3<f64>; N]> {
     let inverse = rotation_inverse(data, frame)?;
-    let mut moment = Vector3::zeros();
+    let mut moments = [Vector3::zeros(); N];
     for row in data.frames.rows_of(frame).filter(|&r| !data.outlier[r]) {
-        let jacobian = rotation_row(data, row);
-        for axis in 0..2 {
-            moment += Vector3::from(jacobian[axis]) * shift[axis][row];
+        let jacobian = rotation_row(data, row).map(Vector3::from);
+        for (moment, shift) in moments.iter_mut().zip(shifts) {
+            for (axis, turns) in jacobian.iter().enumerate() {
+                *moment += turns * shift[axis][row];
+            }
         }
     }
-    Some(inverse * moment)
+    Some(moments.map(|moment| inverse * moment))
 }
 
 /// What the stars of one frame say of its rotation.

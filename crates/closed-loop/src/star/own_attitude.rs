@@ -17,7 +17,7 @@ use telemetry::AttitudeResiduals;
 use crate::evidence::Residuals;
 use crate::situation::Situation;
 use crate::star::data::StarData;
-use crate::star::frame_rotation::rotation_of;
+use crate::star::frame_rotation::rotations_of;
 use crate::star::settling::Settled;
 
 /// The tracker's own attitude beside the stars: its error against the reference,
@@ -63,8 +63,7 @@ pub(crate) fn residuals(
         // the shifts hold the whole misalignment, and so does the error against the bare reference
         let theta = rotation_vector(&table.q[at], &data.attitude[k]) * focal_plane::ARCSEC_PER_RAD
             + data.misalignment;
-        let b = rotation_of(data, k, &shift_before)?;
-        let a = rotation_of(data, k, &shift_after)?;
+        let [b, a] = rotations_of(data, k, [&shift_before, &shift_after])?;
         Some((k, theta - b, theta - a))
     };
     let frames = (0..data.frames.frames()).into_par_iter();

@@ -2,6 +2,7 @@
 //!
 //! Not physics: which variables are tried ([`crate::noise_effects`] says how).
 
+use effects::CHANNEL;
 use telemetry::ModelKind;
 
 use crate::attitude::finish::Finish;
@@ -9,7 +10,6 @@ use crate::attitude::motion_terms;
 use crate::attitude::spatial_errors::changes_of_stars;
 use crate::evidence::Residuals;
 use crate::noise_effects::{NoiseFollows, Turning, Varies};
-use crate::search::empirical::CHANNEL;
 
 /// Changes of stars from which on a declared tracker's noise is another one every now and then; then it follows a channel
 /// where it changes by more than this share of its variance, rms, which is more than one star of a handful makes, and

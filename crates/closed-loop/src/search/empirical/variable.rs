@@ -6,13 +6,10 @@
 //!
 //! Not physics: names, values and ranges.
 
-use effects::StarRows;
+use effects::{CHANNEL, StarRows};
 use focal_plane::Series;
 
 use super::ORDERS;
-
-/// What the names of channels begin with.
-pub(crate) const CHANNEL: &str = "housekeeping:";
 
 /// A variable that a leftover may follow.
 #[derive(Clone, Debug)]
