@@ -54,7 +54,13 @@ pub(super) fn in_place_of_wander(
 ) -> Result<bool, CloseError> {
     let round = case.round;
     let (beside, folds) = (&round.beside, round.folds);
-    let Some(wander) = round.searched.wander.as_ref() else {
+    // what follows the path with its error takes the place of that error, and is asked along one without it
+    let Some(wander) = round
+        .searched
+        .wander
+        .as_ref()
+        .filter(|_| !so_far.follows_own_path())
+    else {
         return Ok(false);
     };
     let mut all = (round.inquiry.terms)(false);

@@ -4,7 +4,7 @@
 //! beside that error,
 //!
 //! ```text
-//! worth - ln(parts tried) a term > L(beside the error) - ln n an axis + 4      L: log-likelihood out of fold
+//! worth - ln(parts tried) a term > L(beside the error) - ln n an axis + 4      L: log-likelihood out of fold, as worth of arcsec
 //! ```
 //!
 //! Where nothing else beats it the time may: frames that turn to and fro with its polynomials, or for a stretch of it that
@@ -58,7 +58,8 @@ pub(super) fn in_place(coloured: &Described, plain: &Described, axes: usize) -> 
     let better = |worth: f64, parts: &[Part]| {
         let time = plain.is_of_time(parts);
         let by = if time { BY_FAR + OF_TIME } else { BY_FAR };
-        worth - plain.looked() * parts.len() as f64 > with - paid + by
+        let worth = worth + plain.fitted.log_scale - plain.looked() * parts.len() as f64;
+        worth > with - paid + by
     };
     let turns = plain.terms.iter().any(|t| t.term.turns_frames());
     let ways: &[bool] = if turns { &[false, true] } else { &[false] };
