@@ -5,9 +5,9 @@ use scenarios::simulate;
 use telemetry::report::Report;
 use telemetry::{EffectEntry, EffectValue};
 
-use crate::kit::{Case, Path, VELOCITY, closed};
+use crate::kit::{Case, Path, VELOCITY, closed, reported};
 
-/// With the correlation time of the format, a minute.
+/// With the correlation time of the format, 100 s.
 const WANDER: &str = "wander_arcsec = [0.5, 0.5, 0.5]";
 
 #[test]
@@ -85,6 +85,27 @@ fn a_wandering_reference_under_slews_is_no_effect() {
     assert!(wanders >= 8, "{wanders} of 10");
 }
 
+/// The same of quiet stars beside white noise of the reference: its rotations have a prior then, and what describes the
+/// wander under that prior is held against it in the same units.
+#[test]
+fn a_wandering_reference_with_white_noise_is_an_error_of_its_own() {
+    let paths = [
+        (Path::Drift, 0.5),
+        (Path::Nods, 0.3),
+        (Path::Nods, 0.5),
+        (Path::Turns, 0.3),
+        (Path::Turns, 0.5),
+    ];
+    for (seed, (path, white)) in (2100..).zip(paths) {
+        let reference =
+            format!("rates = false\nwhite_arcsec = [{white}, {white}, {white}]\n{WANDER}");
+        let report = reported(&Case::new(path, seed).reference(&reference).quiet(1.0));
+        let ids: Vec<&str> = report.effects.iter().map(|e| e.id.as_str()).collect();
+        assert_eq!(ids, ["reference_error"], "{path:?}, {white}");
+        assert!(!report.unattributed.present, "{path:?}, {white}");
+    }
+}
+
 /// White noise of 2 arcsec of a reference every five seconds, carried between its samples to ten frames each: a slow
 /// error of 250 nats and 4.5 s to whoever does not know its step. It is noise of samples, nothing is named, and the
 /// report says why. A wander of 60 s through the same samples is one.
@@ -142,7 +163,9 @@ fn a_slow_error_that_is_declared_is_no_step() {
                 "at_s = 33.0\nx_arcsec = 3.0\ny_arcsec = -2.0",
             );
         }
-        let wander = format!("wander_arcsec = [{wander}, {wander}, {wander}]");
+        let wander = format!(
+            "wander_arcsec = [{wander}, {wander}, {wander}]\nwander_tau_s = [60.0, 60.0, 60.0]"
+        );
         let mut case = case.reference(&wander).quiet(3.2);
         case.run.rate_hz = Some(10.0);
         case.model.noise.distortion_arcsec = Some(1.7);

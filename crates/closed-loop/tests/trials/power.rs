@@ -147,7 +147,7 @@ fn a_smear_longer_than_a_step_follows_the_path_of_its_frame() {
     assert_eq!(report.verdict, Verdict::Explained);
 }
 
-/// A reference that wanders by 0.5 arcsec over a minute, with white noise of its own or without. Along a path through its
+/// A reference that wanders by 0.5 arcsec over 100 s, with white noise of its own or without. Along a path through its
 /// attitudes the wander's own changes are among the accelerations, and a smear by these is not believed; along that
 /// less the wander that the stars tell it is, with its size, and nothing is left.
 #[test]
