@@ -48,6 +48,7 @@ use so_far::SoFar;
 mod by_channel;
 mod case;
 pub(crate) mod changing_effect;
+mod channel_forms;
 pub(crate) mod commonness;
 pub(crate) mod description;
 pub(crate) mod invariance;

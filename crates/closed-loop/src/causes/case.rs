@@ -59,6 +59,11 @@ impl<'r, 'a> Case<'r, 'a> {
         })
     }
 
+    /// Of the sought, channels by another form.
+    pub(super) fn channel_forms(&self) -> impl Iterator<Item = &Empirical> {
+        self.sought.iter().filter(|term| term.is_of_a_form())
+    }
+
     /// What a description stands for, by its places among the chosen, and that description.
     pub(super) fn stand_in(&self) -> Option<(Vec<usize>, Vec<Part>)> {
         let agreed = |set: &[usize], instead: &[Part]| {

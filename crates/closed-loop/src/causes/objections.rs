@@ -19,6 +19,7 @@ use crate::causes::star_constants::Constants;
 use crate::causes::{DOUBT, SMEAR, wanders};
 use crate::error::CloseError;
 use crate::residual_size;
+use crate::search::empirical::Empirical;
 use crate::search::misplaced::{MISPLACED, piled};
 use crate::search::refusal::Refusal;
 use crate::search::selection::{columns_of, costs};
@@ -66,6 +67,8 @@ pub(super) fn in_place_of_wander(
     let mut all = (round.inquiry.terms)(false);
     let terms = wanders::terms(beside.data, wander, case.inside, &beside.weight);
     all.extend(terms);
+    let forms: Vec<Empirical> = case.channel_forms().cloned().collect();
+    all.extend(forms.iter().cloned());
     let plain = Described::new(beside, folds, &round.searched.found, all, &[])?;
     let axes = wander.axes().iter().filter(|a| **a).count();
     let Some(instead) = wanders::in_place(&case.described, &plain, axes) else {
@@ -74,7 +77,7 @@ pub(super) fn in_place_of_wander(
     let tie = wander.behind.is_some_and(|nats| nats < TIE);
     let heaters = plain.is_of_channels(&instead);
     // what it beats speaks against no effect
-    if so_far.reinstates() || (tie || heaters) && suffice(round)? {
+    if so_far.reinstates() || (tie || heaters) && suffice(round, &forms)? {
         so_far.start = Start::White;
         so_far.found_terms.extend(looked_for(&plain, &instead));
     } else {
@@ -199,8 +202,8 @@ fn worse(
 }
 
 /// Whether the effects that are found without a slow error of the reference explain as much as any
-/// description.
-fn suffice(round: &Round<'_, '_>) -> Result<bool, CloseError> {
+/// description, of which a part may be in `forms` of channels.
+fn suffice(round: &Round<'_, '_>, forms: &[Empirical]) -> Result<bool, CloseError> {
     let (level, folds, inquiry) = (&round.beside, round.folds, round.inquiry);
     let candidates = (inquiry.candidates)();
     let Attempt::Searched(searched, _) =
@@ -208,7 +211,9 @@ fn suffice(round: &Round<'_, '_>) -> Result<bool, CloseError> {
     else {
         return Ok(false);
     };
-    let described = Described::new(level, folds, &searched.found, (inquiry.terms)(false), &[])?;
+    let mut terms = (inquiry.terms)(false);
+    terms.extend(forms.iter().cloned());
+    let described = Described::new(level, folds, &searched.found, terms, &[])?;
     let nothing = Known {
         is_no_orbit: &|_| false,
         one_star: &|_, _| false,

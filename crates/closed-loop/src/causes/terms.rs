@@ -9,6 +9,7 @@ use spectra::robust::median_step;
 
 use crate::causes::by_channel::by_channel;
 use crate::causes::changing_effect::Way;
+use crate::causes::channel_forms::channel_forms;
 use crate::causes::places::places;
 use crate::gaps::longest_step;
 use crate::search::empirical::{Empirical, Variable, about_mean, flux_of, range};
@@ -16,6 +17,7 @@ use crate::situation::{Situation, channels_of_interest};
 use crate::star::data::StarData;
 use crate::star::evidence::StarEvidence;
 use crate::unexplained::leftover::jumps::{self, SharedJump};
+use crate::unexplained::leftover::star_tracks;
 
 /// Stars beyond which none has a term of its own.
 pub(crate) const MOST_STARS: usize = 64;
@@ -299,14 +301,15 @@ pub(crate) fn turning(data: &StarData) -> Option<Empirical> {
 }
 
 /// Terms that stand where what is left, `inside` (arcsec), has them: a scale that is another one from an instant on, an
-/// edge or a patch of the detector, a channel of `terms` that one star or slot follows.
+/// edge or a patch of the detector, a channel of `terms` that one star or slot follows, or all do from a threshold on.
 pub(crate) fn sought(
     level: &StarEvidence<'_>,
     inside: &[Vec<f64>],
     terms: &[Empirical],
 ) -> Vec<Empirical> {
     let (data, weight) = (level.data, &level.weight);
-    let grown = jumps::growth(data, inside, weight);
+    let tracks = star_tracks(data, inside, weight);
+    let grown = jumps::growth(&tracks);
     let grown = grown.and_then(|SharedJump { at_s, tried }| {
         let since = Empirical::new(Variable::Since { at_s }, [0.0, 1.0], true)?;
         Some(since.looked_for_among(tried))
@@ -314,6 +317,7 @@ pub(crate) fn sought(
     let mut sought: Vec<Empirical> = grown.into_iter().collect();
     sought.extend(places(data, inside, weight));
     sought.extend(by_channel(data, inside, weight, terms));
+    sought.extend(channel_forms(data, &tracks, terms));
     sought
 }
 

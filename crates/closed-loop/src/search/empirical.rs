@@ -147,7 +147,13 @@ impl Empirical {
             let whole = matches!(by, Variable::Time | Variable::Housekeeping(..));
             let has_size = term.is_of_motion() && !whole;
             let of_size = if has_size { BENT - SIZE } else { 0 };
-            term.coefficients.truncate(OF_A_PAIR + of_size);
+            let fields = if term.is_of_channel() && whole {
+                // two channels turn a camera as one does
+                FIELDS
+            } else {
+                OF_A_PAIR
+            };
+            term.coefficients.truncate(fields + of_size);
         }
         term.by = Some((by, scale));
         Some(term)
@@ -271,6 +277,18 @@ impl Empirical {
         alone.then_some((&self.variable, series, [middle - half, middle + half]))
     }
 
+    /// The same as a straight line.
+    #[must_use]
+    pub(crate) fn straight(mut self) -> Self {
+        self.coefficients.truncate(FIELDS);
+        self
+    }
+
+    /// Whether it is a channel, or two, by a form that was looked for.
+    pub(crate) fn is_of_a_form(&self) -> bool {
+        matches!(self.variable, Variable::Housekeeping(..)) && self.among.is_some()
+    }
+
     /// Whether it is a shift of each star.
     pub(crate) fn is_of_stars(&self) -> bool {
         matches!(self.variable, Variable::Star(_)) && self.by.is_none()
@@ -323,6 +341,8 @@ impl Empirical {
         } else if matches!(self.variable, Variable::Since { .. }) {
             // nothing before it
             parts.push(vec![0]);
+        } else if self.is_of_a_form() {
+            parts.extend((0..n).map(|field| vec![field]));
         } else if n == FIELDS * ORDERS {
             // what bends alone, and the scale
             parts.extend([vec![4, 5], (4..8).collect(), vec![3]]);
@@ -491,21 +511,24 @@ impl Candidate for Empirical {
         values: &[f64],
         surroundings: &Surroundings<'_>,
     ) -> Result<Box<dyn Effect>, EffectError> {
-        if matches!(
-            self.variable,
-            Variable::Half(_)
-                | Variable::Quarter
-                | Variable::Beyond { .. }
-                | Variable::Patch { .. }
-                | Variable::PhaseProduct
-                | Variable::Turning
-                | Variable::During { .. }
-                | Variable::Since { .. }
-        ) {
+        let of_a_form = self.is_of_a_form();
+        if of_a_form
+            || matches!(
+                self.variable,
+                Variable::Half(_)
+                    | Variable::Quarter
+                    | Variable::Beyond { .. }
+                    | Variable::Patch { .. }
+                    | Variable::PhaseProduct
+                    | Variable::Turning
+                    | Variable::During { .. }
+                    | Variable::Since { .. }
+            )
+        {
             return Err(EffectError::WrongType {
                 effect: EMPIRICAL,
                 name: "variable".to_owned(),
-                expected: "a place or a time, not a half of the detector or of the run, nor a turn to and fro",
+                expected: "a place, a time or a channel, not a half of the detector or of the run, a turn to and fro or a threshold",
             });
         }
         let parameters = effects::empirical_parameters(

@@ -119,6 +119,19 @@ impl Scale {
 }
 
 impl Variable {
+    /// Whether its polynomials are not all one.
+    pub(crate) fn is_bent(&self) -> bool {
+        orders(self) > 1
+    }
+
+    /// The same channel by another series; anything else as it is.
+    pub(crate) fn with_series(&self, series: Series) -> Self {
+        match self {
+            Self::Housekeeping(name, _) => Self::Housekeeping(name.clone(), series),
+            other => other.clone(),
+        }
+    }
+
     /// Place among the names, for pairs.
     pub(super) fn rank(&self) -> usize {
         match self {

@@ -15,10 +15,9 @@ use coloured_noise::Coloured;
 use effects::{Candidate, Scene};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use super::{MIN_POINTS, MOST, Series, Track, WORTH_A_SEARCH, star_tracks};
+use super::{MIN_POINTS, MOST, Series, Track, WORTH_A_SEARCH};
 use crate::attitude::spatial_errors::SpatialErrors;
 use crate::search::selection::WIDENING;
-use crate::star::data::StarData;
 
 /// Instants tried before the neighbours of the best are.
 const MOST_STEPS: usize = 1200;
@@ -74,10 +73,9 @@ impl Series {
     }
 }
 
-/// The instant from which on the image of what is left (arcsec, per axis over all rows) is likeliest another size: in
-/// white noise, whatever that is.
-pub(crate) fn growth(data: &StarData, residual: &[Vec<f64>], weight: &[f64]) -> Option<SharedJump> {
-    let tracks = star_tracks(data, residual, weight);
+/// The instant from which on the image of what is left, by the `tracks` of its stars, is likeliest another size: in white
+/// noise, whatever that is.
+pub(crate) fn growth(tracks: &[Track]) -> Option<SharedJump> {
     // the first of the stretches
     let track = tracks.iter().find(|t| !t.turns)?.thinned();
     if track.t_s.len() < MIN_POINTS {
