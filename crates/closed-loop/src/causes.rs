@@ -34,7 +34,7 @@ use crate::error::CloseError;
 use crate::noise_effects;
 use crate::search::empirical::Empirical;
 use crate::search::joined;
-use crate::search::refusal::{Refusal, Refused};
+use crate::search::refusal::{Refused, for_own_path};
 use crate::star::evidence::StarEvidence;
 use crate::star::landing::Elsewhere;
 use crate::star::search::{Attempt, Searched, Start, attempt};
@@ -121,8 +121,7 @@ impl Named<'_> {
     /// Whether something seems to follow a path that holds the error which it would explain: what is left, or an
     /// effect that was refused for it.
     pub(crate) fn follows_own_path(&self) -> bool {
-        let refused = self.refused.values().any(|why| *why == Refusal::OwnPath);
-        refused || self.described.follows_acceleration()
+        for_own_path(&self.refused) || self.described.follows_acceleration()
     }
 }
 

@@ -21,7 +21,7 @@ use crate::error::CloseError;
 use crate::residual_size;
 use crate::search::empirical::Empirical;
 use crate::search::misplaced::{MISPLACED, piled};
-use crate::search::refusal::Refusal;
+use crate::search::refusal::{Refusal, for_own_path};
 use crate::search::selection::{columns_of, costs};
 use crate::search::{Found, family, without};
 use crate::star::evidence::StarEvidence;
@@ -53,15 +53,13 @@ pub(super) fn in_place_of_wander(
     case: &Case<'_, '_>,
     so_far: &mut SoFar,
 ) -> Result<bool, CloseError> {
+    // what follows the path with its error takes the place of that error, and is asked along one without it
+    if for_own_path(&so_far.refused) {
+        return Ok(false);
+    }
     let round = case.round;
     let (beside, folds) = (&round.beside, round.folds);
-    // what follows the path with its error takes the place of that error, and is asked along one without it
-    let Some(wander) = round
-        .searched
-        .wander
-        .as_ref()
-        .filter(|_| !so_far.follows_own_path())
-    else {
+    let Some(wander) = round.searched.wander.as_ref() else {
         return Ok(false);
     };
     let mut all = (round.inquiry.terms)(false);

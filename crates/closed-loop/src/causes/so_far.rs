@@ -108,11 +108,6 @@ impl SoFar {
         self.refused.len() < before
     }
 
-    /// Whether an effect was refused for it.
-    pub(super) fn follows_own_path(&self) -> bool {
-        self.refused.values().any(|why| *why == Refusal::OwnPath)
-    }
-
     /// Refuses those of the chosen that stand in these `places`, without another search.
     pub(super) fn take_out(&mut self, found: &mut Found, places: &[usize], why: &Refusal) {
         let chosen = found.selection.chosen.clone();

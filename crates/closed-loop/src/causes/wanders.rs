@@ -4,7 +4,8 @@
 //! beside that error,
 //!
 //! ```text
-//! worth - ln(parts tried) a term > L(beside the error) - ln n an axis + 4      L: log-likelihood out of fold, as worth of arcsec
+//! worth - ln(parts tried) a term > L(beside the error) - ln n an axis + 4
+//! L, and that in worth: log-likelihood out of fold of the measurements in arcsec
 //! ```
 //!
 //! Where nothing else beats it the time may: frames that turn to and fro with its polynomials, or for a stretch of it that

@@ -24,6 +24,11 @@ pub(crate) enum Refusal {
 /// What was refused, by family ([`crate::search::family`]).
 pub(crate) type Refused = BTreeMap<String, Refusal>;
 
+/// Whether any of them follows a path that holds the error which it would explain.
+pub(crate) fn for_own_path(refused: &Refused) -> bool {
+    refused.values().any(|why| *why == Refusal::OwnPath)
+}
+
 impl Refusal {
     /// In the words of the report.
     pub(crate) fn why(&self) -> String {
