@@ -21,6 +21,15 @@ pub(crate) struct Amplitudes {
     pub(crate) candidates: Vec<DVector<f64>>,
 }
 
+impl Amplitudes {
+    /// All of a fold: nuisance, then candidates.
+    pub(crate) fn of_fold(&self, fold: usize) -> DVector<f64> {
+        let (nuisance, candidates) = (&self.nuisance[fold], &self.candidates[fold]);
+        let all = nuisance.iter().chain(candidates.iter()).copied();
+        DVector::from_iterator(nuisance.len() + candidates.len(), all)
+    }
+}
+
 /// Residuals of every row, arcsec, in the measurement's own axes.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Residuals {

@@ -5,6 +5,7 @@
 //! data            centroids beside what the declared model says of them
 //! directions      directions and attitudes from the centroids alone, where nothing else tells them
 //! misalignment    the rotation between camera and reference, taken exactly
+//! plain_misalignment    the same to predict with, beside a slow error of the reference
 //! frame_rotation  the rotation that the stars of a frame agree on
 //! light           where the light of each star fell, better than its reference says
 //! landing         where fits take the stars, and with them the light
@@ -48,6 +49,7 @@ pub(crate) mod nuisance;
 mod outliers;
 mod own_attitude;
 mod placing;
+mod plain_misalignment;
 mod pointed;
 mod reference_noise;
 mod reference_wander;

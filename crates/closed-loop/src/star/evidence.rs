@@ -139,7 +139,7 @@ impl<'a> StarEvidence<'a> {
     }
 
     /// What is kept, then `candidates`.
-    fn all<'b>(&'b self, candidates: &[&'b dyn Candidate]) -> Vec<&'b dyn Candidate> {
+    pub(super) fn all<'b>(&'b self, candidates: &[&'b dyn Candidate]) -> Vec<&'b dyn Candidate> {
         let kept = self.kept.iter().map(AsRef::as_ref);
         kept.chain(candidates.iter().copied()).collect()
     }
@@ -164,7 +164,7 @@ impl<'a> StarEvidence<'a> {
         }
     }
 
-    fn columns<'b>(&'b self, candidates: &'b [&'b dyn Candidate]) -> StarColumns<'b> {
+    pub(super) fn columns<'b>(&'b self, candidates: &'b [&'b dyn Candidate]) -> StarColumns<'b> {
         StarColumns {
             data: self.data,
             nuisance: &self.nuisance,
@@ -176,7 +176,7 @@ impl<'a> StarEvidence<'a> {
     }
 
     /// The residual variant of a fold.
-    fn residual(&self, fold: usize) -> &[Vec<f64>; 2] {
+    pub(super) fn residual(&self, fold: usize) -> &[Vec<f64>; 2] {
         &self.residuals[if self.residuals.len() == 1 { 0 } else { fold }]
     }
 
@@ -200,27 +200,9 @@ impl<'a> StarEvidence<'a> {
             modelled: vec![vec![0.0; rows]; 2],
         });
         let whole: Vec<[DVector<f64>; N]> = (0..folds.count)
-            .map(|f| {
-                amplitudes.map(|a| {
-                    let (nuisance, candidate) = (&a.nuisance[f], &a.candidates[f]);
-                    DVector::from_iterator(
-                        nuisance.len() + candidate.len(),
-                        nuisance.iter().chain(candidate.iter()).copied(),
-                    )
-                })
-            })
+            .map(|f| amplitudes.map(|a| a.of_fold(f)))
             .collect();
-        let chunks: Vec<_> = folds
-            .fold_ranges()
-            .into_iter()
-            .enumerate()
-            .flat_map(|(fold, frames)| {
-                let end = frames.end;
-                frames
-                    .step_by(CHUNK_FRAMES)
-                    .map(move |at| (fold, at..(at + CHUNK_FRAMES).min(end)))
-            })
-            .collect();
+        let chunks = chunks_of(folds);
         let shift = |filled: &mut Filled, (fold, frames): &(usize, Range<usize>)| {
             columns.fill(frames.clone(), &layout, filled);
             let each = whole[*fold].each_ref();
@@ -298,7 +280,12 @@ impl Evidence for StarEvidence<'_> {
         candidates: &[&dyn Candidate],
         amplitudes: &Amplitudes,
     ) -> Residuals {
-        let [out] = self.residuals_of(folds, candidates, [amplitudes]);
+        if self.noise.is_none() {
+            let [out] = self.residuals_of(folds, candidates, [amplitudes]);
+            return out;
+        }
+        let plain = self.with_plain_misalignment(folds, candidates, amplitudes);
+        let [out] = self.residuals_of(folds, candidates, [&plain]);
         out
     }
 
@@ -310,6 +297,17 @@ impl Evidence for StarEvidence<'_> {
         };
         columns.distance(values) / self.unit_arcsec2()
     }
+}
+
+/// Frames of each fold, some at a time.
+pub(super) fn chunks_of(folds: &Folds) -> Vec<(usize, Range<usize>)> {
+    let each = folds.fold_ranges().into_iter().enumerate();
+    let chunks = each.flat_map(|(fold, frames)| {
+        let end = frames.end;
+        let starts = frames.step_by(CHUNK_FRAMES);
+        starts.map(move |at| (fold, at..(at + CHUNK_FRAMES).min(end)))
+    });
+    chunks.collect()
 }
 
 /// Takes from a frame's residuals the rotation that its stars (outliers aside)

@@ -1,0 +1,121 @@
+//! The misalignment to predict with beside a slow error of the reference.
+//!
+//! Of a rotation that wanders for as long as the run lasts, generalised least squares believes the changes from frame
+//! to frame and knows little of the mean: a constant that suits the other folds may be off by several sigmas of the wander
+//! in an outer one. What is predicted is a fold's residual, of which the plain mean of the other folds is closer:
+//!
+//! ```text
+//! theta_f = (sum w^2 A' A + s^2 P)^-1 sum w^2 A' (r - shift_f)     over the rows of other folds
+//! ```
+//!
+//! A: columns of the misalignment; `shift_f`: what everything else that was fitted without fold f shifts a row by; P: prior
+//! precision; s: noise of a row of weight 1.
+//!
+//! Source: ordinary least squares.
+
+use std::ops::Range;
+
+use block_regression::Folds;
+use effects::Candidate;
+use nalgebra::{DVector, Matrix3, Vector3};
+use rayon::prelude::*;
+
+use crate::evidence::{Amplitudes, Evidence};
+use crate::star::columns::StarColumns;
+use crate::star::evidence::{StarEvidence, chunks_of};
+use crate::star::layout::Filled;
+
+/// Normal equations of three angles.
+#[derive(Clone, Copy)]
+struct Normal {
+    matrix: Matrix3<f64>,
+    moment: Vector3<f64>,
+}
+
+impl Normal {
+    const NOTHING: Self = Self {
+        matrix: Matrix3::from_array_storage(nalgebra::ArrayStorage([[0.0; 3]; 3])),
+        moment: Vector3::new(0.0, 0.0, 0.0),
+    };
+
+    fn add(&mut self, other: &Self) {
+        self.matrix += other.matrix;
+        self.moment += other.moment;
+    }
+}
+
+impl StarEvidence<'_> {
+    /// `amplitudes` with the misalignment, where there is one, that the rows of other folds have in the plain mean.
+    pub(super) fn with_plain_misalignment(
+        &self,
+        folds: &Folds,
+        candidates: &[&dyn Candidate],
+        amplitudes: &Amplitudes,
+    ) -> Amplitudes {
+        let mut out = amplitudes.clone();
+        if self.nuisance.parts().0 == 0 {
+            return out;
+        }
+        for nuisance in &mut out.nuisance {
+            nuisance.rows_mut(0, 3).fill(0.0);
+        }
+        let all = self.all(candidates);
+        let columns = StarColumns {
+            residuals: &[],
+            ..self.columns(&all)
+        };
+        let layout = columns.layout();
+        let whole: Vec<DVector<f64>> = (0..folds.count).map(|f| out.of_fold(f)).collect();
+        let told = |filled: &mut Filled, (fold, frames): &(usize, Range<usize>)| {
+            columns.fill(frames.clone(), &layout, filled);
+            let of_fold = |f: usize| {
+                if f == *fold {
+                    return Normal::NOTHING;
+                }
+                let shift = columns.shift(frames.clone(), &layout, filled, &whole[f]);
+                self.normal_of(frames.clone(), filled, f, &shift)
+            };
+            (0..folds.count).map(of_fold).collect::<Vec<Normal>>()
+        };
+        let chunks = chunks_of(folds);
+        let each: Vec<Vec<Normal>> = chunks.par_iter().map_init(Filled::default, told).collect();
+        let precision = self.precision();
+        let prior = precision.fixed_view::<3, 3>(0, 0) * self.unit_arcsec2();
+        for (f, nuisance) in out.nuisance.iter_mut().enumerate() {
+            let mut normal = Normal::NOTHING;
+            each.iter().for_each(|of_folds| normal.add(&of_folds[f]));
+            let theta = (normal.matrix + prior).try_inverse();
+            let theta = theta.map(|inverse| inverse * normal.moment);
+            let was = amplitudes.nuisance[f].fixed_rows::<3>(0).into_owned();
+            nuisance.rows_mut(0, 3).copy_from(&theta.unwrap_or(was));
+        }
+        out
+    }
+
+    /// Of the rows of `frames`, whose columns are filled, less their `shift`: the residual is that of a fold.
+    fn normal_of(
+        &self,
+        frames: Range<usize>,
+        filled: &Filled,
+        fold: usize,
+        shift: &[DVector<f64>; 2],
+    ) -> Normal {
+        let data = self.data;
+        let rows = data.frames.first_row[frames.start]..data.frames.first_row[frames.end];
+        let residual = self.residual(fold);
+        let mut normal = Normal::NOTHING;
+        for (i, row) in rows.enumerate() {
+            let left = [0, 1].map(|a| residual[a][row] - shift[a][i]);
+            if data.outlier[row] || left.iter().any(|l| !l.is_finite()) {
+                continue;
+            }
+            let weight = self.weight[row].powi(2);
+            for (own, left) in filled.own.iter().zip(left) {
+                let turned = Vector3::from_fn(|k, _| own[(i, k)]);
+                normal.matrix += turned * turned.transpose() * weight;
+                normal.moment += turned * (left * weight);
+            }
+        }
+        normal
+    }
+}
