@@ -58,13 +58,26 @@ impl Coloured {
     /// What is known of the slow part of this noise, the likeliest of a `y` from which its mean may have been taken.
     /// `None`: it has none, or the times have no steps.
     pub fn slow_bounds(&self, t_s: &[f64], y: &[f64], count: &[f64]) -> Option<SlowBounds> {
+        self.slow_bounds_weighed(t_s, y, count, |_| 0.0)
+    }
+
+    /// The same of laws that are not all as likely before `y` is looked at: the logarithm of the `weight` of each, nats.
+    pub(crate) fn slow_bounds_weighed(
+        &self,
+        t_s: &[f64],
+        y: &[f64],
+        count: &[f64],
+        weight: impl Fn(&Self) -> f64 + Sync,
+    ) -> Option<SlowBounds> {
         let scales = Scales::of(t_s).filter(|s| self.slow > 0.0 && s.span > s.step)?;
         let steps = self
             .relative_sigma(t_s, y, count)
             .map_or(USUAL_STEP, |sigma| {
                 std::array::from_fn(|i| (STEP * sigma[i]).min(USUAL_STEP[i]))
             });
-        let summit = self.log_likelihood_beside_constant(t_s, y, count);
+        let log =
+            |noise: &Self| noise.log_likelihood_beside_constant(t_s, y, count) + weight(noise);
+        let summit = log(self);
         let grid = Grid {
             widest: FURTHEST.ln() / steps[0],
             density: |[slow, tau]: [f64; 2]| {
@@ -73,7 +86,7 @@ impl Coloured {
                     tau_s: self.tau_s * (tau * steps[1]).exp(),
                     ..*self
                 };
-                (noise.log_likelihood_beside_constant(t_s, y, count) - summit).exp()
+                (log(&noise) - summit).exp()
             },
         };
         let whole = |tau_s: f64| (tau_s / self.tau_s).ln() / steps[1];

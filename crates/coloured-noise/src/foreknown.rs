@@ -31,8 +31,13 @@ impl Foreknown {
 
     /// Logarithm of the weight of a noise, nats; 0 where it is as expected.
     pub fn log_weight(&self, noise: &Coloured) -> f64 {
+        self.log_weight_apart(noise, Self::SPREAD)
+    }
+
+    /// The same of what is known so well, in the logarithms of size and time.
+    pub(crate) fn log_weight_apart(&self, noise: &Coloured, spread: [f64; 2]) -> f64 {
         let off = [noise.slow / self.slow, noise.tau_s / self.tau_s];
-        let each = off.into_iter().zip(Self::SPREAD);
+        let each = off.into_iter().zip(spread);
         let each = each.map(|(off, spread)| Self::surprise(off, spread));
         -0.5 * (Self::FREEDOM + 1.0) * each.sum::<f64>()
     }

@@ -28,6 +28,7 @@
 //! | likelihoods of rival noises | [`Coloured::log_likelihood`], [`LogProduct`] |
 //! | rotations of frames, and whether their error is slow | [`Rotations`], [`SlowGains`] |
 //! | the noise taken out of their columns | [`Filter`] |
+//! | the noise to tell amplitudes beside, once that is so | [`Rotations::believed`] |
 //! | the slow error itself, as all rotations tell it | [`Rotations::slow_part`] |
 //!
 //! Series and sigmas are in one unit, whatever it is; times are seconds.

@@ -27,6 +27,8 @@ use crate::foreknown::Foreknown;
 use crate::joint::Joint;
 use crate::smoother::slow_part;
 
+mod believed;
+
 /// Sigmas beyond which changes from bin to bin show white noise of the reference.
 const BEYOND_CHANCE: f64 = 4.0;
 /// Times that the white noise which changes show is weighed by what was found before.
@@ -371,28 +373,47 @@ mod tests {
 
     const CENTROID: f64 = 5.25;
     const STARS: f64 = 12.0;
-    const STEP_S: f64 = 0.5;
+    pub(super) const STEP_S: f64 = 0.5;
 
     /// Rotations of so many frames of twelve stars, with slow errors of `sigma` and `tau_s` about each axis.
     fn rotations(frames: usize, slow: [[f64; 2]; 3], seed: u64) -> Rotations {
+        let series = series(frames, slow, [CENTROID / STARS.sqrt(); 3], seed);
+        rotations_of(&series, [STARS; 3], CENTROID)
+    }
+
+    /// Three series of slow errors of `sigma` and `tau_s` with `white` noise.
+    pub(super) fn series(
+        frames: usize,
+        slow: [[f64; 2]; 3],
+        white: [f64; 3],
+        seed: u64,
+    ) -> [Vec<f64>; 3] {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
         let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
-        let mean = slow.map(|[sigma, tau_s]| {
+        std::array::from_fn(|axis| {
+            let [sigma, tau_s] = slow[axis];
             let decay = (-STEP_S / tau_s).exp();
             let mut state = sigma * normal();
             let mut series = Vec::new();
             for _ in 0..frames {
-                series.push(state + CENTROID / STARS.sqrt() * normal());
+                series.push(state + white[axis] * normal());
                 state = decay * state + sigma * (1.0 - decay * decay).sqrt() * normal();
             }
             series
-        });
+        })
+    }
+
+    /// Rotations about three axes of frames that are worth so many `stars`.
+    pub(super) fn rotations_of(mean: &[Vec<f64>; 3], stars: [f64; 3], centroid: f64) -> Rotations {
+        let frames = mean[0].len();
         let theta: Vec<f64> = (0..frames)
             .flat_map(|k| mean.each_ref().map(|m| m[k]))
             .collect();
         let t_s = (0..frames).map(|k| STEP_S * k as f64).collect();
-        let inverse = Some(Matrix3::identity() / STARS);
-        Rotations::new(t_s, theta, vec![1; frames], vec![inverse; frames], CENTROID)
+        let inverse = Some(Matrix3::from_diagonal(
+            &Vector3::from(stars).map(f64::recip),
+        ));
+        Rotations::new(t_s, theta, vec![1; frames], vec![inverse; frames], centroid)
     }
 
     /// White rotations leave nothing to a slow error: what is claimed of one is likelier than white noise, or

@@ -103,10 +103,14 @@ pub(super) fn beside_slow<'a>(
         };
         let Some((added, its_noise)) = search.best(&trial, &base, [&plain, &filtered]) else {
             let (worth, cost) = (trial.worth(&base), trial.cost);
+            let found = search.noise;
+            if search.turns_frames() {
+                search.noise = base.rotations.believed(&found);
+            }
             let (fitted, selection) = search.judged(&moments, &cost, stands)?;
             let candidates = search.candidates;
             return Ok(Coloured {
-                wander: Wander::of(base.rotations, search.noise),
+                wander: Wander::of(base.rotations, found),
                 begun: Begun {
                     candidates: candidates.clone(),
                     moments,
@@ -138,6 +142,11 @@ pub(super) fn beside_slow<'a>(
 }
 
 impl<'s> Search<'s, '_> {
+    fn turns_frames(&self) -> bool {
+        let mut chosen = self.chosen.iter();
+        chosen.any(|&g| self.candidates[g].acts_on_attitude())
+    }
+
     fn beside(&self, fitted: Fitted) -> Result<Fitted, CloseError> {
         fitted.beside(self.folds, &borrowed(&self.candidates), &self.chosen)
     }
