@@ -35,7 +35,7 @@ impl Foreknown {
     }
 
     /// The same of what is known so well, in the logarithms of size and time.
-    pub(crate) fn log_weight_apart(&self, noise: &Coloured, spread: [f64; 2]) -> f64 {
+    pub(crate) fn log_weight_apart(self, noise: &Coloured, spread: [f64; 2]) -> f64 {
         let off = [noise.slow / self.slow, noise.tau_s / self.tau_s];
         let each = off.into_iter().zip(spread);
         let each = each.map(|(off, spread)| Self::surprise(off, spread));

@@ -33,7 +33,7 @@ impl Rotations {
         for axis in 0..3 {
             let others = (0..2).filter(|&other| other != axis);
             let like = mean_of(others.filter_map(|other| own[other].as_ref()));
-            let believed = match &like {
+            let believed = match like {
                 Some(like) => self.bounds_like(noise, axis, like),
                 None => own[axis],
             };
@@ -46,12 +46,7 @@ impl Rotations {
     }
 
     /// Bounds of the slow part of an axis that another axis has such a one `like`.
-    fn bounds_like(
-        &self,
-        noise: &CommonNoise,
-        axis: usize,
-        like: &Foreknown,
-    ) -> Option<SlowBounds> {
+    fn bounds_like(&self, noise: &CommonNoise, axis: usize, like: Foreknown) -> Option<SlowBounds> {
         let reference = noise.reference[axis];
         let (start, worth) = if reference.slow > 0.0 {
             let (start, worth, _) = self.by_itself(axis, reference);
