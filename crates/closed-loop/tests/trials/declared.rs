@@ -23,7 +23,7 @@ fn what_is_declared_is_not_found_again() {
     ];
     for (path, id, parameters) in found {
         let mut case = Case::new(path, 7).with(id, parameters);
-        case.duration_s = 900.0;
+        case.duration_s = if path == Path::Drift { 900.0 } else { 600.0 };
         if parameters == "scale = 1.0" {
             case.channels += VELOCITY;
         }
