@@ -5,7 +5,6 @@
 //! data            centroids beside what the declared model says of them
 //! directions      directions and attitudes from the centroids alone, where nothing else tells them
 //! misalignment    the rotation between camera and reference, taken exactly
-//! plain_misalignment    the same to predict with, beside a slow error of the reference
 //! frame_rotation  the rotation that the stars of a frame agree on
 //! light           where the light of each star fell, better than its reference says
 //! landing         where fits take the stars, and with them the light
@@ -20,6 +19,7 @@
 //! moments         their products, in one pass, for every fit at every noise
 //! by_star         the same of a short run, star by star
 //! evidence        data, noise and products as what the search asks of a measurement
+//! prediction      amplitudes to predict a fold with, beside a slow error of the reference
 //! settling        the declared model at its best, and the outliers beside it
 //! steadied        the reference's path less its slow error
 //! search          the search where the reference itself may err
@@ -49,8 +49,8 @@ pub(crate) mod nuisance;
 mod outliers;
 mod own_attitude;
 mod placing;
-mod plain_misalignment;
 mod pointed;
+mod prediction;
 mod reference_noise;
 mod reference_wander;
 mod rows_left;

@@ -284,8 +284,8 @@ impl Evidence for StarEvidence<'_> {
             let [out] = self.residuals_of(folds, candidates, [amplitudes]);
             return out;
         }
-        let plain = self.with_plain_misalignment(folds, candidates, amplitudes);
-        let [out] = self.residuals_of(folds, candidates, [&plain]);
+        let told = self.to_predict(folds, candidates, amplitudes);
+        let [out] = self.residuals_of(folds, candidates, [&told]);
         out
     }
 

@@ -305,8 +305,27 @@ impl StarMoments {
 
     /// The products of `columns` under `noise`: of scalars of unit variance.
     pub(crate) fn under(&self, columns: &[usize], noise: &CommonNoise) -> BlockGrams {
+        self.under_beside(columns, noise, None)
+    }
+
+    /// The same where the rotations of the bins of a fold are not known.
+    pub(crate) fn under_without(
+        &self,
+        columns: &[usize],
+        noise: &CommonNoise,
+        fold: usize,
+    ) -> BlockGrams {
+        self.under_beside(columns, noise, Some(fold))
+    }
+
+    fn under_beside(
+        &self,
+        columns: &[usize],
+        noise: &CommonNoise,
+        gap: Option<usize>,
+    ) -> BlockGrams {
         let weight = noise.centroid.powi(-2);
-        let (log_scale, innovations) = self.innovations(columns, noise);
+        let (log_scale, innovations) = self.innovations(columns, noise, gap);
         let gram = self
             .blocks
             .par_iter()
@@ -325,7 +344,7 @@ impl StarMoments {
     /// The sum over the blocks of [`under`](Self::under).
     pub(crate) fn under_in_all(&self, columns: &[usize], noise: &CommonNoise) -> BlockGrams {
         let weight = noise.centroid.powi(-2);
-        let (log_scale, innovations) = self.innovations(columns, noise);
+        let (log_scale, innovations) = self.innovations(columns, noise, None);
         let mut gram = pick(self.rest(), columns) * weight;
         for e in innovations {
             gram.gemm(1.0, &e.transpose(), &e, 1.0);
@@ -340,12 +359,19 @@ impl StarMoments {
     }
 
     /// Whitened innovations of the rotations, block by block, and what the log-likelihood of scalars
-    /// under `noise` lacks.
-    fn innovations(&self, columns: &[usize], noise: &CommonNoise) -> (f64, Vec<DMatrix<f64>>) {
-        let inverse: Vec<Option<Matrix3<f64>>> = self
-            .blocks
-            .iter()
-            .flat_map(|b| b.inverse.iter().copied())
+    /// under `noise` lacks. Those of the fold `gap` are not known.
+    fn innovations(
+        &self,
+        columns: &[usize],
+        noise: &CommonNoise,
+        gap: Option<usize>,
+    ) -> (f64, Vec<DMatrix<f64>>) {
+        let folds = self.blocks.iter().zip(&self.fold_of_block);
+        let inverse: Vec<Option<Matrix3<f64>>> = folds
+            .flat_map(|(b, fold)| {
+                let known = gap != Some(*fold);
+                b.inverse.iter().map(move |v| v.filter(|_| known))
+            })
             .collect();
         let filter = Filter::new(noise, &self.t_s, &self.frames, &inverse);
         let mut log_scale = filter.log_scale;

@@ -341,28 +341,64 @@ fn white_noise_of_a_reference_is_weighed_as_its_covariance_says() {
     }
 }
 
+/// Noise of the stars and slow errors of the reference.
+fn shared_noise() -> CommonNoise {
+    CommonNoise {
+        centroid: 4.0,
+        reference: [(0.5, 1.5, 8.0), (0.0, 0.7, 2.0), (3.0, 9.0, 30.0)]
+            .map(|(white, slow, tau_s)| Coloured { white, slow, tau_s }),
+    }
+}
+
+/// Covariance of rows that see these rotations in these frames.
+fn covariance(
+    noise: &CommonNoise,
+    turns: &[(usize, Vector3<f64>)],
+    data: &StarData,
+) -> DMatrix<f64> {
+    DMatrix::from_fn(turns.len(), turns.len(), |i, j| {
+        let ((a, u), (b, v)) = (turns[i], turns[j]);
+        let apart = (data.frames.t_s[a] - data.frames.t_s[b]).abs();
+        let shared = (0..3).map(|k| {
+            let n = noise.reference[k];
+            let white = if a == b { n.white * n.white } else { 0.0 };
+            u[k] * v[k] * (white + n.slow * n.slow * (-apart / n.tau_s).exp())
+        });
+        let own = if i == j { noise.centroid.powi(2) } else { 0.0 };
+        own + shared.sum::<f64>()
+    })
+}
+
+/// The same of the rows of all folds but one, which knows nothing of them: with the covariance of those rows alone.
+#[test]
+fn a_fold_that_is_left_out_is_a_gap() {
+    let noise = shared_noise();
+    with_both(false, |moments, c, turns, data| {
+        let folds = Folds::cut(data.frames.frames());
+        let all: Vec<usize> = (0..moments.width()).collect();
+        for (fold, frames) in folds.fold_ranges().into_iter().enumerate() {
+            let other = |i: &usize| !frames.contains(&turns[*i].0);
+            let rows: Vec<usize> = (0..c.nrows()).filter(other).collect();
+            let turns: Vec<_> = rows.iter().map(|&i| turns[i]).collect();
+            let factor = covariance(&noise, &turns, data).cholesky().unwrap();
+            let c = c.select_rows(&rows);
+            let mut grams = moments.under_without(&all, &noise, fold);
+            let mut blocks = folds.fold_of_block.iter().map(|of| *of != fold);
+            grams.gram.retain(|_| blocks.next() == Some(true));
+            grams.known = None;
+            let (sum, _) = grams.total();
+            close(&sum, &(c.transpose() * factor.solve(&c)));
+        }
+    });
+}
+
 /// Generalised least squares with the whole covariance of all rows; bins hold one frame
 /// here, so that nothing is approximated. Its likelihood has the determinant too.
 #[test]
 fn noise_that_frames_share_is_weighed_as_its_covariance_says() {
-    let noise = CommonNoise {
-        centroid: 4.0,
-        reference: [(0.5, 1.5, 8.0), (0.0, 0.7, 2.0), (3.0, 9.0, 30.0)]
-            .map(|(white, slow, tau_s)| Coloured { white, slow, tau_s }),
-    };
+    let noise = shared_noise();
     with_both(false, |moments, c, turns, data| {
-        let covariance = DMatrix::from_fn(c.nrows(), c.nrows(), |i, j| {
-            let ((a, u), (b, v)) = (turns[i], turns[j]);
-            let apart = (data.frames.t_s[a] - data.frames.t_s[b]).abs();
-            let shared = (0..3).map(|k| {
-                let n = noise.reference[k];
-                let white = if a == b { n.white * n.white } else { 0.0 };
-                u[k] * v[k] * (white + n.slow * n.slow * (-apart / n.tau_s).exp())
-            });
-            let own = if i == j { 16.0 } else { 0.0 };
-            own + shared.sum::<f64>()
-        });
-        let factor = covariance.cholesky().unwrap();
+        let factor = covariance(&noise, turns, data).cholesky().unwrap();
         let all: Vec<usize> = (0..moments.width()).collect();
         let grams = moments.under(&all, &noise);
         let (sum, scalars) = grams.total();

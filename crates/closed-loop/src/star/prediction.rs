@@ -1,4 +1,7 @@
-//! The misalignment to predict with beside a slow error of the reference.
+//! Amplitudes to predict a fold with beside a slow error of the reference.
+//!
+//! Innovations of other folds know what came before them in the fold that is left out: of a step within it they tell next
+//! to nothing. So its bins are left out of the filter, and the other folds tell what acts by its level before and after.
 //!
 //! Of a rotation that wanders for as long as the run lasts, generalised least squares believes the changes from frame
 //! to frame and knows little of the mean: a constant that suits the other folds may be off by several sigmas of the wander
@@ -11,11 +14,11 @@
 //! A: columns of the misalignment; `shift_f`: what everything else that was fitted without fold f shifts a row by; P: prior
 //! precision; s: noise of a row of weight 1.
 //!
-//! Source: ordinary least squares.
+//! Source: Aitken 1935 (generalised least squares), of a series with a gap; ordinary least squares.
 
 use std::ops::Range;
 
-use block_regression::Folds;
+use block_regression::{Fits, Folds, Layout};
 use effects::Candidate;
 use nalgebra::{DVector, Matrix3, Vector3};
 use rayon::prelude::*;
@@ -45,8 +48,59 @@ impl Normal {
 }
 
 impl StarEvidence<'_> {
+    /// `amplitudes`, each fold's from the others: see the module.
+    pub(super) fn to_predict(
+        &self,
+        folds: &Folds,
+        candidates: &[&dyn Candidate],
+        amplitudes: &Amplitudes,
+    ) -> Amplitudes {
+        let across = self.across_gaps(folds, candidates, amplitudes);
+        let told = across.as_ref().unwrap_or(amplitudes);
+        self.with_plain_misalignment(folds, candidates, told)
+    }
+
+    /// The same amplitudes as the other folds tell them across the gap that each leaves; `None` where nothing turns
+    /// frames, or where centroids were learned outside each fold.
+    fn across_gaps(
+        &self,
+        folds: &Folds,
+        candidates: &[&dyn Candidate],
+        amplitudes: &Amplitudes,
+    ) -> Option<Amplitudes> {
+        let noise = self.noise.as_ref()?;
+        if self.learned() || !candidates.iter().any(|c| c.acts_on_attitude()) {
+            return None;
+        }
+        let moments = self.moments(folds, candidates);
+        let columns: Vec<usize> = (0..moments.width()).collect();
+        let nuisance_precision = self.precision();
+        let layout = Layout {
+            relative: self.relative(),
+            candidates: columns.len() - nuisance_precision.nrows() - 1,
+            residuals: 1,
+            nuisance_precision,
+        };
+        let fitted = |c: &usize| amplitudes.candidates.iter().any(|a| a[*c] != 0.0);
+        let set: Vec<usize> = (0..layout.candidates).filter(fitted).collect();
+        let mut out = amplitudes.clone();
+        for fold in 0..folds.count {
+            let grams = moments.under_without(&columns, noise, fold);
+            let fits = Fits::new(&grams, folds, &layout, 1.0)?;
+            // what acts in that fold alone is as the fit has it
+            let Some(beta) = fits.amplitudes_without(fold, &set) else {
+                continue;
+            };
+            out.nuisance[fold] = fits.nuisance(Some(fold), &set, &beta);
+            for (&c, value) in set.iter().zip(beta.iter()) {
+                out.candidates[fold][c] = *value;
+            }
+        }
+        Some(out)
+    }
+
     /// `amplitudes` with the misalignment, where there is one, that the rows of other folds have in the plain mean.
-    pub(super) fn with_plain_misalignment(
+    fn with_plain_misalignment(
         &self,
         folds: &Folds,
         candidates: &[&dyn Candidate],
