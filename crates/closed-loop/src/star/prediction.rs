@@ -60,8 +60,8 @@ impl StarEvidence<'_> {
         self.with_plain_misalignment(folds, candidates, told)
     }
 
-    /// The same amplitudes as the other folds tell them across the gap that each leaves; `None` where nothing turns
-    /// frames, or where centroids were learned outside each fold.
+    /// The same amplitudes as the other folds tell them across the gap that each leaves; `None` where nothing turns the
+    /// camera as a whole, or where centroids were learned outside each fold.
     fn across_gaps(
         &self,
         folds: &Folds,
@@ -69,7 +69,7 @@ impl StarEvidence<'_> {
         amplitudes: &Amplitudes,
     ) -> Option<Amplitudes> {
         let noise = self.noise.as_ref()?;
-        if self.learned() || !candidates.iter().any(|c| c.acts_on_attitude()) {
+        if self.learned() || !candidates.iter().any(|c| c.turns_camera()) {
             return None;
         }
         let moments = self.moments(folds, candidates);
