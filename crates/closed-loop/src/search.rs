@@ -203,12 +203,7 @@ fn fitted(
     candidates: &[&dyn Candidate],
     of: impl FnOnce(&FoldSums, &Layout, f64) -> Option<Fits>,
 ) -> Result<Fitted, CloseError> {
-    let layout = Layout {
-        nuisance_precision: evidence.precision(),
-        relative: evidence.relative(),
-        candidates: candidates.iter().map(|c| c.coefficients().len()).sum(),
-        residuals: evidence.residual_columns(),
-    };
+    let layout = layout_of(evidence, candidates);
     let guess = evidence.variance_guess();
     let sums = grams.by_fold(folds);
     let variance = Fits::noise_alone(&sums, &layout, guess)
@@ -223,6 +218,16 @@ fn fitted(
         variance,
         log_scale: grams.log_scale,
     })
+}
+
+/// What the columns of normal equations with `candidates` in them are.
+pub(crate) fn layout_of(evidence: &dyn Evidence, candidates: &[&dyn Candidate]) -> Layout {
+    Layout {
+        nuisance_precision: evidence.precision(),
+        relative: evidence.relative(),
+        candidates: candidates.iter().map(|c| c.coefficients().len()).sum(),
+        residuals: evidence.residual_columns(),
+    }
 }
 
 /// The columns that the data shows, candidate by candidate.

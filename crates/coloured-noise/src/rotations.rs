@@ -260,6 +260,13 @@ impl Rotations {
         self.likeliest(axis, |y, count| self.near(reference, axis, y, count))
     }
 
+    /// The same of `noise`; `None`: it has no slow part.
+    fn slow_by_itself(&self, noise: &CommonNoise, axis: usize) -> Option<(Coloured, Worth)> {
+        let reference = noise.reference[axis];
+        let (own, worth, _) = (reference.slow > 0.0).then(|| self.by_itself(axis, reference))?;
+        Some((own, worth))
+    }
+
     fn near(&self, reference: Coloured, axis: usize, y: &[f64], count: &[f64]) -> Coloured {
         let start = self.with_centroids(axis, reference, count);
         start.refit_above(self.centroid, &self.t_s, y, count)
@@ -267,11 +274,7 @@ impl Rotations {
 
     /// Bounds of the slow part of an axis. `None`: it has none.
     pub fn slow_bounds(&self, noise: &CommonNoise, axis: usize) -> Option<SlowBounds> {
-        let reference = noise.reference[axis];
-        if reference.slow <= 0.0 {
-            return None;
-        }
-        let (own, worth, _) = self.by_itself(axis, reference);
+        let (own, worth) = self.slow_by_itself(noise, axis)?;
         own.slow_bounds(&self.t_s, &self.mean[axis], self.of(worth, axis))
     }
 

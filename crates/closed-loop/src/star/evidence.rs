@@ -164,7 +164,7 @@ impl<'a> StarEvidence<'a> {
         }
     }
 
-    pub(super) fn columns<'b>(&'b self, candidates: &'b [&'b dyn Candidate]) -> StarColumns<'b> {
+    fn columns<'b>(&'b self, candidates: &'b [&'b dyn Candidate]) -> StarColumns<'b> {
         StarColumns {
             data: self.data,
             nuisance: &self.nuisance,
@@ -172,6 +172,17 @@ impl<'a> StarEvidence<'a> {
             residuals: &self.residuals,
             motion: self.motion,
             weight: &self.weight,
+        }
+    }
+
+    /// The same without residuals.
+    pub(super) fn bare_columns<'b>(
+        &'b self,
+        candidates: &'b [&'b dyn Candidate],
+    ) -> StarColumns<'b> {
+        StarColumns {
+            residuals: &[],
+            ..self.columns(candidates)
         }
     }
 
@@ -189,10 +200,7 @@ impl<'a> StarEvidence<'a> {
     ) -> [Residuals; N] {
         let data = self.data;
         let all = self.all(candidates);
-        let columns = StarColumns {
-            residuals: &[],
-            ..self.columns(&all)
-        };
+        let columns = self.bare_columns(&all);
         let layout = columns.layout();
         let rows = data.t_s.len();
         let mut out = amplitudes.map(|_| Residuals {
@@ -280,22 +288,16 @@ impl Evidence for StarEvidence<'_> {
         candidates: &[&dyn Candidate],
         amplitudes: &Amplitudes,
     ) -> Residuals {
-        if self.noise.is_none() {
-            let [out] = self.residuals_of(folds, candidates, [amplitudes]);
-            return out;
-        }
-        let told = self.to_predict(folds, candidates, amplitudes);
-        let [out] = self.residuals_of(folds, candidates, [&told]);
+        let noise = self.noise.as_ref();
+        let told = noise.map(|noise| self.to_predict(noise, folds, candidates, amplitudes));
+        let amplitudes = told.as_ref().unwrap_or(amplitudes);
+        let [out] = self.residuals_of(folds, candidates, [amplitudes]);
         out
     }
 
     fn distance(&self, one: &dyn Candidate, other: &dyn Candidate, values: &[f64]) -> f64 {
         let both = [one, other];
-        let columns = StarColumns {
-            residuals: &[],
-            ..self.columns(&both)
-        };
-        columns.distance(values) / self.unit_arcsec2()
+        self.bare_columns(&both).distance(values) / self.unit_arcsec2()
     }
 }
 

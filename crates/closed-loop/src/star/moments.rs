@@ -305,20 +305,11 @@ impl StarMoments {
 
     /// The products of `columns` under `noise`: of scalars of unit variance.
     pub(crate) fn under(&self, columns: &[usize], noise: &CommonNoise) -> BlockGrams {
-        self.under_beside(columns, noise, None)
+        self.under_without(columns, noise, None)
     }
 
-    /// The same where the rotations of the bins of a fold are not known.
+    /// The same where the rotations of the bins of the fold `gap` are not known.
     pub(crate) fn under_without(
-        &self,
-        columns: &[usize],
-        noise: &CommonNoise,
-        fold: usize,
-    ) -> BlockGrams {
-        self.under_beside(columns, noise, Some(fold))
-    }
-
-    fn under_beside(
         &self,
         columns: &[usize],
         noise: &CommonNoise,

@@ -18,29 +18,25 @@
 
 use std::ops::Range;
 
-use block_regression::{Fits, Folds, Layout};
+use block_regression::{Fits, Folds};
+use coloured_noise::CommonNoise;
 use effects::Candidate;
 use nalgebra::{DVector, Matrix3, Vector3};
 use rayon::prelude::*;
 
 use crate::evidence::{Amplitudes, Evidence};
-use crate::star::columns::StarColumns;
+use crate::search::layout_of;
 use crate::star::evidence::{StarEvidence, chunks_of};
 use crate::star::layout::Filled;
 
 /// Normal equations of three angles.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Default)]
 struct Normal {
     matrix: Matrix3<f64>,
     moment: Vector3<f64>,
 }
 
 impl Normal {
-    const NOTHING: Self = Self {
-        matrix: Matrix3::from_array_storage(nalgebra::ArrayStorage([[0.0; 3]; 3])),
-        moment: Vector3::new(0.0, 0.0, 0.0),
-    };
-
     fn add(&mut self, other: &Self) {
         self.matrix += other.matrix;
         self.moment += other.moment;
@@ -48,14 +44,15 @@ impl Normal {
 }
 
 impl StarEvidence<'_> {
-    /// `amplitudes`, each fold's from the others: see the module.
+    /// `amplitudes`, each fold's from the others, under this `noise` of the evidence: see the module.
     pub(super) fn to_predict(
         &self,
+        noise: &CommonNoise,
         folds: &Folds,
         candidates: &[&dyn Candidate],
         amplitudes: &Amplitudes,
     ) -> Amplitudes {
-        let across = self.across_gaps(folds, candidates, amplitudes);
+        let across = self.across_gaps(noise, folds, candidates, amplitudes);
         let told = across.as_ref().unwrap_or(amplitudes);
         self.with_plain_misalignment(folds, candidates, told)
     }
@@ -64,28 +61,22 @@ impl StarEvidence<'_> {
     /// camera as a whole, or where centroids were learned outside each fold.
     fn across_gaps(
         &self,
+        noise: &CommonNoise,
         folds: &Folds,
         candidates: &[&dyn Candidate],
         amplitudes: &Amplitudes,
     ) -> Option<Amplitudes> {
-        let noise = self.noise.as_ref()?;
         if self.learned() || !candidates.iter().any(|c| c.turns_camera()) {
             return None;
         }
         let moments = self.moments(folds, candidates);
         let columns: Vec<usize> = (0..moments.width()).collect();
-        let nuisance_precision = self.precision();
-        let layout = Layout {
-            relative: self.relative(),
-            candidates: columns.len() - nuisance_precision.nrows() - 1,
-            residuals: 1,
-            nuisance_precision,
-        };
+        let layout = layout_of(self, candidates);
         let fitted = |c: &usize| amplitudes.candidates.iter().any(|a| a[*c] != 0.0);
         let set: Vec<usize> = (0..layout.candidates).filter(fitted).collect();
         let mut out = amplitudes.clone();
         for fold in 0..folds.count {
-            let grams = moments.under_without(&columns, noise, fold);
+            let grams = moments.under_without(&columns, noise, Some(fold));
             let fits = Fits::new(&grams, folds, &layout, 1.0)?;
             // what acts in that fold alone is as the fit has it
             let Some(beta) = fits.amplitudes_without(fold, &set) else {
@@ -114,17 +105,14 @@ impl StarEvidence<'_> {
             nuisance.rows_mut(0, 3).fill(0.0);
         }
         let all = self.all(candidates);
-        let columns = StarColumns {
-            residuals: &[],
-            ..self.columns(&all)
-        };
+        let columns = self.bare_columns(&all);
         let layout = columns.layout();
         let whole: Vec<DVector<f64>> = (0..folds.count).map(|f| out.of_fold(f)).collect();
         let told = |filled: &mut Filled, (fold, frames): &(usize, Range<usize>)| {
             columns.fill(frames.clone(), &layout, filled);
             let of_fold = |f: usize| {
                 if f == *fold {
-                    return Normal::NOTHING;
+                    return Normal::default();
                 }
                 let shift = columns.shift(frames.clone(), &layout, filled, &whole[f]);
                 self.normal_of(frames.clone(), filled, f, &shift)
@@ -136,7 +124,7 @@ impl StarEvidence<'_> {
         let precision = self.precision();
         let prior = precision.fixed_view::<3, 3>(0, 0) * self.unit_arcsec2();
         for (f, nuisance) in out.nuisance.iter_mut().enumerate() {
-            let mut normal = Normal::NOTHING;
+            let mut normal = Normal::default();
             each.iter().for_each(|of_folds| normal.add(&of_folds[f]));
             let theta = (normal.matrix + prior).try_inverse();
             let theta = theta.map(|inverse| inverse * normal.moment);
@@ -157,7 +145,7 @@ impl StarEvidence<'_> {
         let data = self.data;
         let rows = data.frames.first_row[frames.start]..data.frames.first_row[frames.end];
         let residual = self.residual(fold);
-        let mut normal = Normal::NOTHING;
+        let mut normal = Normal::default();
         for (i, row) in rows.enumerate() {
             let left = [0, 1].map(|a| residual[a][row] - shift[a][i]);
             if data.outlier[row] || left.iter().any(|l| !l.is_finite()) {

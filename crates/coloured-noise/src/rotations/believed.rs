@@ -27,15 +27,14 @@ impl Rotations {
     /// `noise`, the likeliest, as it is believed once it is known to have a slow part: see the module. What has none about any
     /// axis stays as it is.
     pub fn believed(&self, noise: &CommonNoise) -> CommonNoise {
-        let own: [Option<SlowBounds>; 3] =
-            std::array::from_fn(|axis| self.slow_bounds(noise, axis));
+        let across = [0, 1].map(|axis| self.slow_bounds(noise, axis));
         let mut out = *noise;
         for axis in 0..3 {
             let others = (0..2).filter(|&other| other != axis);
-            let like = mean_of(others.filter_map(|other| own[other].as_ref()));
+            let like = mean_of(others.filter_map(|other| across[other].as_ref()));
             let believed = match like {
                 Some(like) => self.bounds_like(noise, axis, like),
-                None => own[axis],
+                None => self.slow_bounds(noise, axis),
             };
             if let Some(bounds) = believed {
                 let part = &mut out.reference[axis];
@@ -47,19 +46,15 @@ impl Rotations {
 
     /// Bounds of the slow part of an axis that another axis has such a one `like`.
     fn bounds_like(&self, noise: &CommonNoise, axis: usize, like: Foreknown) -> Option<SlowBounds> {
-        let reference = noise.reference[axis];
-        let (start, worth) = if reference.slow > 0.0 {
-            let (start, worth, _) = self.by_itself(axis, reference);
-            (start, worth)
-        } else {
+        let (start, worth) = self.slow_by_itself(noise, axis).unwrap_or_else(|| {
             let like = Coloured {
                 slow: like.slow,
                 tau_s: like.tau_s,
-                ..reference
+                ..noise.reference[axis]
             };
-            let count = &self.count[axis];
-            (self.with_centroids(axis, like, count), Worth::Stars)
-        };
+            let start = self.with_centroids(axis, like, &self.count[axis]);
+            (start, Worth::Stars)
+        });
         let (y, count) = (&self.mean[axis], self.of(worth, axis));
         let weight = |noise: &Coloured| like.log_weight_apart(noise, APART);
         start.slow_bounds_weighed(&self.t_s, y, count, weight)
@@ -87,6 +82,13 @@ mod tests {
 
     const FRAMES: usize = 840;
     const CENTROID: f64 = 0.7;
+    const WHITE: CommonNoise = CommonNoise {
+        centroid: CENTROID,
+        reference: [Coloured {
+            white: 0.0,
+            ..Coloured::WHITE
+        }; 3],
+    };
     /// Of twelve stars: a turn about the boresight moves them twenty times less.
     const WORTH: [f64; 3] = [12.0, 12.0, 0.12];
 
@@ -133,13 +135,7 @@ mod tests {
                 white: white[a].hypot(noise.reference[a].white),
                 ..noise.reference[a]
             };
-            let mut noise = CommonNoise {
-                centroid: CENTROID,
-                reference: [Coloured {
-                    white: 0.0,
-                    ..Coloured::WHITE
-                }; 3],
-            };
+            let mut noise = WHITE;
             let mut last = None;
             for _ in 0..3 {
                 let left = std::array::from_fn(|a| step(&y[a], &of_axis(&noise, a)).1);
@@ -165,14 +161,7 @@ mod tests {
     fn white_noise_stays_white() {
         let y = series(FRAMES, [[0.0, 1.0]; 3], [0.2; 3], 1);
         let rotations = rotations_of(&y, [12.0; 3], CENTROID);
-        let white = CommonNoise {
-            centroid: CENTROID,
-            reference: [Coloured {
-                white: 0.0,
-                ..Coloured::WHITE
-            }; 3],
-        };
-        let believed = rotations.believed(&white);
+        let believed = rotations.believed(&WHITE);
         assert!(believed.reference.iter().all(|axis| axis.slow <= 0.0));
     }
 }

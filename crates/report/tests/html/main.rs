@@ -30,9 +30,18 @@ impl Noise {
             .wrapping_add(1_442_695_040_888_963_407);
         ((self.0 >> 11) as f64) / (1_u64 << 53) as f64 - 0.5
     }
+
+    /// A row of residuals `size` wide; `after` is a tenth of `before`.
+    fn push(&mut self, size: f64, before: &mut [Vec<f64>], after: &mut [Vec<f64>]) {
+        for (before, after) in before.iter_mut().zip(after) {
+            let value = size * self.next();
+            before.push(value);
+            after.push(0.1 * value);
+        }
+    }
 }
 
-/// Ten stars over `frames` frames that drift over the detector; `after` is a tenth of `before`.
+/// Ten stars over `frames` frames that drift over the detector.
 fn star_rows(frames: u32) -> StarResiduals {
     let mut noise = Noise(1);
     let mut rows = StarResiduals::default();
@@ -46,11 +55,7 @@ fn star_rows(frames: u32) -> StarResiduals {
                 .push(100.0 * f64::from(star) - 480.0 + 60.0 * drift);
             rows.y_px
                 .push(90.0 * f64::from(9 - star) - 400.0 + 80.0 * drift);
-            for axis in 0..2 {
-                let value = 8.0 * noise.next();
-                rows.before_arcsec[axis].push(value);
-                rows.after_arcsec[axis].push(0.1 * value);
-            }
+            noise.push(8.0, &mut rows.before_arcsec, &mut rows.after_arcsec);
             rows.fold.push(5 * k / frames);
             rows.outlier.push(false);
         }
@@ -63,11 +68,7 @@ fn attitude_rows(frames: u32) -> AttitudeResiduals {
     let mut rows = AttitudeResiduals::default();
     for k in 0..frames {
         rows.t_s.push(2.0 * f64::from(k));
-        for axis in 0..3 {
-            let value = 3.0 * noise.next();
-            rows.before_arcsec[axis].push(value);
-            rows.after_arcsec[axis].push(0.1 * value);
-        }
+        noise.push(3.0, &mut rows.before_arcsec, &mut rows.after_arcsec);
         rows.fold.push(5 * k / frames);
         rows.outlier.push(false);
     }

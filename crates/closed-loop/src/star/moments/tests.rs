@@ -382,7 +382,7 @@ fn a_fold_that_is_left_out_is_a_gap() {
             let turns: Vec<_> = rows.iter().map(|&i| turns[i]).collect();
             let factor = covariance(&noise, &turns, data).cholesky().unwrap();
             let c = c.select_rows(&rows);
-            let mut grams = moments.under_without(&all, &noise, fold);
+            let mut grams = moments.under_without(&all, &noise, Some(fold));
             let mut blocks = folds.fold_of_block.iter().map(|of| *of != fold);
             grams.gram.retain(|_| blocks.next() == Some(true));
             grams.known = None;
