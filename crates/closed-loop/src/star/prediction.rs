@@ -44,7 +44,8 @@ impl Normal {
 }
 
 impl StarEvidence<'_> {
-    /// `amplitudes`, each fold's from the others, under this `noise` of the evidence: see the module.
+    /// `amplitudes`, each fold's from the others, under this `noise` of the evidence: see the module. One fold alone is
+    /// not predicted: its amplitudes are its own.
     pub(super) fn to_predict(
         &self,
         noise: &CommonNoise,
@@ -52,6 +53,9 @@ impl StarEvidence<'_> {
         candidates: &[&dyn Candidate],
         amplitudes: &Amplitudes,
     ) -> Amplitudes {
+        if folds.count < 2 {
+            return amplitudes.clone();
+        }
         let across = self.across_gaps(noise, folds, candidates, amplitudes);
         let told = across.as_ref().unwrap_or(amplitudes);
         self.with_plain_misalignment(folds, candidates, told)
@@ -159,5 +163,91 @@ impl StarEvidence<'_> {
             }
         }
         normal
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use coloured_noise::Coloured;
+    use telemetry::Model;
+
+    use super::*;
+    use crate::star::data::StarData;
+    use crate::star::harness::at_rest;
+    use crate::star::nuisance::StarNuisance;
+    use crate::star::slow_price::SlowPrice;
+
+    const STEP: [f64; 3] = [3.0, -2.0, 5.0];
+    const AT_S: f64 = 24.75;
+
+    /// Stars that a step at [`AT_S`] moves, beside a reference that wanders by an arcsecond.
+    fn stepped<'a>(data: &'a StarData, step: &dyn Candidate) -> StarEvidence<'a> {
+        let rows = data.t_s.len();
+        let slow = Coloured {
+            slow: 1.0,
+            tau_s: 20.0,
+            white: 0.0,
+        };
+        let mut evidence = StarEvidence {
+            data,
+            nuisance: StarNuisance::declared(&Model::default(), data),
+            residuals: Arc::new(vec![[vec![0.0; rows], vec![0.0; rows]]]),
+            motion: None,
+            resolved: false,
+            own_paths: false,
+            sigma_guess_arcsec: 1.0,
+            noise: Some(CommonNoise {
+                centroid: 0.1,
+                reference: [slow; 3],
+            }),
+            weight: Arc::new(vec![1.0; rows]),
+            drawn: None,
+            slow_price: SlowPrice::default(),
+            kept: Vec::new(),
+        };
+        let all = Folds::whole(data.frames.t_s.len());
+        let shifts = evidence.residuals_of(&all, &[step], [&amplitudes(1, STEP)]);
+        let [x, y] = [0, 1].map(|axis| shifts[0].modelled[axis].clone());
+        evidence.residuals = Arc::new(vec![[x, y]]);
+        evidence
+    }
+
+    fn amplitudes(folds: usize, step: [f64; 3]) -> Amplitudes {
+        Amplitudes {
+            nuisance: vec![DVector::zeros(3); folds],
+            candidates: vec![DVector::from_row_slice(&step); folds],
+        }
+    }
+
+    /// Other folds see the levels before and after. Of a single fold there are none: what it is fitted with stays.
+    #[test]
+    fn a_step_is_told_across_its_own_fold_and_in_all_data_by_itself() {
+        let t_s: Vec<f64> = (0..120).map(|k| 0.5 * f64::from(k)).collect();
+        let data = at_rest(t_s);
+        let step = effects::step_at(AT_S, [0.0, 60.0], 1);
+        let candidates = [step.as_ref()];
+        let evidence = stepped(&data, step.as_ref());
+        let noise = evidence.noise.unwrap();
+        let told = |folds: &Folds, given: [f64; 3]| {
+            evidence.to_predict(&noise, folds, &candidates, &amplitudes(folds.count, given))
+        };
+        let frames = data.frames.t_s.len();
+        let known = amplitudes(1, STEP);
+        assert_eq!(
+            told(&Folds::whole(frames), STEP).of_fold(0),
+            known.of_fold(0)
+        );
+        let folds = Folds::cut(frames);
+        let predicted = told(&folds, [0.1, 0.1, 0.1]);
+        for fold in 0..folds.count {
+            for (got, want) in predicted.candidates[fold].iter().zip(STEP) {
+                // drawn to nothing by a prior of its own size, beside a wander of 1 arcsec
+                let drawn = want.powi(2) / (want.powi(2) + 2.0);
+                let share = got / want;
+                assert!(share > 0.9 * drawn && share < 1.01, "{fold}: {got} {want}");
+            }
+        }
     }
 }

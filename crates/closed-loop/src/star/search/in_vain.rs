@@ -62,23 +62,17 @@ pub(crate) fn in_vain(
         all: None,
         single: false,
     };
-    let worth = |set: &[usize]| {
-        let scored = trial.score(set, &wander.noise);
-        let scored = scored.ok_or(CloseError::Singular)?;
-        Ok(trial.worth(&scored))
-    };
+    let worth = |set: &[usize]| Some(trial.worth(&trial.score(set, &wander.noise)?));
 
     let turns = known.iter().copied();
     let turns = turns.filter(|&at| own.candidates[at].acts_on_attitude());
-    let mut sets = vec![known.clone()];
+    let mut sets = Vec::new();
     for out in taken_out_in_turn(turns.collect()) {
         let rest = without(&known, &out);
         sets.extend(new.iter().map(|&at| [&rest[..], &[at]].concat()));
     }
-    let worths: Vec<f64> = sets
-        .par_iter()
-        .map(|set| worth(set))
-        .collect::<Result<_, CloseError>>()?;
-    let (before, with) = worths.split_first().ok_or(CloseError::Singular)?;
-    Ok(with.iter().all(|with| with + POLISH < *before))
+    let before = worth(&known).ok_or(CloseError::Singular)?;
+    // what cannot be told from what is there (a jump where a step was found already) brings nothing
+    let pays = |set: &Vec<usize>| worth(set).is_some_and(|with| with + POLISH >= before);
+    Ok(!sets.par_iter().any(pays))
 }
