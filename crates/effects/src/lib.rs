@@ -62,5 +62,7 @@ pub use pixel_phase_harmonics::{LARGEST_WAVE_PX, harmonics_of};
 pub use pixel_wave::{PixelWave, PixelWaves};
 pub use scene::{FrameGeometry, Scene, StarFacts, Surroundings, VectorFrame};
 pub use step_misalignment::step_at;
-pub use velocity_aberration::{SHORTEST_ORBIT_S, free_orbit, nearest_circles, orbit_could_show};
+pub use velocity_aberration::{
+    SHORTEST_ORBIT_S, could_be_about_a_planet, free_orbit, nearest_circles, orbit_could_show,
+};
 pub use warm_pixels::WarmPixels;

@@ -71,7 +71,9 @@ const CHANNELS: [([&str; 3], f64); 2] = [
 mod orbit;
 
 use orbit::Orbit;
-pub use orbit::{SHORTEST_ORBIT_S, free_orbit, nearest_circles, orbit_could_show};
+pub use orbit::{
+    SHORTEST_ORBIT_S, could_be_about_a_planet, free_orbit, nearest_circles, orbit_could_show,
+};
 
 /// The kind.
 #[derive(Debug)]

@@ -188,6 +188,7 @@ impl Inquiry<'_> {
             surroundings,
             &searched.found,
             None,
+            false,
         )?);
         let too_fast = line.filter(|line| !data.bins.resolve(line.frequency_hz));
         Ok(PutForward {

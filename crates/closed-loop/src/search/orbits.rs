@@ -19,10 +19,11 @@ use std::sync::Arc;
 
 use block_regression::{Estimate, Folds};
 use effects::{
-    Candidate, SHORTEST_ORBIT_S, Surroundings, free_orbit, nearest_circles, orbit_could_show,
+    Candidate, Coefficient, SHORTEST_ORBIT_S, Surroundings, could_be_about_a_planet, free_orbit,
+    nearest_circles, orbit_could_show,
 };
 use focal_plane::{ARCSEC_PER_RAD, AttitudeSource, SPEED_OF_LIGHT_M_S};
-use nalgebra::{Matrix6, SMatrix, SVector, Vector3, Vector6};
+use nalgebra::{DMatrix, Matrix6, SMatrix, SVector, Vector3, Vector6};
 use telemetry::report::ConsideredEffect;
 
 use crate::error::CloseError;
@@ -52,6 +53,8 @@ pub(crate) const OWN_SHAPE: f64 = 15.0;
 /// The coefficient of an orbit that is its speed, and in how many of its sigmas it is known.
 const SPEED: &str = "speed_m_s";
 const KNOWN: f64 = 3.0;
+/// Sigmas by which period and speed may be off.
+const BELIEVED: f64 = 2.0;
 /// Share of what others explain of the same in white noise, below which it is no orbit.
 const RIVAL: f64 = 0.5;
 
@@ -209,27 +212,41 @@ impl Normal {
     }
 }
 
-/// The orbit, if it is worth a search: beside those effects that were `found` which do not turn the camera, and
-/// held against those that do, or against what slow noise explains, `slow` nats (`None`: that is not known).
+/// What an orbit could be in the place of: it turns the camera, or, where frames turn freely (`by_scale`), stretches
+/// what they see from the boresight.
+fn is_rival(candidate: &dyn Candidate, by_scale: bool) -> bool {
+    let scale = |c: &Coefficient| c.name == "k0";
+    match candidate.id() {
+        _ if !by_scale => candidate.turns_camera(),
+        ABERRATION | "focal_length_drift" => true,
+        "optical_distortion" => candidate.coefficients().iter().all(scale),
+        _ => false,
+    }
+}
+
+/// The orbit, if it is worth a search: held against those effects that were `found` which it could be in the place of,
+/// or against what slow noise explains, `slow` nats (`None`: that is not known), and beside the others. `by_scale`:
+/// frames turn freely, and know a velocity by their scale alone.
 pub(crate) fn propose(
     evidence: &dyn Evidence,
     folds: &Folds,
     surroundings: &Surroundings<'_>,
     found: &Found,
     slow: Option<f64>,
+    by_scale: bool,
 ) -> Result<Option<Arc<dyn Candidate>>, CloseError> {
     if !orbit_could_show(surroundings) {
         return Ok(None);
     }
-    let (turn, not_turn): (Vec<_>, Vec<_>) = found.chosen().partition(|c| c.turns_camera());
+    let (rivals, others): (Vec<_>, Vec<_>) = found.chosen().partition(|c| is_rival(*c, by_scale));
     let span_s = surroundings.span_s;
-    let lines = turn.iter().flat_map(|c| c.nonlinear());
+    let lines = rivals.iter().flat_map(|c| c.nonlinear());
     let lines = lines.filter(|n| n.unit == "Hz").map(|n| n.value.recip());
     let lines = lines.filter(|p| *p > SHORTEST_ORBIT_S);
     let periods: Vec<f64> = usual_periods(surroundings).chain(lines).collect();
     let free: Vec<Box<dyn Candidate>> = periods.iter().map(|&p| free_orbit(p, span_s)).collect();
     let mut all: Vec<&dyn Candidate> = free.iter().map(AsRef::as_ref).collect();
-    all.extend(&not_turn);
+    all.extend(&others);
     let fitted = fit(evidence, folds, &all)?;
     let beside: Vec<usize> = (periods.len()..all.len()).collect();
     let best = (0..periods.len())
@@ -252,8 +269,8 @@ pub(crate) fn propose(
         evidence,
         folds,
         surroundings,
-        not_turn,
-        turn,
+        others,
+        rivals,
         slow,
     };
     // the one that is likelier once it is at its best; of two alike the nearer circle
@@ -265,14 +282,22 @@ pub(crate) fn propose(
             likelier = Some(other);
         }
     }
-    let Some(Likely { orbit, nats }) = likelier else {
+    let Some(Likely {
+        orbit,
+        nats,
+        bounds,
+    }) = likelier
+    else {
         return Ok(None);
     };
     // a fit may end at more turns than it was tried at
     let fastest_s = SHORTEST_ORBIT_S.min(surroundings.length_s() / FEW_TURNS);
     let period_s = period_s(orbit.as_ref(), surroundings).unwrap_or(f64::INFINITY);
     let is_fast = period_s < fastest_s;
-    let stands = nats >= WORTH_A_SEARCH && !is_fast && !beside.slow_makes(orbit.as_ref(), nats);
+    // whatever is slow stretches the field as some orbit does
+    let is_none = by_scale && !bounds.hold_a_planet(period_s);
+    let stands =
+        nats >= WORTH_A_SEARCH && !is_fast && !is_none && !beside.slow_makes(orbit.as_ref(), nats);
     Ok(stands.then_some(orbit))
 }
 
@@ -299,6 +324,41 @@ fn velocities(fitted: &Fitted, k: usize, set: &[usize]) -> Option<(Vector6<f64>,
 struct Likely {
     orbit: Arc<dyn Candidate>,
     nats: f64,
+    bounds: Bounds,
+}
+
+/// What the period may be at most, and the speed at least.
+#[derive(Clone, Copy)]
+struct Bounds {
+    longest_s: f64,
+    least_m_s: f64,
+}
+
+impl Bounds {
+    /// Nothing is known.
+    const NONE: Self = Self {
+        longest_s: f64::INFINITY,
+        least_m_s: 0.0,
+    };
+
+    /// Of an orbit of `period_s` that these amplitudes of one nearby led to: speed first and stretch last, whose variance
+    /// is 0 where it does not show.
+    fn of(period_s: f64, values: &[f64], covariance: &DMatrix<f64>) -> Self {
+        let last = values.len() - 1;
+        let sigma = |k: usize| match covariance[(k, k)] {
+            0.0 => f64::INFINITY,
+            variance => variance.sqrt(),
+        };
+        let speed = values[0].abs();
+        Self {
+            longest_s: period_s * (1.0 + BELIEVED * sigma(last) / speed),
+            least_m_s: speed - BELIEVED * sigma(0),
+        }
+    }
+
+    fn hold_a_planet(self, period_s: f64) -> bool {
+        could_be_about_a_planet(period_s, self.longest_s, self.least_m_s)
+    }
 }
 
 /// What an orbit is fitted beside, and held against.
@@ -306,8 +366,8 @@ struct Beside<'a> {
     evidence: &'a dyn Evidence,
     folds: &'a Folds,
     surroundings: &'a Surroundings<'a>,
-    not_turn: Vec<&'a dyn Candidate>,
-    turn: Vec<&'a dyn Candidate>,
+    others: Vec<&'a dyn Candidate>,
+    rivals: Vec<&'a dyn Candidate>,
     slow: Option<f64>,
 }
 
@@ -320,15 +380,16 @@ impl Beside<'_> {
     /// `orbit` after fits about itself; `None` where it is not worth a search, or others explain as much.
     fn at_its_best(&self, mut orbit: Arc<dyn Candidate>) -> Result<Option<Likely>, CloseError> {
         let mut nats = 0.0;
+        let mut bounds = Bounds::NONE;
         for _ in 0..ROUNDS {
             let mut all: Vec<&dyn Candidate> = vec![orbit.as_ref()];
-            all.extend(&self.not_turn);
-            all.extend(&self.turn);
+            all.extend(&self.others);
+            all.extend(&self.rivals);
             let fitted = fit(self.evidence, self.folds, &all)?;
             let columns = |groups: std::ops::Range<usize>| {
                 columns_of(&fitted.groups, &groups.collect::<Vec<usize>>())
             };
-            let first = 1 + self.not_turn.len();
+            let first = 1 + self.others.len();
             let with = columns(0..first);
             let without = columns(1..first);
             let error = |set: &[usize]| fitted.fits.error(set).unwrap_or(f64::INFINITY);
@@ -355,16 +416,23 @@ impl Beside<'_> {
                 break;
             };
             let count = orbit.coefficients().len();
-            let (values, _) = amplitudes_from(0, count, &with, &estimate);
+            let (values, covariance) = amplitudes_from(0, count, &with, &estimate);
             let Some(better) = orbit.refined(&values) else {
                 break;
             };
             orbit = better.into();
+            if let Some(period_s) = period_s(orbit.as_ref(), self.surroundings) {
+                bounds = Bounds::of(period_s, &values, &covariance);
+            }
             if (nats - before).abs() < SETTLED {
                 break;
             }
         }
-        Ok(Some(Likely { orbit, nats }))
+        Ok(Some(Likely {
+            orbit,
+            nats,
+            bounds,
+        }))
     }
 }
 

@@ -41,6 +41,12 @@ const STEP: f64 = 0.5;
 const APART: f64 = 0.1;
 /// Beside the surface of solid osmium an orbit takes sqrt(3 pi / G rho) = 42 minutes, s: nature has no faster one.
 pub const SHORTEST_ORBIT_S: f64 = 2500.0;
+/// No planet is denser than the Earth, sqrt(3 pi / G rho) = 5061 s, and of the giants none than Neptune, s.
+const BESIDE_THE_EARTH_S: f64 = 5061.0;
+const BESIDE_A_GIANT_S: f64 = 9365.0;
+/// G M of the heaviest of those that are no giants, and of Jupiter, m^3/s^2.
+const EARTH_M3_S2: f64 = 3.986e14;
+const JUPITER_M3_S2: f64 = 1.267e17;
 /// How likely a faster one is beside the others: five nats. Against a slow error of the reference, which one to two turns
 /// in the span follow nearly as well, its five parameters are worth a nat or two more in one of 30 draws.
 const UNNATURAL: f64 = 1.0 / 150.0;
@@ -386,6 +392,18 @@ pub fn orbit_could_show(surroundings: &Surroundings<'_>) -> bool {
     !camera && Velocity::channels(surroundings).is_none()
 }
 
+/// Whether a circle about a planet of the Sun may have this period, s, or one up to `longest_s`, and at least this
+/// speed, m/s: `v^3 = 2 pi G M / P`.
+pub fn could_be_about_a_planet(period_s: f64, longest_s: f64, least_m_s: f64) -> bool {
+    let period_s = period_s.max(BESIDE_THE_EARTH_S);
+    let heaviest = if period_s < BESIDE_A_GIANT_S {
+        EARTH_M3_S2
+    } else {
+        JUPITER_M3_S2
+    };
+    period_s <= longest_s && least_m_s <= (TAU * heaviest / period_s).cbrt()
+}
+
 /// Aberration by any velocity that turns once in `period_s`, about the middle of `span_s`: six coefficients.
 pub fn free_orbit(period_s: f64, span_s: [f64; 2]) -> Box<dyn Candidate> {
     const NAMES: [&str; 6] = ["x_cos", "y_cos", "z_cos", "x_sin", "y_sin", "z_sin"];
@@ -541,6 +559,25 @@ mod tests {
                 assert!(apart.norm() < 1e-12, "{turn:?} at {t_s}: {apart}");
             }
         }
+    }
+
+    /// A satellite in 700 km goes round in 5930 s at 7.5 km/s; a focal length that follows a wave of 2700 s, or of 5000 s by
+    /// 60 ppm, goes round nothing.
+    #[test]
+    fn orbits_are_about_planets() {
+        assert!(could_be_about_a_planet(5930.0, 5930.0, 7500.0));
+        assert!(!could_be_about_a_planet(2700.0, 2900.0, 4800.0));
+        assert!(could_be_about_a_planet(4700.0, 5300.0, 7300.0));
+        assert!(!could_be_about_a_planet(5000.0, 6000.0, 18_000.0));
+        assert!(could_be_about_a_planet(10_800.0, 10_800.0, 41_000.0));
+        // beside each of them, at the speed there
+        let speed = |mu: f64, radius: f64| (mu / radius).sqrt();
+        let period = |mu: f64, radius: f64| TAU * (radius.powi(3) / mu).sqrt();
+        let earth = period(EARTH_M3_S2, 6.371e6);
+        assert!((earth / BESIDE_THE_EARTH_S - 1.0).abs() < 1e-3, "{earth}");
+        let neptune = period(6.8365e15, 2.4764e7);
+        assert!((neptune / BESIDE_A_GIANT_S - 1.0).abs() < 3e-3, "{neptune}");
+        assert!((speed(EARTH_M3_S2, 6.371e6) - (TAU * EARTH_M3_S2 / earth).cbrt()).abs() < 1e-6);
     }
 
     /// Columns are slopes: a hundredth of the speed in each of the others changes the velocity by what they

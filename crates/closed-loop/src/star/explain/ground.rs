@@ -222,10 +222,15 @@ impl<'g, 'a> Ground<'g, 'a> {
             .into_iter()
             .collect();
         put_forward.extend(jump.map(|jump| jump.candidate(self.scene)));
-        if self.scene.has_reference {
+        if self.scene.has_reference || self.scales_tell() {
             put_forward.extend(self.orbit(searched, look)?);
         }
         Ok(put_forward)
+    }
+
+    /// Whether the scales of frames that turn freely tell the velocity along the boresight.
+    fn scales_tell(&self) -> bool {
+        self.scene.has_catalogue && !self.scene.has_reference
     }
 
     /// The orbit that turns the camera in place of what was found to, or beside what is left of that.
@@ -237,7 +242,8 @@ impl<'g, 'a> Ground<'g, 'a> {
         let wander = searched.wander.as_ref();
         let slow = wander.map_or(0.0, Wander::nats);
         let turns = searched.found.chosen().any(|c| c.turns_camera());
-        if wander.is_none() && !turns && !look.is_some_and(Look::follows) {
+        let shows = turns || self.scales_tell() || look.is_some_and(Look::follows);
+        if wander.is_none() && !shows {
             return Ok(None);
         }
         orbits::propose(
@@ -246,6 +252,7 @@ impl<'g, 'a> Ground<'g, 'a> {
             &self.scene.surroundings,
             &searched.found,
             Some(slow),
+            self.scales_tell(),
         )
     }
 
