@@ -33,7 +33,8 @@
 //! ```
 //!
 //! Nor does a velocity that hardly changes need channels, where stars have a catalogue and frames turn freely: the
-//! scale of a frame is `1 - b.v/c` for its boresight b, wherever it looks. It is told as an orbit of a year.
+//! scale of a frame is `1 - b.v/c` for its boresight b, wherever it looks. It is told as an orbit of a year. An orbit of
+//! hours changes that scale.
 //!
 //! Source: first-order stellar aberration, `focal_plane::aberrated`; derivation above.
 
@@ -87,7 +88,7 @@ impl EffectKind for Kind {
         "the apparent direction is u + v/c, and nobody corrected it"
     }
     fn needs(&self) -> &'static str {
-        "velocity channels (vx_km_s, vy_km_s, vz_km_s or in m/s), and for an attitude the boresights of [frames]; or an inertial reference, for an orbit that no channel tells; or a catalogue alone and frames that look here and there, for a steady velocity"
+        "velocity channels (vx_km_s, vy_km_s, vz_km_s or in m/s), and for an attitude the boresights of [frames]; or an inertial reference, for an orbit that no channel tells; or a catalogue alone, for an orbit about a planet, and frames that look here and there for a steady velocity"
     }
     fn acts_on(&self) -> ActsOn {
         ActsOn {
