@@ -33,6 +33,7 @@ use std::collections::BTreeMap;
 
 use block_regression::Folds;
 use effects::longest_exposure_s;
+use nalgebra::Matrix3;
 use spectra::robust::median_step;
 use telemetry::report::{ConsideredEffect, Estimate, FoundEffect};
 use telemetry::{EffectEntry, EffectValue, Model};
@@ -47,6 +48,7 @@ use crate::search::selection::{FAMILY_ALPHA, columns_of};
 use crate::situation::Situation;
 use crate::star::data::StarData;
 use crate::star::evidence::StarEvidence;
+use crate::star::frame_rotation::Turns;
 use density::DECLARED;
 pub(crate) use follows::{NoiseFollows, noise_follows};
 use judge::{Judged, Known, judge};
@@ -182,7 +184,14 @@ pub(crate) fn declared_variance(
     Ok(variance.collect())
 }
 
-/// Squared residuals of the rows that count, each over its declared variance.
+/// Squared residuals of the rows that count, each over its declared variance. Where the model declares that the reference
+/// wanders, the rotation that the stars of a frame share has that variance S, too:
+///
+/// ```text
+/// r' (V + A S A')^-1 r = r' V^-1 r - m' (1 + S N)^-1 S m      N = A' V^-1 A      m = A' V^-1 r
+/// ```
+///
+/// Source: Woodbury 1950 (the inverse of a sum).
 pub(crate) fn in_declared_sigmas(
     situation: &Situation<'_>,
     data: &StarData,
@@ -194,7 +203,20 @@ pub(crate) fn in_declared_sigmas(
         let square: f64 = residual.axes.iter().map(|a| a[r] * a[r]).sum();
         square / declared[r]
     });
-    Some(squares.filter(|s| s.is_finite()).sum())
+    let squares: f64 = squares.filter(|s| s.is_finite()).sum();
+    let wander = declared::reference(&declared::effects(situation).ok()?);
+    if data.free_attitude || wander.iter().all(Option::is_none) {
+        return Some(squares);
+    }
+    let variance = wander.map(|axis| axis.map_or(0.0, |known| known.slow.powi(2)));
+    let variance = Matrix3::from_diagonal(&variance.into());
+    let weight: Vec<f64> = declared.iter().map(|v| v.sqrt().recip()).collect();
+    let turns = Turns::of(data, [&residual.axes[0], &residual.axes[1]], &weight);
+    let taken = turns.frames.iter().flatten().filter_map(|turn| {
+        let shrunk = (Matrix3::identity() + variance * turn.normal).try_inverse()? * variance;
+        Some(turn.moment.dot(&(shrunk * turn.moment)))
+    });
+    Some(squares - taken.sum::<f64>())
 }
 
 /// Declared outliers: share and size of each kind.

@@ -72,11 +72,11 @@ impl<'a> Constants<'a> {
         let fits = &found.fitted.fits;
         let distorted = level.nuisance.distorted();
         let distortion = fits.nuisance(None, &set, &values).select_rows(&distorted);
-        // under coloured noise rows count otherwise than here
-        let alike = level.noise.is_none() && level.drawn.is_none();
-        let told = (alike && !distorted.is_empty()).then(|| {
+        // beside noise that frames share, with what their rotations say of it, which is next to nothing
+        let unit = level.unit_arcsec2();
+        let told = (!distorted.is_empty()).then(|| {
             let of_all = fits.nuisance_gram();
-            of_all.select_rows(&distorted).select_columns(&distorted)
+            of_all.select_rows(&distorted).select_columns(&distorted) * unit
         });
         Some(Self {
             level,

@@ -126,3 +126,30 @@ fn a_misplaced_star_shows_beside_a_distortion_that_its_motion_shows() {
         assert_eq!(report.verdict, Verdict::Explained, "{seed}");
     }
 }
+
+/// A star that is misplaced by 1.6 arcseconds, beside a declared distortion of 4 and a wandering reference: stars that go
+/// to and fro by eight pixels show that the distortion, whose slope they see, has not moved it.
+#[test]
+fn a_misplaced_star_beside_a_wander_is_no_constant_among_others() {
+    let mut case = Case::new(Path::Turns, 323);
+    case.stars = 14;
+    let wander =
+        "rates = false\nwander_arcsec = [0.5, 0.5, 0.5]\nwander_tau_s = [20.0, 60.0, 60.0]";
+    case = case.reference(wander);
+    let made = |case: &Case| {
+        let mut scenario = case.quiet(0.4);
+        scenario.model.noise.distortion_arcsec = Some(4.0);
+        let bundle = simulate(&scenario).expect("a bundle");
+        (scenario.model_without_effects(), bundle)
+    };
+    let (_, bundle) = made(&case);
+    let stars = bundle.stars.expect("stars");
+    let id = stars.star_id[..14].iter().min().expect("one");
+    let lines = format!("star_id = {id}\neast_arcsec = 1.6");
+    let (model, bundle) = made(&case.with("catalogue_position", &lines));
+    let report = closed(&model, &bundle).expect("the loop closes").report;
+    assert_eq!(named(&report), ["catalogue_position", "reference_error"]);
+    let east = &report.effects[0].parameters["east_arcsec"];
+    let z = (east.value - 1.6) / east.sigma.expect("a sigma");
+    assert!(z.abs() < 4.0 && !report.unattributed.present, "{east:?}");
+}

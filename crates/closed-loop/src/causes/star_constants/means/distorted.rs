@@ -10,7 +10,7 @@
 //! ```
 //!
 //! with that part of the fitted distortion back in e which the means have put into it, for the fit has
-//! `L d = D' r + D_beside' r_beside`; under coloured noise, where rows count otherwise, all of it, and P is the prior's.
+//! `L d = D' r + D_beside' r_beside`; where N is not known, all of it, and P is the prior's.
 //!
 //! Source: generalised least squares; the posterior of what the other rows tell (Lindley & Smith 1972).
 
