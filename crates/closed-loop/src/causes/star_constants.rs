@@ -73,11 +73,8 @@ impl<'a> Constants<'a> {
         let distorted = level.nuisance.distorted();
         let distortion = fits.nuisance(None, &set, &values).select_rows(&distorted);
         // beside noise that frames share, with what their rotations say of it, which is next to nothing
-        let unit = level.unit_arcsec2();
-        let told = (!distorted.is_empty()).then(|| {
-            let of_all = fits.nuisance_gram();
-            of_all.select_rows(&distorted).select_columns(&distorted) * unit
-        });
+        let of_all = fits.nuisance_gram().select_rows(&distorted);
+        let told = of_all.select_columns(&distorted) * level.unit_arcsec2();
         Some(Self {
             level,
             found,

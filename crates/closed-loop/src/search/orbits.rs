@@ -215,9 +215,11 @@ impl Normal {
 /// What an orbit could be in the place of: it turns the camera, or, where frames turn freely (`by_scale`), stretches
 /// what they see from the boresight.
 fn is_rival(candidate: &dyn Candidate, by_scale: bool) -> bool {
+    if !by_scale {
+        return candidate.turns_camera();
+    }
     let scale = |c: &Coefficient| c.name == "k0";
     match candidate.id() {
-        _ if !by_scale => candidate.turns_camera(),
         ABERRATION | "focal_length_drift" => true,
         "optical_distortion" => candidate.coefficients().iter().all(scale),
         _ => false,

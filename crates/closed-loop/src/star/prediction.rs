@@ -243,6 +243,14 @@ mod tests {
         evidence
     }
 
+    fn times_s() -> Vec<f64> {
+        (0..FRAMES).map(|k| f64::from(k) / RATE_HZ).collect()
+    }
+
+    fn step() -> Box<dyn Candidate> {
+        effects::step_at(AT_S, [0.0, f64::from(FRAMES) / RATE_HZ], 1)
+    }
+
     /// The same in every fold.
     fn amplitudes(evidence: &StarEvidence<'_>, folds: &Folds, step: [f64; 3]) -> Amplitudes {
         Amplitudes {
@@ -256,8 +264,8 @@ mod tests {
     /// to `sqrt(2 tau / 30) = 3.7`.
     #[test]
     fn the_fold_that_a_step_is_in_is_a_gap() {
-        let data = at_rest((0..FRAMES).map(|k| f64::from(k) / RATE_HZ).collect());
-        let step = effects::step_at(AT_S, [0.0, f64::from(FRAMES) / RATE_HZ], 1);
+        let data = at_rest(times_s());
+        let step = step();
         let folds = Folds::cut(data.frames.t_s.len());
         let mut squares = 0.0;
         let draws = 10;
@@ -278,8 +286,8 @@ mod tests {
     /// What is fitted to all data at once is no prediction.
     #[test]
     fn one_fold_alone_keeps_its_amplitudes() {
-        let data = at_rest((0..FRAMES).map(|k| f64::from(k) / RATE_HZ).collect());
-        let step = effects::step_at(AT_S, [0.0, f64::from(FRAMES) / RATE_HZ], 1);
+        let data = at_rest(times_s());
+        let step = step();
         let evidence = moved(&data, step.as_ref(), 0);
         let noise = evidence.noise.unwrap();
         let one = Folds::whole(data.frames.t_s.len());

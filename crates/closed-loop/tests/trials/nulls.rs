@@ -2,7 +2,6 @@
 //! nine such sets: these seeds raise none.
 
 use scenarios::simulate;
-use telemetry::report::Report;
 use telemetry::{EffectEntry, EffectValue};
 
 use crate::kit::{Case, Path, VELOCITY, closed, named, power, reported};
@@ -243,8 +242,6 @@ fn a_change_of_stars_is_no_step() {
         bundle.catalog = None;
         closed(&model, &bundle).expect("the loop closes").report
     };
-    let named =
-        |report: &Report| -> Vec<String> { report.effects.iter().map(|e| e.id.clone()).collect() };
     let alarms: Vec<u64> = (10..22)
         .filter(|&seed| {
             let report = without_stars(&Case::new(Path::Drift, seed));

@@ -1,7 +1,6 @@
 //! Aberration by an orbit that no channel tells: five unknowns, and a reference for each of its rivals.
 
 use closed_loop::Closed;
-
 use scenarios::simulate;
 use telemetry::report::Report;
 
@@ -29,8 +28,7 @@ fn an_orbit_that_no_channel_tells_is_found() {
         (Path::Still, 2600.0),
     ] {
         let report = of_an_orbit(path, 40, period_s).report;
-        let ids: Vec<&str> = report.effects.iter().map(|e| e.id.as_str()).collect();
-        assert_eq!(ids, ["velocity_aberration"], "{path:?}");
+        assert_eq!(named(&report), ["velocity_aberration"], "{path:?}");
         let told = &report.effects[0].parameters;
         for (name, truth) in [("speed_m_s", 1000.0), ("period_s", period_s)] {
             let sigma = told[name].sigma.expect("it has an error");
@@ -51,8 +49,7 @@ fn an_orbit_is_held_against_the_line_in_its_place() {
     case.stars = 5;
     let orbit = "speed_m_s = 400.0\nperiod_s = 3000.0\nphase_rad = 0.7\nnode_deg = 40.0\ninclination_deg = 55.0";
     let report = case.with("velocity_aberration", orbit).close().report;
-    let ids: Vec<&str> = report.effects.iter().map(|e| e.id.as_str()).collect();
-    assert_eq!(ids, ["velocity_aberration"]);
+    assert_eq!(named(&report), ["velocity_aberration"]);
     assert!(!report.unattributed.present);
 }
 

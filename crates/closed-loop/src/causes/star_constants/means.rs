@@ -139,7 +139,7 @@ impl Means {
             from: end,
             values: &left.distortion,
             precision: level.nuisance.distortion_precision(),
-            told: left.told.as_ref(),
+            told: &left.told,
         };
         let squares: Vec<(f64, f64)> = parts.iter().map(|part| part.residual_means()).collect();
         let mut all = design.sums(0..0);
@@ -284,8 +284,8 @@ pub(super) struct Left<'a> {
     pub(super) inside: &'a [Vec<f64>],
     /// Coefficients of the distortion, those of x, then those of y, arcsec.
     pub(super) distortion: DVector<f64>,
-    /// What all rows say of them, in the weights of the rows, where that is known.
-    pub(super) told: Option<DMatrix<f64>>,
+    /// What all rows say of them, in the weights of the rows.
+    pub(super) told: DMatrix<f64>,
 }
 
 /// h of the module's header.

@@ -233,7 +233,8 @@ impl<'g, 'a> Ground<'g, 'a> {
         self.scene.has_catalogue && !self.scene.has_reference
     }
 
-    /// The orbit that turns the camera in place of what was found to, or beside what is left of that.
+    /// The orbit that turns the camera, or stretches what free frames see, in place of what was found to, or beside what is
+    /// left of that.
     fn orbit(
         &self,
         searched: &Searched<'_>,

@@ -10,7 +10,7 @@
 //! ```
 //!
 //! with that part of the fitted distortion back in e which the means have put into it, for the fit has
-//! `L d = D' r + D_beside' r_beside`; where N is not known, all of it, and P is the prior's.
+//! `L d = D' r + D_beside' r_beside`; where N does not hold what the means say, all of it, and P is the prior's.
 //!
 //! Source: generalised least squares; the posterior of what the other rows tell (Lindley & Smith 1972).
 
@@ -22,8 +22,8 @@ pub(super) struct Distorted<'a> {
     pub(super) values: &'a DVector<f64>,
     /// Precision of the coefficients of an axis, 1/arcsec^2.
     pub(super) precision: Option<&'a DMatrix<f64>>,
-    /// What all rows say of them, in the weights of the rows, where that is known.
-    pub(super) told: Option<&'a DMatrix<f64>>,
+    /// What all rows say of them, in the weights of the rows.
+    pub(super) told: &'a DMatrix<f64>,
 }
 
 impl Distorted<'_> {
@@ -39,8 +39,7 @@ impl Distorted<'_> {
             let mut own = prior.view_mut((first, first), (count, count));
             own.copy_from(&(of_axis * noise));
         }
-        let beside = |told: &DMatrix<f64>| (&prior + told - means.tr_mul(&means)).cholesky();
-        let told = self.told.and_then(beside);
+        let told = (&prior + self.told - means.tr_mul(&means)).cholesky();
         let by_rows = told.is_some();
         let Some(root) = told.or_else(|| prior.cholesky()) else {
             return Modes::default();
@@ -122,7 +121,7 @@ mod tests {
                 from: 0,
                 values: &DVector::zeros(2),
                 precision: Some(&precision),
-                told: Some(&told),
+                told: &told,
             };
             let modes = prior.modes(&means, 1.0);
             // both stars off along x, less what a fit of both priors takes
