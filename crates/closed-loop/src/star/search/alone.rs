@@ -34,6 +34,9 @@ const BY_FAR: f64 = 10.0;
 const TRACE: f64 = 0.05;
 /// A slow error gains this many times as much, and more, where no polish brings effects in its place up to it.
 const HOPELESS: f64 = 1.5;
+/// Nats by which effects that were polished are behind a slow error in their place, where no other form and nothing
+/// beside them brings them up to it.
+const FAR_BEHIND: f64 = 50.0;
 /// Effects that turn frames of which every set is held against a slow error: of more there are too many.
 const MOST_SETS_OF: usize = 3;
 /// Rounds of selection and polish; the choice settles in two.
@@ -44,6 +47,8 @@ pub(super) struct Begun {
     pub(super) candidates: Vec<Arc<dyn Candidate>>,
     pub(super) moments: StarMoments,
     pub(super) plain: Fitted,
+    /// Whether what white evidence chooses of them is known to be far behind a slow error.
+    pub(super) hopeless: bool,
 }
 
 /// What white evidence comes to.
@@ -67,6 +72,7 @@ impl Begun {
             candidates,
             moments,
             plain,
+            hopeless: false,
         })
     }
 }
@@ -126,7 +132,7 @@ pub(super) fn without_slow(
         if *chosen == before || !polish(white, folds, &mut polished, fitted, chosen)? {
             let alone = Alone::new(white, folds, &begun, fitted, chosen, cost);
             let known = known.filter(|_| *chosen == before);
-            let whole = known.or_else(|| alone.likely(&start));
+            let whole = known.or_else(|| alone.held_against(&start)?.likely());
             if !whole.is_some_and(|whole| alone.stands(&whole, &start)) {
                 break;
             }
@@ -142,7 +148,9 @@ pub(super) fn without_slow(
         let all: Vec<usize> = (0..chosen.len()).collect();
         let cost = chosen.iter().map(|&g| cost[g]).collect();
         let alone = Alone::new(white, folds, &own, &own.plain, &all, cost);
-        known = alone.likely(&start);
+        let held = alone.held_against(&start);
+        begun.hopeless = held.as_ref().is_some_and(Held::is_hopeless);
+        known = held.and_then(Held::likely);
         if known.is_none() {
             break;
         }
@@ -163,11 +171,31 @@ pub(super) fn is_hopeless(
     may: &[bool],
     noise: &CommonNoise,
 ) -> Result<bool, CloseError> {
+    if begun.hopeless {
+        return Ok(true);
+    }
     let (selection, quieter) = begun.plain.selected(folds, &begun.candidates, may)?;
     let fitted = quieter.as_ref().unwrap_or(&begun.plain);
     let cost = costs(&fitted.groups, may);
     let alone = Alone::new(white, folds, begun, fitted, &selection.chosen, cost);
     Ok(alone.is_hopeless(fitted, noise))
+}
+
+/// What was chosen at its best noise, and the nats that it is worth more than a slow error in the place of all of it
+/// that such an error could be.
+struct Held {
+    whole: Scored,
+    lead: f64,
+}
+
+impl Held {
+    fn likely(self) -> Option<Scored> {
+        (self.lead > BY_FAR).then_some(self.whole)
+    }
+
+    fn is_hopeless(&self) -> bool {
+        self.lead < -FAR_BEHIND
+    }
 }
 
 /// What white evidence chose, held against slow errors in its place.
@@ -209,14 +237,14 @@ impl<'a> Alone<'a> {
         }
     }
 
-    /// What was chosen at its best noise, if it is worth more by far than a slow error in the place of all of it
-    /// that such an error could be.
-    fn likely(&self, start: &CommonNoise) -> Option<Scored> {
+    fn held_against(&self, start: &CommonNoise) -> Option<Held> {
         let (whole, rest) = rayon::join(
             || self.trial.score(self.chosen, start),
             || self.instead_of(self.most(), start),
         );
-        whole.filter(|whole| self.is_by_far(whole, rest))
+        let whole = whole?;
+        let lead = self.trial.worth_of_white(&whole) - rest?;
+        Some(Held { whole, lead })
     }
 
     /// Whether those that turn frames, as they are, explain so much less than a slow error in their place that no

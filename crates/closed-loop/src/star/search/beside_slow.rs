@@ -67,6 +67,7 @@ pub(super) fn beside_slow<'a>(
         candidates,
         mut moments,
         plain,
+        hopeless,
     } = begun;
     let mut search = Search {
         white,
@@ -115,6 +116,7 @@ pub(super) fn beside_slow<'a>(
                     candidates: candidates.clone(),
                     moments,
                     plain,
+                    hopeless,
                 },
                 searched: Searched {
                     found: Found {

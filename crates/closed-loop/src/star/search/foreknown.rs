@@ -78,6 +78,7 @@ impl Forms {
             candidates,
             moments,
             plain,
+            ..
         } = Begun::on(white, folds, candidates)?;
         let mut forms = Self {
             moments: (!white.is_long()).then_some(moments),
