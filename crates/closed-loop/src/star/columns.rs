@@ -118,6 +118,14 @@ impl StarColumns<'_> {
         }
     }
 
+    /// What candidates that all turn the camera turn `frames` by, arcsec: three rows a frame.
+    pub(crate) fn turns(&self, frames: Range<usize>) -> DMatrix<f64> {
+        let layout = self.layout();
+        let mut turns = DMatrix::zeros(3 * frames.len(), layout.turn.len());
+        self.fill_turns(&self.data.frames.t_s[frames], &layout, &mut turns);
+        turns
+    }
+
     fn fill_turns(&self, t_s: &[f64], layout: &Layout, out: &mut DMatrix<f64>) {
         let frames = t_s.len();
         let mut column = 0;

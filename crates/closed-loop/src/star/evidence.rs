@@ -146,13 +146,38 @@ impl<'a> StarEvidence<'a> {
 
     /// One pass over the data that serves every noise.
     pub(crate) fn moments(&self, folds: &Folds, candidates: &[&dyn Candidate]) -> StarMoments {
+        self.moments_keeping(folds, candidates, |bins| Keep::Bins(bins))
+    }
+
+    /// The same, with every frame's moments where there is room.
+    pub(crate) fn moments_by_frame(
+        &self,
+        folds: &Folds,
+        candidates: &[&dyn Candidate],
+    ) -> StarMoments {
+        self.moments_keeping(folds, candidates, |bins| Keep::BinsAndFrames(bins))
+    }
+
+    /// What candidates that turn the camera turn the frames of each block by, arcsec: three rows a frame.
+    pub(crate) fn turns(&self, folds: &Folds, candidates: &[&dyn Candidate]) -> Vec<DMatrix<f64>> {
+        let columns = self.bare_columns(candidates);
+        let blocks = folds.blocks.par_iter();
+        blocks.map(|frames| columns.turns(frames.clone())).collect()
+    }
+
+    fn moments_keeping(
+        &self,
+        folds: &Folds,
+        candidates: &[&dyn Candidate],
+        keep: impl for<'k> Fn(&'k Bins) -> Keep<'k>,
+    ) -> StarMoments {
         let most = match self.drawn {
             Some(_) => MOST_RESTLESS_BINS,
             None => MOST_BINS,
         };
         let bins = Bins::cut(&self.data.frames.t_s, folds, most);
         let all = self.all(candidates);
-        StarMoments::accumulate(&self.columns(&all), folds, Keep::Bins(&bins))
+        StarMoments::accumulate(&self.columns(&all), folds, keep(&bins))
     }
 
     /// All of these products under its noise, or white.

@@ -17,6 +17,7 @@
 //!
 //! Source: the partitioned normal equations of bundle adjustment (Brown 1958).
 
+mod by_frame;
 mod paced;
 mod sums;
 #[cfg(test)]
@@ -29,6 +30,7 @@ use coloured_noise::{CommonNoise, Filter, Rotations};
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use rayon::prelude::*;
 
+use self::by_frame::ByFrame;
 use self::paced::Paced;
 pub(super) use self::sums::SOLVING;
 use self::sums::{Scratch, SolvedBins, Sums};
@@ -43,6 +45,9 @@ pub(crate) const MOST_RESTLESS_BINS: usize = 6000;
 
 /// Rows from which on slow columns are not taken at every frame: with a fortieth of them it saves nothing.
 const PACED_ROWS: usize = 300_000;
+
+/// Frames by columns of which every frame's own rotations are kept at most: 100 MB.
+const MOST_BY_FRAME: usize = 100_000_000 / (3 * size_of::<f64>());
 
 /// Blocks at least that one scratch is for.
 const TOGETHER: usize = 4;
@@ -62,8 +67,18 @@ pub(crate) enum Keep<'a> {
     Free,
     /// Every frame's own, with this prior precision about each axis: the reference has white noise.
     Drawn([f64; 3]),
-    /// Means over bins.
+    /// Means over bins; and, where there is room, every frame's own as well.
     Bins(&'a Bins),
+    BinsAndFrames(&'a Bins),
+}
+
+impl<'a> Keep<'a> {
+    fn bins(self) -> Option<&'a Bins> {
+        match self {
+            Keep::Bins(bins) | Keep::BinsAndFrames(bins) => Some(bins),
+            Keep::None | Keep::Free | Keep::Drawn(_) => None,
+        }
+    }
 }
 
 /// What the pass keeps of a block.
@@ -82,6 +97,8 @@ struct Block {
     inverse: Vec<Option<Matrix3<f64>>>,
     /// What the log-likelihood of the scalars lacks, nats.
     log_scale: f64,
+    /// Every frame's rotation, where these are kept and no bin is without an attitude.
+    by_frame: Option<ByFrame>,
 }
 
 impl Block {
@@ -119,6 +136,7 @@ impl Block {
             scalars: self.rest_scalars,
             theta: DMatrix::zeros(0, self.rest.ncols()),
             inverse: Vec::new(),
+            by_frame: None,
             ..self
         }
     }
@@ -146,7 +164,7 @@ impl StarMoments {
         let paced = match keep {
             _ if !long => None,
             Keep::None => Paced::of(columns, &folds.blocks),
-            Keep::Bins(bins) => Paced::of(columns, &bins.rows),
+            Keep::Bins(bins) | Keep::BinsAndFrames(bins) => Paced::of(columns, &bins.rows),
             Keep::Free | Keep::Drawn(_) => None,
         };
         let sums = |frames, bins: Option<&SolvedBins<'_>>, scratch: &mut Scratch| match &paced {
@@ -168,10 +186,13 @@ impl StarMoments {
                     };
                     sums(frames, Some(&bins), scratch).drawn(precision, scratch)
                 }
-                Keep::Bins(bins) => {
+                Keep::Bins(bins) | Keep::BinsAndFrames(bins) => {
+                    let room = !long
+                        && columns.layout().width() * columns.data.frames.frames() < MOST_BY_FRAME;
                     let bins = SolvedBins {
                         frames: bins.rows[bins.folds.blocks[b].clone()].into(),
                         least: SOLVING,
+                        by_frame: room && matches!(keep, Keep::BinsAndFrames(_)),
                     };
                     sums(frames, Some(&bins), scratch).block(scratch)
                 }
@@ -182,21 +203,27 @@ impl StarMoments {
             .with_min_len(TOGETHER)
             .map_init(Scratch::default, block)
             .collect();
-        let (t_s, frames) = match keep {
-            Keep::Bins(bins) => (
-                bins.t_s.clone(),
-                bins.rows.iter().map(ExactSizeIterator::len).collect(),
-            ),
-            _ => (Vec::new(), Vec::new()),
-        };
+        let (t_s, frames) = keep.bins().map_or_else(Default::default, |bins| {
+            let frames = bins.rows.iter().map(ExactSizeIterator::len);
+            (bins.t_s.clone(), frames.collect())
+        });
+        Self::of(blocks, t_s, frames, folds.fold_of_block.clone())
+    }
+
+    fn of(
+        blocks: Vec<Block>,
+        t_s: Vec<f64>,
+        frames: Vec<usize>,
+        fold_of_block: Vec<usize>,
+    ) -> Self {
         Self {
             blocks,
             t_s,
             frames,
             rest: OnceLock::new(),
             rest_by_fold: OnceLock::new(),
-            fold_of_block: folds.fold_of_block.clone(),
             white: OnceLock::new(),
+            fold_of_block,
         }
     }
 

@@ -54,6 +54,7 @@ mod beside_slow;
 mod first_sight;
 mod foreknown;
 mod in_vain;
+mod on_frames;
 mod trial;
 
 /// Parts of a long run of which one is searched before the whole is.

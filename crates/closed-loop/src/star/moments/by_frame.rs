@@ -19,11 +19,45 @@ use super::{Block, SINGULAR, StarMoments, pick};
 /// M of each frame of a block, three rows a frame, and N.
 #[derive(Clone, Debug)]
 pub(super) struct ByFrame {
-    pub(super) moments: DMatrix<f64>,
-    pub(super) normals: Vec<Matrix3<f64>>,
+    /// While it is summed, three columns a frame.
+    moments: DMatrix<f64>,
+    normals: Vec<Matrix3<f64>>,
 }
 
 impl ByFrame {
+    /// No frames yet of so many.
+    pub(super) fn of_none(width: usize, frames: usize) -> Self {
+        Self {
+            moments: DMatrix::zeros(width, 3 * frames),
+            normals: Vec::with_capacity(frames),
+        }
+    }
+
+    /// Frames with these N and M about each axis, a column a frame from `held` on.
+    pub(super) fn push(
+        &mut self,
+        moments: &[DMatrix<f64>; 3],
+        held: usize,
+        normals: &[Matrix3<f64>],
+    ) {
+        for k in 0..normals.len() {
+            let first = 3 * (self.normals.len() + k);
+            for (axis, moments) in moments.iter().enumerate() {
+                let mut into = self.moments.column_mut(first + axis);
+                into.copy_from(&moments.column(held + k));
+            }
+        }
+        self.normals.extend_from_slice(normals);
+    }
+
+    /// Once all are summed, of columns in this order.
+    pub(super) fn in_order(self, order: &[usize]) -> Self {
+        Self {
+            moments: self.moments.select_rows(order).transpose(),
+            ..self
+        }
+    }
+
     /// M of columns that turn the camera by `turns`.
     fn of_turns(&self, turns: &DMatrix<f64>) -> DMatrix<f64> {
         let mut moments = turns.clone();

@@ -124,6 +124,7 @@ impl Paced {
         let bins = bins.map(|bins| SolvedBins {
             frames: bins.frames.iter().map(|b| self.nodes_of(b)).collect(),
             least: bins.least,
+            by_frame: false,
         });
         let slow = StarColumns {
             data: &self.data,

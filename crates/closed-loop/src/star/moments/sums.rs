@@ -16,6 +16,7 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, DMatrixView, DMatrixViewMut, DVector, Dyn, Matrix3, Vector3};
 
+use super::by_frame::ByFrame;
 use super::{Block, pick};
 use crate::star::columns::StarColumns;
 use crate::star::frame_rotation::rotation_row;
@@ -39,6 +40,8 @@ pub(super) struct SolvedBins<'a> {
     pub(super) frames: Cow<'a, [Range<usize>]>,
     /// Fewest stars of one that has a rotation.
     pub(super) least: usize,
+    /// Whether every frame's are kept as well.
+    pub(super) by_frame: bool,
 }
 
 impl SolvedBins<'_> {
@@ -47,6 +50,7 @@ impl SolvedBins<'_> {
         Self {
             frames: frames.clone().map(|k| k..k + 1).collect(),
             least: SOLVING,
+            by_frame: false,
         }
     }
 }
@@ -68,6 +72,7 @@ pub(super) struct Sums {
     scalars: usize,
     /// M of each bin, three columns a bin, and N.
     bins: Option<Turned>,
+    by_frame: Option<ByFrame>,
     /// Products of the rows of bins that have no attitude, and how many scalars.
     lost: Option<(DMatrix<f64>, usize)>,
     /// Columns of X and Y whose products are known better ([`super::paced`]), and these, below the diagonal.
@@ -250,6 +255,8 @@ impl Sums {
         let (shared, own, turn) = (layout.shared, layout.own.len(), layout.turn.len());
         let width = layout.width();
         let space = &mut scratch.space;
+        let frames = bins.filter(|b| b.by_frame);
+        let frames = frames.map(|b| b.frames.iter().map(ExactSizeIterator::len).sum());
         Self {
             shared: zeros_in(&mut space.shared, shared, shared),
             cross: zeros_in(&mut space.cross, 2 * shared, own),
@@ -262,6 +269,7 @@ impl Sums {
                     vec![Matrix3::zeros(); b.frames.len()],
                 )
             }),
+            by_frame: frames.map(|frames| ByFrame::of_none(width, frames)),
             lost: None,
             fast: None,
             layout,
@@ -311,6 +319,9 @@ impl Sums {
             let Some(SolvedBins { frames: ranges, .. }) = bins else {
                 continue;
             };
+            if let Some(by_frame) = &mut sums.by_frame {
+                by_frame.push(&scratch.moments, held, &scratch.normal);
+            }
             for (k, frame) in chunk.enumerate() {
                 while ranges[bin].end <= frame {
                     bin += 1;
@@ -519,6 +530,7 @@ impl Sums {
             scalars -= count;
         }
         let width = order.len();
+        let by_frame = self.by_frame.filter(|_| lost.is_none());
         let block = Block {
             rest: Arc::new(rest),
             lost,
@@ -527,6 +539,7 @@ impl Sums {
             theta: DMatrix::zeros(0, width),
             inverse: Vec::new(),
             log_scale: 0.0,
+            by_frame: by_frame.map(|by_frame| by_frame.in_order(&order)),
         };
         let space = &mut scratch.space;
         let bins = self.bins.map(|(summed, normals)| {

@@ -19,10 +19,21 @@ struct Turn {
     coefficients: Vec<Coefficient>,
     /// Told as what it is, or row by row.
     whole: bool,
+    at: fn(f64) -> f64,
 }
 
 impl Turn {
-    fn at(t_s: f64) -> f64 {
+    fn by(at: fn(f64) -> f64, whole: bool) -> Self {
+        Self {
+            coefficients: ["x", "y", "z"]
+                .map(|n| Coefficient::new(n, "arcsec", 1.0))
+                .to_vec(),
+            whole,
+            at,
+        }
+    }
+
+    fn wave(t_s: f64) -> f64 {
         (0.9 * t_s).sin() + 0.1 * t_s
     }
 }
@@ -51,7 +62,7 @@ impl Candidate for Turn {
                 y: rows.y_px[i],
             });
             for axis in 0..3 {
-                let g = Self::at(rows.t_s[i]) / ARCSEC_PER_RAD;
+                let g = (self.at)(rows.t_s[i]) / ARCSEC_PER_RAD;
                 out.x[axis * n + i] = x[axis] * g;
                 out.y[axis * n + i] = y[axis] * g;
             }
@@ -61,7 +72,7 @@ impl Candidate for Turn {
     fn attitude_columns(&self, rows: &AttitudeRows<'_>, out: VectorsMut<'_>) -> bool {
         let n = rows.len();
         for (k, t) in rows.t_s.iter().enumerate() {
-            let g = Self::at(*t) / ARCSEC_PER_RAD;
+            let g = (self.at)(*t) / ARCSEC_PER_RAD;
             out.x[k] = g;
             out.y[n + k] = g;
             out.z[2 * n + k] = g;
@@ -191,13 +202,7 @@ fn with_pass(
     let nuisance = StarNuisance::declared(&model, &data);
     let ids = data.stars.iter().map(|s| s.id).collect();
     let sparse = Empirical::new(Variable::Star(ids), [0.0, 1.0], true).unwrap();
-    let turn = |whole| Turn {
-        coefficients: ["x", "y", "z"]
-            .map(|n| Coefficient::new(n, "arcsec", 1.0))
-            .to_vec(),
-        whole,
-    };
-    let (whole, rowwise) = (turn(true), turn(false));
+    let [whole, rowwise] = [true, false].map(|whole| Turn::by(Turn::wave, whole));
     let residual: [Vec<f64>; 2] = std::array::from_fn(|axis| {
         (0..data.t_s.len())
             .map(|r| (1.7 * r as f64 + axis as f64).sin() + 0.2)
@@ -463,12 +468,7 @@ fn parts_of_stars_are_the_whole() {
     let model = "format = \"boresight-model/1\"\n[noise]\ntemporal_arcsec = 7.0\n\
                  distortion_arcsec = 3.0\ndistortion_order = 2\n";
     let nuisance = StarNuisance::declared(&Model::parse(model, "model.toml", &[]).unwrap(), &data);
-    let turn = Turn {
-        coefficients: ["x", "y", "z"]
-            .map(|n| Coefficient::new(n, "arcsec", 1.0))
-            .to_vec(),
-        whole: true,
-    };
+    let turn = Turn::by(Turn::wave, true);
     let waves = effects::harmonics_of(&data.camera, &[1, 2]);
     let candidates: [&dyn Candidate; 2] = [&turn, &*waves];
     let residual = std::array::from_fn(|axis| {
@@ -496,4 +496,96 @@ fn parts_of_stars_are_the_whole() {
         };
         close(&sum.total().0, &whole.total().0);
     }
+}
+
+/// What turns the camera, put in place or beside the others by the moments of frames, is what another pass makes of it:
+/// to rounding, white and under a slow error. A turn that every bin holds has nothing left in R. Bins of three frames.
+#[test]
+fn what_turns_the_camera_needs_no_other_pass() {
+    let data = data(false, 171);
+    let model = "format = \"boresight-model/1\"\n[noise]\ntemporal_arcsec = 7.0\n\
+                 distortion_arcsec = 3.0\ndistortion_order = 2\n";
+    let nuisance = StarNuisance::declared(&Model::parse(model, "model.toml", &[]).unwrap(), &data);
+    let turns: [fn(f64) -> f64; 3] = [Turn::wave, |t_s| (1.7 * t_s).cos(), |_| 1.0];
+    let [wave, faster, rest] = turns.map(|at| Turn::by(at, true));
+    let waves = effects::harmonics_of(&data.camera, &[1, 2]);
+    let residual = std::array::from_fn(|axis| {
+        let rows = 0..data.t_s.len();
+        rows.map(|r| (1.7 * r as f64 + axis as f64).sin()).collect()
+    });
+    let (weight, residuals) = (weights(&data), [residual]);
+    let none = StarColumns {
+        data: &data,
+        nuisance: &nuisance,
+        candidates: &[],
+        residuals: &residuals,
+        motion: None,
+        weight: &weight,
+    };
+    let folds = Folds::cut(data.frames.frames());
+    let bins = Bins::cut(&data.frames.t_s, &folds, 60);
+    let pass = |candidates: &[&dyn Candidate]| {
+        let columns = StarColumns { candidates, ..none };
+        StarMoments::accumulate(&columns, &folds, Keep::BinsAndFrames(&bins))
+    };
+    let turned = |turn: &Turn| -> Vec<DMatrix<f64>> {
+        let turning: [&dyn Candidate; 1] = [turn];
+        let columns = StarColumns {
+            candidates: &turning,
+            ..none
+        };
+        let blocks = folds.blocks.iter();
+        blocks.map(|b| columns.turns(b.clone())).collect()
+    };
+    let same = |ours: &StarMoments, other: &StarMoments| {
+        let all: Vec<usize> = (0..other.width()).collect();
+        let (a, b) = (ours.white_of(&all), other.white_of(&all));
+        close(&a.total().0, &b.total().0);
+        let noise = shared_noise();
+        let (a, b) = (ours.under(&all, &noise), other.under(&all, &noise));
+        close(&a.total().0, &b.total().0);
+        assert!((a.total().1 - b.total().1).abs() < 0.5);
+        assert!((a.log_scale - b.log_scale).abs() < 1e-9);
+    };
+    let first = none.layout().width() - 1;
+    let before = pass(&[&wave, &*waves, &wave]);
+    assert!(before.is_by_frame());
+    for turn in [&faster, &rest] {
+        let other = pass(&[turn, &*waves, &wave]);
+        let which: Vec<usize> = (first..first + 3).collect();
+        let ours = before.clone().with_turns(&which, &turned(turn));
+        same(&ours, &other);
+        // and once more, by the moments that were put in place
+        let last = first + 3 + waves.coefficients().len();
+        let which: Vec<usize> = (last..last + 3).collect();
+        same(
+            &ours.with_turns(&which, &turned(turn)),
+            &pass(&[turn, &*waves, turn]),
+        );
+        let beside = before.narrowed(first, 1).beside_turns(1, &turned(turn));
+        same(&beside, &pass(&[turn]));
+        if std::ptr::eq(turn, &rest) {
+            let nothing = beside.rest().columns(first, 3).norm();
+            assert!(nothing <= 0.0, "{nothing}");
+        }
+    }
+}
+
+/// Frames of one star have no rotation of their own: what they hold is in no frame's moments.
+#[test]
+fn frames_without_an_attitude_ask_for_another_pass() {
+    let data = data(true, 40);
+    let model = "format = \"boresight-model/1\"\n[noise]\ntemporal_arcsec = 7.0\n";
+    let folds = Folds::cut(data.frames.frames());
+    let bins = Bins::cut(&data.frames.t_s, &folds, MOST_BINS);
+    let columns = StarColumns {
+        data: &data,
+        nuisance: &StarNuisance::declared(&Model::parse(model, "model.toml", &[]).unwrap(), &data),
+        candidates: &[],
+        residuals: &[[data.t_s.clone(), data.t_s.clone()]],
+        motion: None,
+        weight: &weights(&data),
+    };
+    let moments = StarMoments::accumulate(&columns, &folds, Keep::BinsAndFrames(&bins));
+    assert!(!moments.is_by_frame());
 }

@@ -17,6 +17,7 @@ use block_regression::Folds;
 use coloured_noise::CommonNoise;
 use effects::Candidate;
 
+use super::on_frames::{OnFrames, in_forms};
 use super::trial::{Scored, Trial};
 use super::{Wander, first_sight};
 use crate::declared::OnCentroids;
@@ -66,7 +67,16 @@ impl Begun {
         folds: &Folds,
         candidates: Vec<Arc<dyn Candidate>>,
     ) -> Result<Self, CloseError> {
-        let moments = white.moments(folds, &borrowed(&candidates));
+        let moments = white.moments_by_frame(folds, &borrowed(&candidates));
+        Self::of(white, folds, candidates, moments)
+    }
+
+    fn of(
+        white: &StarEvidence<'_>,
+        folds: &Folds,
+        candidates: Vec<Arc<dyn Candidate>>,
+        moments: StarMoments,
+    ) -> Result<Self, CloseError> {
         let plain = plainly(white, folds, &candidates, &moments)?;
         Ok(Self {
             candidates,
@@ -74,6 +84,19 @@ impl Begun {
             plain,
             hopeless: false,
         })
+    }
+
+    /// The same in other `forms`.
+    fn in_forms(
+        self,
+        white: &StarEvidence<'_>,
+        folds: &Folds,
+        forms: Vec<Arc<dyn Candidate>>,
+    ) -> Result<Self, CloseError> {
+        // its fits share the products
+        drop(self.plain);
+        let moments = in_forms(white, folds, self.moments, &self.candidates, &forms);
+        Self::of(white, folds, forms, moments)
     }
 }
 
@@ -129,7 +152,8 @@ pub(super) fn without_slow(
             }
         }
         let mut polished = begun.candidates.clone();
-        if *chosen == before || !polish(white, folds, &mut polished, fitted, chosen)? {
+        let on_frames = OnFrames::of(white, &begun.moments);
+        if *chosen == before || !polish(&on_frames, folds, &mut polished, fitted, chosen)? {
             let alone = Alone::new(white, folds, &begun, fitted, chosen, cost);
             let known = known.filter(|_| *chosen == before);
             let whole = known.or_else(|| alone.held_against(&start)?.likely());
@@ -155,9 +179,8 @@ pub(super) fn without_slow(
             break;
         }
         before.clone_from(chosen);
-        // there is no room for the old products beside the new
-        drop(begun);
-        begun = Begun::on(white, folds, polished)?;
+        drop(quieter);
+        begun = begun.in_forms(white, folds, polished)?;
     }
     Ok(Outcome::Open(Box::new(begun)))
 }

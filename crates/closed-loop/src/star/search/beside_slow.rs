@@ -13,6 +13,7 @@ use effects::Candidate;
 use rayon::prelude::*;
 
 use super::alone::{Begun, plainly};
+use super::on_frames::{OnFrames, in_forms};
 use super::trial::{Scored, Trial};
 use super::{Searched, Wander};
 use crate::error::CloseError;
@@ -133,10 +134,10 @@ pub(super) fn beside_slow<'a>(
         search.chosen.push(added);
         search.noise = its_noise;
         let fitted = search.fitted(&moments)?;
-        if search.polished(&fitted)? {
-            // there is no room for the old products beside the new
-            drop((plain, filtered, fitted, moments));
-            moments = white.moments(folds, &borrowed(&search.candidates));
+        let before = search.candidates.clone();
+        if search.polished(&moments, &fitted)? {
+            drop((plain, filtered, fitted));
+            moments = in_forms(white, folds, moments, &before, &search.candidates);
         } else {
             (plain_fit, filtered_fit) = (Some(plain), Some(fitted));
         }
@@ -257,8 +258,9 @@ impl<'s> Search<'s, '_> {
     }
 
     /// Whether the choice has other forms now.
-    fn polished(&mut self, fitted: &Fitted) -> Result<bool, CloseError> {
-        let evidence = self.white.with_noise(&self.noise);
+    fn polished(&mut self, moments: &StarMoments, fitted: &Fitted) -> Result<bool, CloseError> {
+        let level = self.white.with_noise(&self.noise);
+        let evidence = OnFrames::of(&level, moments);
         let (candidates, chosen) = (&mut self.candidates, &self.chosen);
         polish(&evidence, self.folds, candidates, fitted, chosen)
     }

@@ -102,3 +102,82 @@ pub(super) fn in_forms(
     let turning: Vec<&dyn Candidate> = changed.iter().map(|&g| forms[g].as_ref()).collect();
     moments.with_turns(&which, &white.turns(folds, &turning))
 }
+
+#[cfg(test)]
+mod tests {
+    use telemetry::Model;
+
+    use super::*;
+    use crate::search::empirical::{Empirical, Variable};
+    use crate::star::data::StarData;
+    use crate::star::harness::at_rest;
+    use crate::star::nuisance::StarNuisance;
+    use crate::star::slow_price::SlowPrice;
+
+    const SPAN_S: f64 = 60.0;
+
+    fn evidence(data: &StarData) -> StarEvidence<'_> {
+        let mut model = Model::default();
+        model.noise.distortion_arcsec = Some(1.0);
+        let rows = data.t_s.len();
+        let residual = [1.3, 2.1].map(|f| (0..rows).map(|r| (f * r as f64).sin()).collect());
+        StarEvidence {
+            data,
+            nuisance: StarNuisance::declared(&model, data),
+            residuals: Arc::new(vec![residual]),
+            motion: None,
+            resolved: false,
+            own_paths: false,
+            sigma_guess_arcsec: 1.0,
+            noise: None,
+            weight: Arc::new(vec![1.0; rows]),
+            drawn: None,
+            slow_price: SlowPrice::default(),
+            // one that stands before all candidates
+            kept: vec![Arc::new(of_star(data, 2))],
+        }
+    }
+
+    fn of_star(data: &StarData, star: usize) -> Empirical {
+        Empirical::new(Variable::Star(vec![data.stars[star].id]), [0.0, 1.0], true).unwrap()
+    }
+
+    fn step(at_s: f64) -> Arc<dyn Candidate> {
+        effects::step_at(at_s, [0.0, SPAN_S], 1).into()
+    }
+
+    fn assert_same(ours: &BlockGrams, other: &BlockGrams) {
+        let ((ours, scalars), (other, others)) = (ours.total(), other.total());
+        let off = (&ours - &other).norm() / other.norm();
+        assert!(
+            off < 1e-11 && (scalars - others).abs() < 0.5,
+            "off by {off}"
+        );
+    }
+
+    /// Steps beside the nuisance and what is kept, and one of the candidates at another instant, are those of a pass:
+    /// to rounding. What turns no camera is passed over.
+    #[test]
+    fn forms_on_frames_are_those_of_a_pass() {
+        let data = at_rest((0..120).map(|k| 0.5 * f64::from(k)).collect());
+        let (white, folds) = (evidence(&data), Folds::cut(data.frames.t_s.len()));
+        let candidates: Vec<Arc<dyn Candidate>> =
+            vec![Arc::new(of_star(&data, 0)), step(20.0), step(41.3)];
+        let moments = white.moments_by_frame(&folds, &borrowed(&candidates));
+        assert!(moments.is_by_frame());
+        let on_frames = OnFrames::of(&white, &moments);
+        let two = [step(11.1), step(33.3)];
+        for tried in [&two[..], &candidates[..2]] {
+            let tried = borrowed(tried);
+            let other = white.grams(&folds, &tried);
+            assert_same(&on_frames.grams(&folds, &tried), &other);
+        }
+        for (g, other) in [(1, step(25.2)), (0, Arc::new(of_star(&data, 3)))] {
+            let mut forms = candidates.clone();
+            forms[g] = other;
+            let ours = in_forms(&white, &folds, moments.clone(), &candidates, &forms);
+            let other = white.moments(&folds, &borrowed(&forms));
+            assert_same(&white.under(&ours), &white.under(&other));
+        }
+    }
+}
