@@ -60,6 +60,8 @@ pub(super) struct Known<'a> {
     pub(super) path: Option<AttitudeSeries>,
     /// What was chosen, in its polished form, and its place among the candidates.
     pub(super) forms: Vec<(usize, Arc<dyn Candidate>)>,
+    /// What was chosen of what an earlier search left: the catalogue does not list it.
+    pub(super) put_forward: Vec<Arc<dyn Candidate>>,
     /// How often the light may still be followed to where it falls.
     pub(super) landings: usize,
 }
@@ -132,16 +134,21 @@ pub(super) fn explain(
     let own = own.map(|(variants, zero_px)| anew(data, situation, motion, variants, &zero_px));
     let level = own.as_ref().unwrap_or(&measured);
     let ground = Ground::of(begun, level, motion, &scene)?;
-    let findings = match ground.search(progress)? {
-        ControlFlow::Continue(findings) => findings,
-        ControlFlow::Break(explained) => return Ok(explained),
+    let mut explained = match ground.search(progress)? {
+        ControlFlow::Continue(findings) => {
+            let by_images = ByImages {
+                measured: &measured,
+                image: image.as_ref(),
+                formed: formed.as_ref(),
+            };
+            conclude(&ground, findings, &by_images, progress)?
+        }
+        ControlFlow::Break(explained) => explained,
     };
-    let by_images = ByImages {
-        measured: &measured,
-        image: image.as_ref(),
-        formed: formed.as_ref(),
-    };
-    conclude(&ground, findings, &by_images, progress)
+    if let Explained::Elsewhere(elsewhere) = &mut explained {
+        elsewhere.split(ground.listed().len());
+    }
+    Ok(explained)
 }
 
 /// The motion of the tracker: by its reference, or by `path`, or by its own stars.

@@ -58,9 +58,19 @@ pub(crate) struct Elsewhere {
     pub(crate) shifts: Shifts,
     /// What was chosen, in its polished form, and its place among the candidates.
     pub(crate) forms: Vec<(usize, Arc<dyn Candidate>)>,
+    /// Those of them that no catalogue lists, once they are told from the others.
+    pub(crate) put_forward: Vec<Arc<dyn Candidate>>,
 }
 
 impl Elsewhere {
+    /// Tells what stands behind the first `listed` candidates from what the catalogue lists.
+    pub(crate) fn split(&mut self, listed: usize) {
+        let (forms, put_forward) = self.forms.drain(..).partition(|(g, _)| *g < listed);
+        self.forms = forms;
+        let put_forward: Vec<_> = put_forward;
+        self.put_forward = put_forward.into_iter().map(|(_, c)| c).collect();
+    }
+
     /// `None`: the light falls where it was taken to.
     pub(crate) fn of(
         level: &StarEvidence<'_>,
@@ -74,6 +84,7 @@ impl Elsewhere {
         Ok(Some(Box::new(Self {
             shifts: Shifts::of(level, folds, choice)?,
             forms: choice.forms(),
+            put_forward: Vec::new(),
         })))
     }
 }

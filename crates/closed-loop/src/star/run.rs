@@ -179,7 +179,7 @@ fn trace(
             settled: &settled,
             known: &known,
         };
-        let Elsewhere { shifts, forms } = match explain(data, &begun, progress)? {
+        let elsewhere = match explain(data, &begun, progress)? {
             Explained::Closed(closed) => return Ok(Ended::Closed(closed)),
             Explained::AsMeasured(why) => return Ok(Ended::AsMeasured(*why)),
             Explained::Steadier(path) => {
@@ -188,8 +188,14 @@ fn trace(
             }
             Explained::Elsewhere(elsewhere) => *elsewhere,
         };
+        let Elsewhere {
+            shifts,
+            forms,
+            put_forward,
+        } = elsewhere;
         known.landings -= 1;
         known.forms = forms;
+        known.put_forward = put_forward;
         // the declared model knows nothing of where the light falls
         settled
             .phase_error

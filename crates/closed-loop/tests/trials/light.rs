@@ -2,6 +2,9 @@
 //!
 //! A pixel is 70 arcsec; the declared triangle has its 5.06 arcsec.
 
+use std::cell::RefCell;
+
+use closed_loop::close;
 use scenarios::simulate;
 
 use crate::kit::{Case, Path, closed, named};
@@ -165,4 +168,25 @@ fn a_sky_that_passes_by_leaves_its_noise() {
     assert!(report.effects.is_empty(), "{:?}", report.effects);
     let squares = report.before.chi2_per_dof.expect("noise is declared");
     assert!((0.95..1.08).contains(&squares), "{squares}");
+}
+
+/// A line between what the catalogue lists takes the light 0.06 px along: what the first search left is put forward,
+/// the light is followed, and there the line is searched for at once, not found in what is left another time.
+#[test]
+fn a_line_that_takes_the_light_along_is_put_forward_once() {
+    let line = "frequency_hz = 0.0512\nx_cos_arcsec = 4.0\ny_sin_arcsec = 4.0";
+    let mut case = Case::new(Path::Slews, 3500).with("periodic_misalignment", line);
+    case.duration_s = 900.0;
+    let (model, bundle) = case.make();
+    let steps = RefCell::new(Vec::new());
+    let said = |step: &str| steps.borrow_mut().push(step.to_owned());
+    let report = close(&model, &bundle, &said).unwrap().report;
+    assert_eq!(named(&report), ["periodic_misalignment"]);
+    let steps = steps.into_inner();
+    let count = |what: &str| steps.iter().filter(|s| s.starts_with(what)).count();
+    assert_eq!(
+        (count("searching for"), count("searching again")),
+        (2, 1),
+        "{steps:?}"
+    );
 }

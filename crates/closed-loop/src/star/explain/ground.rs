@@ -77,10 +77,12 @@ impl<'g, 'a> Ground<'g, 'a> {
         &self,
         progress: &dyn Fn(&str),
     ) -> Result<ControlFlow<Explained, Findings<'a>>, CloseError> {
-        let landings = self.begun.known.landings;
+        let known = self.begun.known;
         let formed = self.begun.situation.windows.is_some();
         // but for the last time before anything is described
-        let mut outcome = match self.named(&[], !formed && landings > 1)? {
+        let lands = !formed && known.landings > 1;
+        let (outcome, mut also) = self.first(lands)?;
+        let mut outcome = match outcome {
             Outcome::Named(named) => *named,
             Outcome::Elsewhere(to) => return Ok(ControlFlow::Break(Explained::Elsewhere(to))),
         };
@@ -91,15 +93,22 @@ impl<'g, 'a> Ground<'g, 'a> {
         let (level, folds) = (self.level, self.begun.folds);
         if !put_forward.is_empty() && !in_vain(level, folds, &outcome.searched, &put_forward)? {
             progress("searching again with the line, jump or orbit that is left");
+            let first = self.listed().len() + also.len();
+            let count = put_forward.len();
+            also.extend(put_forward);
             // what was put forward in vain changes nothing
-            if let Outcome::Named(mut again) = self.named(&put_forward, false)?
-                && again
-                    .searched
-                    .found
-                    .names_one_of_the_last(put_forward.len())
-            {
-                inside = self.left(&mut again);
-                outcome = *again;
+            match self.named(&also, lands)? {
+                Outcome::Named(mut again) => {
+                    if again.searched.found.names_one_of_the_last(count) {
+                        inside = self.left(&mut again);
+                        outcome = *again;
+                    }
+                }
+                Outcome::Elsewhere(to) => {
+                    if to.forms.iter().any(|(g, _)| *g >= first) {
+                        return Ok(ControlFlow::Break(Explained::Elsewhere(to)));
+                    }
+                }
             }
         }
         let residual = inside.as_ref().map(|(residual, _)| residual.as_slice());
@@ -112,6 +121,22 @@ impl<'g, 'a> Ground<'g, 'a> {
             inside,
             look,
         }))
+    }
+
+    /// The first search: with what an earlier one put forward, if that is named again.
+    fn first(&self, lands: bool) -> Result<(Outcome<'a>, Vec<Arc<dyn Candidate>>), CloseError> {
+        let also = &self.begun.known.put_forward;
+        if !also.is_empty() {
+            let outcome = self.named(also, lands)?;
+            let again = match &outcome {
+                Outcome::Named(named) => named.searched.found.names_one_of_the_last(also.len()),
+                Outcome::Elsewhere(_) => true,
+            };
+            if again {
+                return Ok((outcome, also.clone()));
+            }
+        }
+        Ok((self.named(&[], lands)?, Vec::new()))
     }
 
     /// Terms of what nobody listed, for the question what the leftover follows most.
@@ -135,6 +160,16 @@ impl<'g, 'a> Ground<'g, 'a> {
         self.level.data
     }
 
+    /// What may be named of the catalogue.
+    pub(super) fn listed(&self) -> Vec<Arc<dyn Candidate>> {
+        let mut list = catalogue::candidates(self.scene);
+        // With raw windows a warm pixel is the dark map's business.
+        let formed = self.begun.situation.windows.is_some();
+        list.retain(|c| c.acts_on_stars() && !(formed && c.id() == "hot_pixel"));
+        self.begun.known.polished(&mut list);
+        list
+    }
+
     /// What may be named of the catalogue and of what was put forward; `lands`: whether the light is to be followed.
     fn named(
         &self,
@@ -149,11 +184,7 @@ impl<'g, 'a> Ground<'g, 'a> {
             ..
         } = *self.begun;
         let candidates = || {
-            let mut list = catalogue::candidates(self.scene);
-            // With raw windows a warm pixel is the dark map's business.
-            let formed = situation.windows.is_some();
-            list.retain(|c| c.acts_on_stars() && !(formed && c.id() == "hot_pixel"));
-            known.polished(&mut list);
+            let mut list = self.listed();
             list.extend(put_forward.iter().cloned());
             list
         };
