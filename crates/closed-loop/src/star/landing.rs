@@ -65,10 +65,10 @@ pub(crate) struct Elsewhere {
 impl Elsewhere {
     /// Tells what stands behind the first `listed` candidates from what the catalogue lists.
     pub(crate) fn split(&mut self, listed: usize) {
-        let (forms, put_forward) = self.forms.drain(..).partition(|(g, _)| *g < listed);
+        let forms = self.forms.drain(..);
+        let (forms, others): (Vec<_>, Vec<_>) = forms.partition(|(g, _)| *g < listed);
         self.forms = forms;
-        let put_forward: Vec<_> = put_forward;
-        self.put_forward = put_forward.into_iter().map(|(_, c)| c).collect();
+        self.put_forward = others.into_iter().map(|(_, c)| c).collect();
     }
 
     /// `None`: the light falls where it was taken to.
