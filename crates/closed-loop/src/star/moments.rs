@@ -167,6 +167,8 @@ impl StarMoments {
             Keep::Bins(bins) | Keep::BinsAndFrames(bins) => Paced::of(columns, &bins.rows),
             Keep::Free | Keep::Drawn(_) => None,
         };
+        let room = || columns.layout().width() * columns.data.frames.frames() < MOST_BY_FRAME;
+        let by_frame = matches!(keep, Keep::BinsAndFrames(_)) && !long && room();
         let sums = |frames, bins: Option<&SolvedBins<'_>>, scratch: &mut Scratch| match &paced {
             Some(paced) => paced.sums(columns, frames, bins, scratch),
             None => Sums::over(columns, frames, bins, scratch),
@@ -187,12 +189,10 @@ impl StarMoments {
                     sums(frames, Some(&bins), scratch).drawn(precision, scratch)
                 }
                 Keep::Bins(bins) | Keep::BinsAndFrames(bins) => {
-                    let room = !long
-                        && columns.layout().width() * columns.data.frames.frames() < MOST_BY_FRAME;
                     let bins = SolvedBins {
                         frames: bins.rows[bins.folds.blocks[b].clone()].into(),
                         least: SOLVING,
-                        by_frame: room && matches!(keep, Keep::BinsAndFrames(_)),
+                        by_frame,
                     };
                     sums(frames, Some(&bins), scratch).block(scratch)
                 }

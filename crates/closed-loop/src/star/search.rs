@@ -368,7 +368,7 @@ fn explored<'a>(
     start: CommonNoise,
     sight: Option<&OnCentroids>,
 ) -> Result<Explored<'a>, CloseError> {
-    let begun = Begun::on(white, folds, candidates)?;
+    let begun = Begun::by_frame(white, folds, candidates)?;
     Ok(
         match alone::without_slow(white, folds, begun, may, start, sight)? {
             Outcome::Settled(found) => Explored::White(found),

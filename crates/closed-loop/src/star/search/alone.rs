@@ -67,6 +67,16 @@ impl Begun {
         folds: &Folds,
         candidates: Vec<Arc<dyn Candidate>>,
     ) -> Result<Self, CloseError> {
+        let moments = white.moments(folds, &borrowed(&candidates));
+        Self::of(white, folds, candidates, moments)
+    }
+
+    /// The same with every frame's moments where there is room, for candidates that are to be polished.
+    pub(super) fn by_frame(
+        white: &StarEvidence<'_>,
+        folds: &Folds,
+        candidates: Vec<Arc<dyn Candidate>>,
+    ) -> Result<Self, CloseError> {
         let moments = white.moments_by_frame(folds, &borrowed(&candidates));
         Self::of(white, folds, candidates, moments)
     }
@@ -152,8 +162,8 @@ pub(super) fn without_slow(
             }
         }
         let mut polished = begun.candidates.clone();
-        let on_frames = OnFrames::of(white, &begun.moments);
-        if *chosen == before || !polish(&on_frames, folds, &mut polished, fitted, chosen)? {
+        let on_frames = || OnFrames::of(white, &begun.moments);
+        if *chosen == before || !polish(&on_frames(), folds, &mut polished, fitted, chosen)? {
             let alone = Alone::new(white, folds, &begun, fitted, chosen, cost);
             let known = known.filter(|_| *chosen == before);
             let whole = known.or_else(|| alone.held_against(&start)?.likely());
