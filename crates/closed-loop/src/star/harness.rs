@@ -2,11 +2,17 @@
 //!
 //! Not physics: helpers of tests.
 
+use std::sync::Arc;
+
 use focal_plane::{AttitudeSeries, Camera, Pixel, StarFrames};
 use nalgebra::UnitQuaternion;
+use telemetry::Model;
 
 use crate::declared::OnCentroids;
 use crate::star::data::{Inputs, Star, StarData};
+use crate::star::evidence::StarEvidence;
+use crate::star::nuisance::StarNuisance;
+use crate::star::slow_price::SlowPrice;
 
 /// Places of six stars in a detector of 1024 pixels, from its centre, px.
 pub(crate) const STARS: [[f64; 2]; 6] = [
@@ -58,4 +64,23 @@ pub(crate) fn seen(
         phase: &OnCentroids::default(),
         effects: &[],
     })
+}
+
+/// White evidence of rows of equal weight that show nothing.
+pub(crate) fn silent<'a>(data: &'a StarData, model: &Model) -> StarEvidence<'a> {
+    let rows = data.t_s.len();
+    StarEvidence {
+        data,
+        nuisance: StarNuisance::declared(model, data),
+        residuals: Arc::new(vec![[vec![0.0; rows], vec![0.0; rows]]]),
+        motion: None,
+        resolved: false,
+        own_paths: false,
+        sigma_guess_arcsec: 1.0,
+        noise: None,
+        weight: Arc::new(vec![1.0; rows]),
+        drawn: None,
+        slow_price: SlowPrice::default(),
+        kept: Vec::new(),
+    }
 }

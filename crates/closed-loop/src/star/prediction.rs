@@ -179,9 +179,7 @@ mod tests {
     use super::*;
     use crate::star::data::StarData;
     use crate::star::frame_rotation::rotation_row;
-    use crate::star::harness::at_rest;
-    use crate::star::nuisance::StarNuisance;
-    use crate::star::slow_price::SlowPrice;
+    use crate::star::harness::{at_rest, silent};
 
     const STEP: [f64; 3] = [8.0, -8.0, 8.0];
     /// In the middle of the third of five folds.
@@ -195,7 +193,6 @@ mod tests {
 
     /// Stars that `step` moves, beside a reference that wanders.
     fn moved<'a>(data: &'a StarData, step: &dyn Candidate, seed: u64) -> StarEvidence<'a> {
-        let rows = data.t_s.len();
         let slow = Coloured {
             slow: SIGMA,
             tau_s: TAU_S,
@@ -205,21 +202,11 @@ mod tests {
         model.noise.distortion_arcsec = Some(1.0);
         model.noise.bias_arcsec = Some([10.0; 3]);
         let mut evidence = StarEvidence {
-            data,
-            nuisance: StarNuisance::declared(&model, data),
-            residuals: Arc::new(vec![[vec![0.0; rows], vec![0.0; rows]]]),
-            motion: None,
-            resolved: false,
-            own_paths: false,
-            sigma_guess_arcsec: 1.0,
             noise: Some(CommonNoise {
                 centroid: CENTROID,
                 reference: [slow; 3],
             }),
-            weight: Arc::new(vec![1.0; rows]),
-            drawn: None,
-            slow_price: SlowPrice::default(),
-            kept: Vec::new(),
+            ..silent(data, &model)
         };
         let one = Folds::whole(data.frames.t_s.len());
         let size = amplitudes(&evidence, &one, STEP);

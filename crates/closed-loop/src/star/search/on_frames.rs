@@ -110,9 +110,7 @@ mod tests {
     use super::*;
     use crate::search::empirical::{Empirical, Variable};
     use crate::star::data::StarData;
-    use crate::star::harness::at_rest;
-    use crate::star::nuisance::StarNuisance;
-    use crate::star::slow_price::SlowPrice;
+    use crate::star::harness::{at_rest, silent};
 
     const SPAN_S: f64 = 60.0;
 
@@ -122,19 +120,10 @@ mod tests {
         let rows = data.t_s.len();
         let residual = [1.3, 2.1].map(|f| (0..rows).map(|r| (f * r as f64).sin()).collect());
         StarEvidence {
-            data,
-            nuisance: StarNuisance::declared(&model, data),
             residuals: Arc::new(vec![residual]),
-            motion: None,
-            resolved: false,
-            own_paths: false,
-            sigma_guess_arcsec: 1.0,
-            noise: None,
-            weight: Arc::new(vec![1.0; rows]),
-            drawn: None,
-            slow_price: SlowPrice::default(),
             // one that stands before all candidates
             kept: vec![Arc::new(of_star(data, 2))],
+            ..silent(data, &model)
         }
     }
 
