@@ -308,8 +308,12 @@ impl Fits {
     }
 
     /// Noise variance of a scalar where no candidate is in the model, from a first guess.
-    pub fn noise_alone(sums: &FoldSums, layout: &Layout, guess: f64) -> Option<f64> {
-        let (gram, scalars) = &sums.all;
+    /// `total`: the sum of all blocks, and its scalars.
+    pub fn noise_alone(
+        (gram, scalars): &(DMatrix<f64>, f64),
+        layout: &Layout,
+        guess: f64,
+    ) -> Option<f64> {
         let n = layout.nuisance_precision.nrows();
         let kept: Vec<usize> = (0..n).chain(n + layout.candidates..gram.ncols()).collect();
         let alone = gram.select_columns(&kept).select_rows(&kept);

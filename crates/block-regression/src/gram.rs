@@ -216,18 +216,6 @@ impl FoldSums {
         let others = self.fold.iter().enumerate().filter(|(f, _)| *f != fold);
         sum(self.all.0.nrows(), others.map(|(_, s)| s))
     }
-
-    /// All as one block, without what the log-likelihood of the scalars lacks.
-    pub fn as_one(&self) -> BlockGrams {
-        let (gram, scalars) = &self.all;
-        BlockGrams {
-            gram: vec![Gram::whole(gram.clone())],
-            scalars: vec![*scalars],
-            log_scale: 0.0,
-            known: None,
-            by_source: Vec::new(),
-        }
-    }
 }
 
 fn sum<'a>(
@@ -286,6 +274,19 @@ impl BlockGrams {
         FoldSums {
             all: sum(self.width(), fold.iter()),
             fold,
+        }
+    }
+
+    /// The same summed over all blocks, as one.
+    #[must_use]
+    pub fn in_all(&self, folds: &Folds) -> Self {
+        let (gram, scalars) = self.by_fold(folds).all;
+        Self {
+            gram: vec![Gram::whole(gram)],
+            scalars: vec![scalars],
+            log_scale: self.log_scale,
+            known: None,
+            by_source: Vec::new(),
         }
     }
 

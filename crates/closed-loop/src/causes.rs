@@ -81,8 +81,10 @@ const SLOW_SHARE: f64 = 0.2;
 pub(crate) struct Inquiry<'a> {
     /// Effects that may be named.
     pub(crate) candidates: &'a dyn Fn() -> Vec<Arc<dyn Candidate>>,
-    /// Terms that describe, beside a slow error of the reference or not.
-    pub(crate) terms: &'a dyn Fn(bool) -> Vec<Empirical>,
+    /// Terms that describe.
+    pub(crate) terms: &'a dyn Fn() -> Vec<Empirical>,
+    /// Whether one of them does beside a slow error of the reference, too.
+    pub(crate) beside_slow: &'a dyn Fn(&Empirical) -> bool,
     /// What effects may change with.
     pub(crate) ways: &'a [Way],
     /// What the model declares of the reference's slow error, axis by axis.
@@ -96,7 +98,16 @@ pub(crate) struct Inquiry<'a> {
     pub(crate) sight: Option<&'a OnCentroids>,
 }
 
-/// What a inquiry ends with.
+impl Inquiry<'_> {
+    /// Terms that describe, beside a slow error of the reference or not.
+    fn terms_beside(&self, slow: bool) -> Vec<Empirical> {
+        let mut terms = (self.terms)();
+        terms.retain(|term| !slow || (self.beside_slow)(term));
+        terms
+    }
+}
+
+/// What an inquiry ends with.
 pub(crate) enum Outcome<'a> {
     Named(Box<Named<'a>>),
     /// What was found takes the light elsewhere, whatever may speak against it.

@@ -53,6 +53,10 @@ pub(crate) trait Evidence: Sync {
     fn variance_guess(&self) -> f64;
     /// The normal equations with `candidates` in them, block by block.
     fn grams(&self, folds: &Folds, candidates: &[&dyn Candidate]) -> BlockGrams;
+    /// Their sum over all blocks, as one.
+    fn grams_in_all(&self, folds: &Folds, candidates: &[&dyn Candidate]) -> BlockGrams {
+        self.grams(folds, candidates).in_all(folds)
+    }
     /// Out-of-fold residuals of every row, outliers included.
     fn residuals(
         &self,

@@ -11,9 +11,9 @@
 
 use std::sync::Arc;
 
-use block_regression::{BlockGrams, Design, Estimate, Fits, FoldSums, Folds, Layout};
+use block_regression::{BlockGrams, Design, Estimate, Fits, Folds, Layout};
 use effects::{Candidate, Coefficient};
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 
 use crate::error::CloseError;
 use crate::evidence::{Amplitudes, Evidence, Residuals};
@@ -180,8 +180,9 @@ pub(crate) fn fit_grams(
     folds: &Folds,
     candidates: &[&dyn Candidate],
 ) -> Result<Fitted, CloseError> {
-    let of = |sums: &FoldSums, layout: &Layout, v| Fits::of(grams, sums, folds, layout, v);
-    fitted(evidence, grams, folds, candidates, of)
+    let sums = grams.by_fold(folds);
+    let of = |layout: &Layout, v| Fits::of(grams, &sums, folds, layout, v);
+    fitted(evidence, candidates, &sums.all, grams.log_scale, of)
 }
 
 /// As [`fit`], for what asks nothing of folds and blocks ([`Fits::whole`]).
@@ -190,33 +191,32 @@ pub(crate) fn fit_whole(
     folds: &Folds,
     candidates: &[&dyn Candidate],
 ) -> Result<Fitted, CloseError> {
-    let of = |sums: &FoldSums, layout: &Layout, v| Fits::whole(&sums.as_one(), layout, v);
-    let grams = evidence.grams(folds, candidates);
-    fitted(evidence, &grams, folds, candidates, of)
+    let grams = evidence.grams_in_all(folds, candidates);
+    let of = |layout: &Layout, v| Fits::whole(&grams, layout, v);
+    fitted(evidence, candidates, &grams.total(), grams.log_scale, of)
 }
 
-/// The fits that `of` makes of the sums, the columns, and the variance that priors are weighed against.
+/// The fits that `of` makes of normal equations whose sum is `total`: by the columns, and the variance that priors are
+/// weighed against.
 fn fitted(
     evidence: &dyn Evidence,
-    grams: &BlockGrams,
-    folds: &Folds,
     candidates: &[&dyn Candidate],
-    of: impl FnOnce(&FoldSums, &Layout, f64) -> Option<Fits>,
+    total: &(DMatrix<f64>, f64),
+    log_scale: f64,
+    of: impl FnOnce(&Layout, f64) -> Option<Fits>,
 ) -> Result<Fitted, CloseError> {
     let layout = layout_of(evidence, candidates);
     let guess = evidence.variance_guess();
-    let sums = grams.by_fold(folds);
-    let variance = Fits::noise_alone(&sums, &layout, guess)
+    let variance = Fits::noise_alone(total, &layout, guess)
         .unwrap_or(guess)
         .max(f64::MIN_POSITIVE);
-    let fits = of(&sums, &layout, variance).ok_or(CloseError::Singular)?;
-    let (_, scalars) = sums.all;
+    let fits = of(&layout, variance).ok_or(CloseError::Singular)?;
     Ok(Fitted {
         groups: grouped(&fits, candidates),
         fits,
-        scalars,
+        scalars: total.1,
         variance,
-        log_scale: grams.log_scale,
+        log_scale,
     })
 }
 

@@ -6,27 +6,27 @@ use std::cell::OnceCell;
 
 use block_regression::Estimate;
 
-use crate::causes::description::{Described, Part};
+use crate::causes::description::{Described, InTwo, Part};
 use crate::causes::invariance::{Change, changing};
 use crate::causes::one_star::is_one_star;
 use crate::causes::round::{Round, best_beside};
 use crate::causes::so_far::SoFar;
 use crate::causes::stand_ins::{Known, stand_ins};
 use crate::causes::star_constants::Constants;
-use crate::causes::terms;
+use crate::causes::{terms, wanders};
 use crate::error::CloseError;
 use crate::search::empirical::Empirical;
 use crate::search::orbits::has_no_speed;
-use crate::search::refusal::Refusal;
+use crate::search::refusal::{Refusal, for_own_path};
 use crate::search::selection::columns_of;
 
 /// An outcome that may be spoken against.
 pub(super) struct Case<'r, 'a> {
     pub(super) round: &'r Round<'r, 'a>,
-    /// What is left in sample, where that is known, arcsec.
-    pub(super) inside: Option<&'r [Vec<f64>]>,
     pub(super) constants: Option<Constants<'r>>,
     pub(super) described: Described,
+    /// The same under white noise, where the stars may follow something in the place of a slow error of the reference.
+    pub(super) plain: Option<Described>,
     /// Terms that stand where what is left has them.
     pub(super) sought: Vec<Empirical>,
     /// Of the chosen, once it was asked for.
@@ -46,14 +46,45 @@ impl<'r, 'a> Case<'r, 'a> {
         if !turns && (0..found.selection.chosen.len()).any(|k| round.is_too_fast(k)) {
             so_far.found_terms.extend(terms::turning(level.data));
         }
-        let usual = (inquiry.terms)(round.searched.wander.is_some());
+        let wander = round.searched.wander.as_ref();
+        let usual = inquiry.terms_beside(wander.is_some());
         let sought = inside.map_or_else(Vec::new, |inside| terms::sought(level, inside, &usual));
-        let all = so_far.with_found(usual, &sought);
+        // what follows the path with its error takes the place of that error, and is asked along one without it
+        let instead = wander.filter(|_| !round.last && !for_own_path(&so_far.refused));
+        let (described, plain) = if let Some(wander) = instead {
+            let beside = &round.beside;
+            let of_frames = wanders::terms(beside.data, wander, inside, &beside.weight);
+            let terms = (inquiry.terms)().into_iter().map(|term| InTwo {
+                is_in: [(inquiry.beside_slow)(&term), true],
+                term,
+            });
+            let sought = sought.iter().map(|term| InTwo {
+                is_in: [true, term.is_of_a_form()],
+                term: term.clone(),
+            });
+            let kept = so_far.found_terms.iter().map(|term| InTwo {
+                is_in: [true, false],
+                term: term.clone(),
+            });
+            let of_frames = of_frames.into_iter().map(|term| InTwo {
+                is_in: [false, true],
+                term,
+            });
+            let all = terms.chain(sought).chain(kept).chain(of_frames).collect();
+            let ways = inquiry.ways;
+            let [described, plain] =
+                Described::twice(level, beside, round.folds, found, all, ways)?;
+            (described, Some(plain))
+        } else {
+            let all = so_far.with_found(usual, &sought);
+            let described = Described::new(level, round.folds, found, all, inquiry.ways)?;
+            (described, None)
+        };
         Ok(Self {
             round,
-            inside,
             constants: Constants::of(level, found, inside),
-            described: Described::new(level, round.folds, found, all, inquiry.ways)?,
+            described,
+            plain,
             sought,
             estimate: OnceCell::new(),
         })

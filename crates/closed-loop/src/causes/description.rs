@@ -12,17 +12,23 @@ use effects::{AttitudeRows, Candidate, Coefficient, Effect, EffectError, StarRow
 use focal_plane::{Camera, PointsMut, VectorsMut};
 use std::sync::{Arc, OnceLock};
 
-use crate::causes::changing_effect::{Changing, Inner, Way};
+use crate::causes::changing_effect::Way;
 use crate::error::CloseError;
+use crate::evidence::Evidence;
 use crate::follows::{self, Followed};
 use crate::search::empirical::{Empirical, Variable};
 use crate::search::group::Group;
-use crate::search::selection::{FAMILY_ALPHA, Judgement, columns_of, costs, each};
-use crate::search::{Fitted, Found, borrowed, fit, fit_beside};
+use crate::search::selection::{FAMILY_ALPHA, Judgement, columns_of, each};
+use crate::search::{Fitted, Found, borrowed, fit};
 use crate::star::columns::star_columns_of;
 use crate::star::evidence::StarEvidence;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use telemetry::report::{Dependence, Unattributed};
+
+use columns::Columns;
+pub(crate) use columns::InTwo;
+
+mod columns;
 
 /// Chance beyond which stars differ by more than a line through them.
 const BESIDE_A_LINE: f64 = 1e-4;
@@ -72,88 +78,50 @@ impl Described {
         terms: Vec<Empirical>,
         ways: &[Way],
     ) -> Result<Self, CloseError> {
-        let chosen = &found.selection.chosen;
-        let estimate = found.estimate();
-        let only = found.only(chosen);
-        let mut changing = Vec::new();
-        if let Some(estimate) = estimate {
-            let values = only.spread(&estimate.value);
-            let mut first = 0;
-            for candidate in &only.candidates {
-                let end = first + candidate.coefficients().len();
-                let own = &values.as_slice()[first..end];
-                first = end;
-                changing.push(Changing::new(Inner::Lent(*candidate), own, ways.to_vec()));
-            }
-        }
-        let mut all: Vec<&dyn Candidate> = only.candidates.clone();
-        all.extend(changing.iter().map(|c| c as &dyn Candidate));
-        all.extend(terms.iter().map(|t| t as &dyn Candidate));
-        // products of hundreds of columns a block: in long runs, of fewer blocks
+        let columns = Columns::of(found, terms, ways);
         let coarse = evidence.coarser(folds);
         let folds = coarse.as_ref().unwrap_or(folds);
-        let n = chosen.len();
-        let own: Vec<usize> = (0..n).collect();
-        let fitted = fit_beside(evidence, folds, &all, &own)?;
-        let names = only.candidates.iter().map(|c| c.id()).collect();
-        let channels = only.candidates.iter();
-        let channels = channels.map(|c| c.selectors().get("channel").cloned());
-        let channels = channels.collect();
-        let turns = only.candidates.iter().map(|c| c.acts_on_attitude());
-        let turns = turns.collect();
-        let groups = &found.fitted.groups;
-        let costs = costs(groups, &vec![true; groups.len()]);
-        let paid = chosen.iter().map(|&g| costs[g].ln()).collect();
-        let mut first: usize = only.candidates.iter().map(|c| c.coefficients().len()).sum();
-        let mut changes = vec![Vec::new(); n];
-        for (k, changing) in changing.iter().enumerate() {
-            let seen = &fitted.groups[n + k].columns;
-            for (way, columns) in changing.ways() {
-                let own = first + columns.start..first + columns.end;
-                let columns: Vec<usize> = own.filter(|c| seen.contains(c)).collect();
-                if !columns.is_empty() {
-                    changes[k].push((way.clone(), columns));
-                }
-            }
-            first += changing.coefficients().len();
+        let grams = evidence.grams(folds, &columns.candidates());
+        columns.described(evidence, folds, &grams)
+    }
+
+    /// Two descriptions of the same under two noises, that of `level` and white, from one pass: the second has no
+    /// changes, and each the terms that are its own.
+    pub(crate) fn twice(
+        level: &StarEvidence<'_>,
+        white: &StarEvidence<'_>,
+        folds: &Folds,
+        found: &Found,
+        terms: Vec<InTwo>,
+        ways: &[Way],
+    ) -> Result<[Self; 2], CloseError> {
+        let of = |which: usize| {
+            let own = terms.iter().filter(move |t| t.is_in[which]);
+            own.map(|t| t.term.clone()).collect::<Vec<_>>()
+        };
+        // where the reference has white noise, white evidence is another pass
+        if level.noise.is_none() || white.drawn.is_some() {
+            let plain = Self::new(white, folds, found, of(1), &[])?;
+            return Ok([Self::new(level, folds, found, of(0), ways)?, plain]);
         }
-        let groups = &fitted.groups[n + changing.len()..];
-        let terms = terms
-            .into_iter()
-            .zip(groups)
-            .map(|(term, group)| {
-                let mut parts: Vec<Vec<usize>> = Vec::new();
-                for part in term.parts() {
-                    let part: Vec<usize> = part
-                        .into_iter()
-                        .map(|k| first + k)
-                        .filter(|c| group.columns.contains(c))
-                        .collect();
-                    if !part.is_empty() && !parts.contains(&part) {
-                        parts.push(part);
-                    }
-                }
-                let own = first;
-                first += term.coefficients().len();
-                Term {
-                    term,
-                    first: own,
-                    parts,
-                    group: group.clone(),
-                }
-            })
-            .collect();
-        Ok(Self {
-            fitted,
-            chosen: own,
-            terms,
-            changes,
-            names,
-            channels,
-            turns,
-            paid,
-            rest: OnceLock::new(),
-        })
+        let coarse = level.coarser(folds);
+        let folds = coarse.as_ref().unwrap_or(folds);
+        let all = terms.iter().map(|t| t.term.clone()).collect();
+        let all = Columns::of(found, all, ways);
+        let moments = level.moments(folds, &all.candidates());
+        let first = level.precision().nrows();
+        let own = all.in_two(&terms).map(|own| {
+            let own = own.into_iter().map(|c| first + c);
+            let residuals = moments.width() - level.residual_columns()..moments.width();
+            (0..first).chain(own).chain(residuals).collect::<Vec<_>>()
+        });
+        let [coloured, plain] = [(level, 0), (white, 1)]
+            .map(|(evidence, which)| evidence.under_of(&moments, &own[which]));
+        drop(moments);
+        Ok([
+            Columns::of(found, of(0), ways).described(level, folds, &coloured)?,
+            Columns::of(found, of(1), &[]).described(white, folds, &plain)?,
+        ])
     }
 }
 

@@ -21,7 +21,7 @@ use crate::error::CloseError;
 use crate::residual_size;
 use crate::search::empirical::Empirical;
 use crate::search::misplaced::{MISPLACED, piled};
-use crate::search::refusal::{Refusal, for_own_path};
+use crate::search::refusal::Refusal;
 use crate::search::selection::{columns_of, costs};
 use crate::search::{Found, family, without};
 use crate::star::evidence::StarEvidence;
@@ -53,33 +53,23 @@ pub(super) fn in_place_of_wander(
     case: &Case<'_, '_>,
     so_far: &mut SoFar,
 ) -> Result<bool, CloseError> {
-    // what follows the path with its error takes the place of that error, and is asked along one without it
-    if for_own_path(&so_far.refused) {
-        return Ok(false);
-    }
     let round = case.round;
-    let (beside, folds) = (&round.beside, round.folds);
-    let Some(wander) = round.searched.wander.as_ref() else {
+    let (Some(wander), Some(plain)) = (&round.searched.wander, &case.plain) else {
         return Ok(false);
     };
-    let mut all = (round.inquiry.terms)(false);
-    let terms = wanders::terms(beside.data, wander, case.inside, &beside.weight);
-    all.extend(terms);
-    let forms: Vec<Empirical> = case.channel_forms().cloned().collect();
-    all.extend(forms.iter().cloned());
-    let plain = Described::new(beside, folds, &round.searched.found, all, &[])?;
     let axes = wander.axes().iter().filter(|a| **a).count();
-    let Some(instead) = wanders::in_place(&case.described, &plain, axes) else {
+    let Some(instead) = wanders::in_place(&case.described, plain, axes) else {
         return Ok(false);
     };
     let tie = wander.behind.is_some_and(|nats| nats < TIE);
     let heaters = plain.is_of_channels(&instead);
+    let forms: Vec<Empirical> = case.channel_forms().cloned().collect();
     // what it beats speaks against no effect
     if so_far.reinstates() || (tie || heaters) && suffice(round, &forms)? {
         so_far.start = Start::White;
-        so_far.found_terms.extend(looked_for(&plain, &instead));
+        so_far.found_terms.extend(looked_for(plain, &instead));
     } else {
-        so_far.keep_whole(&plain, instead);
+        so_far.keep_whole(plain, instead);
     }
     Ok(true)
 }
@@ -209,7 +199,7 @@ fn suffice(round: &Round<'_, '_>, forms: &[Empirical]) -> Result<bool, CloseErro
     else {
         return Ok(false);
     };
-    let mut terms = (inquiry.terms)(false);
+    let mut terms = (inquiry.terms)();
     terms.extend(forms.iter().cloned());
     let described = Described::new(level, folds, &searched.found, terms, &[])?;
     let nothing = Known {

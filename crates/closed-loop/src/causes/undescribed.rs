@@ -41,7 +41,7 @@ pub(super) fn standing<'a>(
     let all = borrowed(&found.candidates);
     let fitted = fit_beside(level, folds, &all, &found.selection.chosen)?;
     let found = Found { fitted, ..found };
-    let terms = so_far.with_found((inquiry.terms)(wander.is_some()), sought);
+    let terms = so_far.with_found(inquiry.terms_beside(wander.is_some()), sought);
     let described = Described::new(level, folds, &found, terms, inquiry.ways)?;
     // how an effect changes may be among what is described
     let beside = best_beside(&found, &may);

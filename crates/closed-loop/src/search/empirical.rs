@@ -225,6 +225,11 @@ impl Empirical {
         of_motion && self.by.is_none()
     }
 
+    /// Whether it is the acceleration, alone or with another variable.
+    pub(crate) fn is_of_acceleration(&self) -> bool {
+        matches!(self.variable, Variable::Acceleration)
+    }
+
     /// Whether it is the time alone.
     pub(crate) fn is_of_time(&self) -> bool {
         let of_time = matches!(

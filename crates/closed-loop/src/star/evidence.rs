@@ -182,10 +182,14 @@ impl<'a> StarEvidence<'a> {
 
     /// All of these products under its noise, or white.
     pub(crate) fn under(&self, moments: &StarMoments) -> BlockGrams {
-        let all: Vec<usize> = (0..moments.width()).collect();
+        self.under_of(moments, &(0..moments.width()).collect::<Vec<_>>())
+    }
+
+    /// Those of some of the columns.
+    pub(crate) fn under_of(&self, moments: &StarMoments, columns: &[usize]) -> BlockGrams {
         match &self.noise {
-            Some(noise) => moments.under(&all, noise),
-            None => moments.white_of(&all),
+            Some(noise) => moments.under(columns, noise),
+            None => moments.white_of(columns),
         }
     }
 

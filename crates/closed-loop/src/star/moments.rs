@@ -249,7 +249,23 @@ impl StarMoments {
 
     /// The sum over the blocks of the products under white noise, of some of the columns.
     pub(crate) fn white_in_all(&self, columns: &[usize]) -> BlockGrams {
-        let white = self.white.get_or_init(|| {
+        self.white_as_one(pick(self.white_sum(), columns))
+    }
+
+    /// Their sum, as one block.
+    fn white_as_one(&self, sum: DMatrix<f64>) -> BlockGrams {
+        BlockGrams {
+            gram: vec![Gram::whole(sum)],
+            scalars: vec![self.blocks.iter().map(|b| b.scalars).sum()],
+            log_scale: 0.0,
+            known: None,
+            by_source: Vec::new(),
+        }
+    }
+
+    /// The sum over the blocks of the products under white noise.
+    fn white_sum(&self) -> &DMatrix<f64> {
+        self.white.get_or_init(|| {
             let width = self.width();
             let all: Vec<usize> = (0..width).collect();
             let some = self.blocks.par_chunks(ADDED);
@@ -269,14 +285,7 @@ impl StarMoments {
                 .fold(self.rest().clone(), |sum, part| sum + part);
             mirror_lower(&mut sum);
             sum
-        });
-        BlockGrams {
-            gram: vec![Gram::whole(pick(white, columns))],
-            scalars: vec![self.blocks.iter().map(|b| b.scalars).sum()],
-            log_scale: 0.0,
-            known: None,
-            by_source: Vec::new(),
-        }
+        })
     }
 
     /// The sums of R over the blocks of each fold, where all columns are asked for.

@@ -2,6 +2,7 @@
 //!
 //! Not physics: the order of the steps.
 
+use std::cell::OnceCell;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
@@ -188,11 +189,12 @@ impl<'g, 'a> Ground<'g, 'a> {
             list.extend(put_forward.iter().cloned());
             list
         };
+        let accelerates = OnceCell::new();
         let inquiry = Inquiry {
             candidates: &candidates,
-            terms: &|wander| {
-                let yields = self.yields && (!wander || self.accelerates());
-                terms::terms(situation, self.data(), yields)
+            terms: &|| terms::terms(situation, self.data(), self.yields),
+            beside_slow: &|term| {
+                !term.is_of_acceleration() || *accelerates.get_or_init(|| self.accelerates())
             },
             ways: &self.ways,
             reference: self.slow_reference,

@@ -11,6 +11,7 @@
 
 use std::sync::Arc;
 
+use block_regression::BlockGrams;
 use nalgebra::{DMatrix, Matrix3, Vector3};
 use rayon::prelude::*;
 
@@ -70,6 +71,29 @@ impl ByFrame {
         }
         moments
     }
+
+    /// Products of columns that turn the camera by `turns`, with the moments `own`, with all columns and, before the last
+    /// `residuals` of these, with themselves.
+    fn products(&self, residuals: usize, own: &DMatrix<f64>, turns: &DMatrix<f64>) -> DMatrix<f64> {
+        let (first, added) = (self.moments.ncols() - residuals, turns.ncols());
+        let (fixed, last) = self.moments.columns_range_pair(..first, first..);
+        let flipped = turns.transpose();
+        let mut products = DMatrix::zeros(added, self.moments.ncols() + added);
+        for (to, from) in [
+            (0, fixed),
+            (first, own.columns(0, added)),
+            (first + added, last),
+        ] {
+            let mut into = products.columns_mut(to, from.ncols());
+            into.gemm(1.0, &flipped, &from, 0.0);
+        }
+        products
+    }
+}
+
+/// With columns of zeros from `first` on.
+fn widened(m: &DMatrix<f64>, first: usize, added: usize) -> DMatrix<f64> {
+    m.clone().insert_columns(first, added, 0.0)
 }
 
 impl StarMoments {
@@ -112,6 +136,28 @@ impl StarMoments {
             block.beside_turns(residuals, turns, frames)
         });
         self.in_blocks(beside.collect())
+    }
+
+    /// The same under white noise, summed over the blocks: every frame's moments must be there.
+    pub(crate) fn white_beside_turns(
+        &self,
+        residuals: usize,
+        turns: &[DMatrix<f64>],
+    ) -> BlockGrams {
+        let first = self.width() - residuals;
+        let added = turns.first().map_or(0, DMatrix::ncols);
+        let each = self.blocks.par_iter().zip(turns);
+        let products = each.filter_map(|(block, turns)| {
+            let by_frame = block.by_frame.as_ref()?;
+            Some(by_frame.products(residuals, &by_frame.of_turns(turns), turns))
+        });
+        let products: Vec<DMatrix<f64>> = products.collect();
+        let mut sum = widened(self.white_sum(), first, added).insert_rows(first, added, 0.0);
+        let none = DMatrix::zeros(added, sum.ncols());
+        let all = products.iter().fold(none, |all, part| all + part);
+        sum.columns_mut(first, added).tr_copy_from(&all);
+        sum.rows_mut(first, added).copy_from(&all);
+        self.white_as_one(sum)
     }
 
     /// Other `blocks` of the same frames.
@@ -167,11 +213,10 @@ impl Block {
     fn beside_turns(&self, residuals: usize, turns: &DMatrix<f64>, frames: &[usize]) -> Self {
         let first = self.rest.ncols() - residuals;
         let added = turns.ncols();
-        let widened = |m: &DMatrix<f64>| m.clone().insert_columns(first, added, 0.0);
         let mut block = Self {
-            rest: Arc::new(widened(&self.rest).insert_rows(first, added, 0.0)),
+            rest: Arc::new(widened(&self.rest, first, added).insert_rows(first, added, 0.0)),
             lost: None,
-            theta: widened(&self.theta),
+            theta: widened(&self.theta, first, added),
             inverse: self.inverse.clone(),
             by_frame: None,
             ..*self
@@ -179,18 +224,8 @@ impl Block {
         let Some(by_frame) = &self.by_frame else {
             return block;
         };
-        let (own, flipped) = (by_frame.of_turns(turns), turns.transpose());
-        let (fixed, last) = by_frame.moments.columns_range_pair(..first, first..);
-        let mut flat = DMatrix::zeros(added, block.rest.ncols());
-        for (to, from) in [
-            (0, fixed),
-            (first, own.columns(0, added)),
-            (first + added, last),
-        ] {
-            let mut into = flat.columns_mut(to, from.ncols());
-            into.gemm(1.0, &flipped, &from, 0.0);
-        }
-        let whole = flat.transpose();
+        let own = by_frame.of_turns(turns);
+        let whole = by_frame.products(residuals, &own, turns).transpose();
         let which: Vec<usize> = (first..first + added).collect();
         let bins = Binned::of(&own, frames, &block.inverse);
         bins.put_theta(&which, &mut block.theta);

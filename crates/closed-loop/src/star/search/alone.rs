@@ -151,19 +151,28 @@ pub(super) fn without_slow(
         {
             break;
         }
-        if let Some(phase) = sight.take() {
-            let choice = Choice {
-                candidates: &begun.candidates,
-                fitted,
-                chosen,
-            };
-            if let Some(to) = first_sight::of_choice(white, folds, choice, phase)? {
-                return Ok(Outcome::Elsewhere(to));
+        let choice = Choice {
+            candidates: &begun.candidates,
+            fitted,
+            chosen,
+        };
+        let sight = match sight.take() {
+            Some(phase) if first_sight::seems_to_move_it(white, folds, choice, phase)? => {
+                Some(phase)
             }
-        }
+            _ => None,
+        };
         let mut polished = begun.candidates.clone();
-        let on_frames = || OnFrames::of(white, &begun.moments);
-        if *chosen == before || !polish(&on_frames(), folds, &mut polished, fitted, chosen)? {
+        let changed = *chosen != before && {
+            let on_frames = OnFrames::of(white, &begun.moments);
+            polish(&on_frames, folds, &mut polished, fitted, chosen)?
+        };
+        if let Some(phase) = sight
+            && let Some(to) = first_sight::of_forms(white, folds, &polished, chosen, phase)?
+        {
+            return Ok(Outcome::Elsewhere(to));
+        }
+        if !changed {
             let alone = Alone::new(white, folds, &begun, fitted, chosen, cost);
             let known = known.filter(|_| *chosen == before);
             let whole = known.or_else(|| alone.held_against(&start)?.likely());

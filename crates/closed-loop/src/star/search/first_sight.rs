@@ -46,7 +46,8 @@ pub(super) fn of_part(
     of_forms(white, folds, choice.candidates, choice.chosen, phase)
 }
 
-fn seems_to_move_it(
+/// Whether a choice, as it is, takes the light so far that it is worth polishing for that.
+pub(super) fn seems_to_move_it(
     white: &StarEvidence<'_>,
     folds: &Folds,
     choice: Choice<'_>,
@@ -56,7 +57,7 @@ fn seems_to_move_it(
 }
 
 /// Where the chosen of `candidates` take the light, fitted as they are.
-fn of_forms(
+pub(super) fn of_forms(
     white: &StarEvidence<'_>,
     folds: &Folds,
     candidates: &[Arc<dyn Candidate>],

@@ -33,6 +33,17 @@ impl<'e, 'a> OnFrames<'e, 'a> {
             moments: moments.is_by_frame().then(narrowed),
         }
     }
+
+    /// The moments, and what candidates turn the frames of each block by, if they all turn the camera.
+    fn turned(
+        &self,
+        folds: &Folds,
+        candidates: &[&dyn Candidate],
+    ) -> Option<(&StarMoments, Vec<DMatrix<f64>>)> {
+        let all_turn = candidates.iter().all(|c| c.turns_camera());
+        let moments = self.moments.as_ref().filter(|_| all_turn)?;
+        Some((moments, self.level.turns(folds, candidates)))
+    }
 }
 
 impl Evidence for OnFrames<'_, '_> {
@@ -53,14 +64,20 @@ impl Evidence for OnFrames<'_, '_> {
     }
 
     fn grams(&self, folds: &Folds, candidates: &[&dyn Candidate]) -> BlockGrams {
-        match &self.moments {
-            Some(moments) if candidates.iter().all(|c| c.turns_camera()) => {
-                let turns = self.level.turns(folds, candidates);
-                let beside = moments.beside_turns(self.residual_columns(), &turns);
-                self.level.under(&beside)
-            }
-            _ => self.level.grams(folds, candidates),
-        }
+        let Some((moments, turns)) = self.turned(folds, candidates) else {
+            return self.level.grams(folds, candidates);
+        };
+        let beside = moments.beside_turns(self.residual_columns(), &turns);
+        self.level.under(&beside)
+    }
+
+    fn grams_in_all(&self, folds: &Folds, candidates: &[&dyn Candidate]) -> BlockGrams {
+        let white = self.level.noise.is_none();
+        let turned = white.then(|| self.turned(folds, candidates)).flatten();
+        let Some((moments, turns)) = turned else {
+            return self.grams(folds, candidates).in_all(folds);
+        };
+        moments.white_beside_turns(self.residual_columns(), &turns)
     }
 
     fn residuals(
@@ -160,6 +177,7 @@ mod tests {
             let tried = borrowed(tried);
             let other = white.grams(&folds, &tried);
             assert_same(&on_frames.grams(&folds, &tried), &other);
+            assert_same(&on_frames.grams_in_all(&folds, &tried), &other);
         }
         for (g, other) in [(1, step(25.2)), (0, Arc::new(of_star(&data, 3)))] {
             let mut forms = candidates.clone();
