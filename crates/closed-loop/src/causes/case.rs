@@ -6,6 +6,7 @@ use std::cell::OnceCell;
 
 use block_regression::Estimate;
 
+use crate::causes::Inquiry;
 use crate::causes::description::{Described, InTwo, Part};
 use crate::causes::invariance::{Change, changing};
 use crate::causes::one_star::is_one_star;
@@ -51,33 +52,16 @@ impl<'r, 'a> Case<'r, 'a> {
         let sought = inside.map_or_else(Vec::new, |inside| terms::sought(level, inside, &usual));
         // what follows the path with its error takes the place of that error, and is asked along one without it
         let instead = wander.filter(|_| !round.last && !for_own_path(&so_far.refused));
+        let (folds, ways) = (round.folds, inquiry.ways);
         let (described, plain) = if let Some(wander) = instead {
-            let beside = &round.beside;
-            let of_frames = wanders::terms(beside.data, wander, inside, &beside.weight);
-            let terms = (inquiry.terms)().into_iter().map(|term| InTwo {
-                is_in: [(inquiry.beside_slow)(&term), true],
-                term,
-            });
-            let sought = sought.iter().map(|term| InTwo {
-                is_in: [true, term.is_of_a_form()],
-                term: term.clone(),
-            });
-            let kept = so_far.found_terms.iter().map(|term| InTwo {
-                is_in: [true, false],
-                term: term.clone(),
-            });
-            let of_frames = of_frames.into_iter().map(|term| InTwo {
-                is_in: [false, true],
-                term,
-            });
-            let all = terms.chain(sought).chain(kept).chain(of_frames).collect();
-            let ways = inquiry.ways;
+            let frames = wanders::terms(level.data, wander, inside, &level.weight);
+            let terms = in_two(inquiry, &sought, &so_far.found_terms, frames);
             let [described, plain] =
-                Described::twice(level, beside, round.folds, found, all, ways)?;
+                Described::twice(level, &round.beside, folds, found, terms, ways)?;
             (described, Some(plain))
         } else {
-            let all = so_far.with_found(usual, &sought);
-            let described = Described::new(level, round.folds, found, all, inquiry.ways)?;
+            let terms = so_far.with_found(usual, &sought);
+            let described = Described::new(level, folds, found, terms, ways)?;
             (described, None)
         };
         Ok(Self {
@@ -158,4 +142,31 @@ impl<'r, 'a> Case<'r, 'a> {
         let data = self.round.beside.data;
         id.is_some_and(|id| is_one_star(data, slope, columns, id))
     }
+}
+
+/// The terms of an outcome beside a slow error of the reference, and of the same under white noise: there frames may turn
+/// with the time, and of what was `sought`, forms of channels alone take part.
+fn in_two(
+    inquiry: &Inquiry<'_>,
+    sought: &[Empirical],
+    found: &[Empirical],
+    frames: Vec<Empirical>,
+) -> Vec<InTwo> {
+    let usual = (inquiry.terms)().into_iter().map(|term| InTwo {
+        is_in: [(inquiry.beside_slow)(&term), true],
+        term,
+    });
+    let sought = sought.iter().map(|term| InTwo {
+        is_in: [true, term.is_of_a_form()],
+        term: term.clone(),
+    });
+    let found = found.iter().map(|term| InTwo {
+        is_in: [true, false],
+        term: term.clone(),
+    });
+    let frames = frames.into_iter().map(|term| InTwo {
+        is_in: [false, true],
+        term,
+    });
+    usual.chain(sought).chain(found).chain(frames).collect()
 }

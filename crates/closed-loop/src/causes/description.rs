@@ -115,13 +115,11 @@ impl Described {
             let residuals = moments.width() - level.residual_columns()..moments.width();
             (0..first).chain(own).chain(residuals).collect::<Vec<_>>()
         });
-        let [coloured, plain] = [(level, 0), (white, 1)]
-            .map(|(evidence, which)| evidence.under_of(&moments, &own[which]));
-        drop(moments);
-        Ok([
-            Columns::of(found, of(0), ways).described(level, folds, &coloured)?,
-            Columns::of(found, of(1), &[]).described(white, folds, &plain)?,
-        ])
+        let of_these = |evidence: &StarEvidence<'_>, which: usize, ways: &[Way]| {
+            let grams = evidence.under_of(&moments, &own[which]);
+            Columns::of(found, of(which), ways).described(evidence, folds, &grams)
+        };
+        Ok([of_these(level, 0, ways)?, of_these(white, 1, &[])?])
     }
 }
 
@@ -324,5 +322,74 @@ impl Candidate for Kept {
         surroundings: &Surroundings<'_>,
     ) -> Result<Box<dyn Effect>, EffectError> {
         self.inner.realise(values, surroundings)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use coloured_noise::{Coloured, CommonNoise};
+    use telemetry::Model;
+
+    use super::*;
+    use crate::star::harness::{at_rest, silent};
+
+    /// Two descriptions of one pass are those of a pass each, to rounding, with the terms and changes that are their own.
+    #[test]
+    fn two_descriptions_of_one_pass_are_those_of_two() {
+        let data = at_rest((0..200).map(|k| 0.5 * f64::from(k)).collect());
+        let of = |variable, range| Empirical::new(variable, range, true).unwrap();
+        let star = |k: usize| of(Variable::Star(vec![data.stars[k].id]), [0.0, 1.0]);
+        let span = [0.0, 99.5];
+        let terms = [
+            (star(0), [true, false]),
+            (of(Variable::Time, span), [true, true]),
+            (of(Variable::Position(0), [-390.0, 300.0]), [false, true]),
+            (star(4), [true, true]),
+        ];
+        let rows = data.t_s.len();
+        let residual = [1.3, 2.1].map(|f| (0..rows).map(|r| (f * r as f64).sin()).collect());
+        let white = StarEvidence {
+            residuals: Arc::new(vec![residual]),
+            kept: vec![Arc::new(star(2))],
+            ..silent(&data, &Model::default())
+        };
+        let slow = Coloured {
+            white: 0.0,
+            slow: 0.5,
+            tau_s: 20.0,
+        };
+        let level = white.with_noise(&CommonNoise {
+            centroid: 0.7,
+            reference: [slow; 3],
+        });
+        let folds = Folds::cut(data.frames.t_s.len());
+        let chosen: Arc<dyn Candidate> = effects::step_at(31.3, span, 1).into();
+        let found = Found::of_chosen(&level, &folds, &[chosen], &[0]).unwrap();
+        let ways = [Way::With(Variable::Time, span)];
+        let in_two = terms
+            .iter()
+            .cloned()
+            .map(|(term, is_in)| InTwo { term, is_in });
+        let both = Described::twice(&level, &white, &folds, &found, in_two.collect(), &ways);
+        let alone = |evidence: &StarEvidence<'_>, which: usize, ways: &[Way]| {
+            let own = terms.iter().filter(|(_, is_in)| is_in[which]);
+            let own = own.map(|(term, _)| term.clone()).collect();
+            Described::new(evidence, &folds, &found, own, ways).unwrap()
+        };
+        let others = [alone(&level, 0, &ways), alone(&white, 1, &[])];
+        for (ours, other) in both.unwrap().iter().zip(&others) {
+            let columns = |d: &Described| -> Vec<usize> {
+                let parts = d.terms.iter().flat_map(|t| t.parts.concat());
+                parts
+                    .chain(d.changes[0].iter().flat_map(|(_, c)| c.clone()))
+                    .collect()
+            };
+            assert_eq!(columns(ours), columns(other));
+            for c in columns(ours) {
+                let [a, b] = [ours, other].map(|d| d.fitted.fits.error(&[c]).unwrap());
+                assert!((a - b).abs() < 1e-9 * b, "column {c}: {a}, {b}");
+            }
+        }
+        assert!(!others[0].changes[0].is_empty() && others[1].changes[0].is_empty());
     }
 }
