@@ -57,6 +57,8 @@ pub(crate) struct Finish<'a> {
     pub(crate) slow: Option<Slow>,
     pub(crate) oversize: Vec<ConsideredEffect>,
     pub(crate) wander: Option<&'a Wander>,
+    /// Whether all that accelerates is a slow error of the reference's own path.
+    pub(crate) only_errors_accelerate: bool,
     /// What was looked for without candidates.
     pub(crate) orbit: Option<Look>,
     pub(crate) settled: &'a Settled,

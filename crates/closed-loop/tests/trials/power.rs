@@ -164,6 +164,23 @@ fn a_smear_is_found_beside_a_wander() {
     }
 }
 
+/// Where such a wander is all that accelerates, no size of a smear is told: the path is not the camera's.
+#[test]
+fn a_wander_alone_tells_no_smear() {
+    for (path, seen) in [(Path::Drift, false), (Path::Turns, true)] {
+        let case = Case::new(path, 1).reference("rates = false\nwander_arcsec = [0.5, 0.5, 0.5]\n");
+        let report = reported(&case.quiet(1.0));
+        let smear = report.considered.iter().find(|c| c.id == "exposure_smear");
+        let smear = smear.expect("it is not named");
+        let told = [
+            smear.observable,
+            smear.detectable.is_some(),
+            smear.against.is_none(),
+        ];
+        assert_eq!(told, [seen; 3], "{smear:?}");
+    }
+}
+
 /// Nods beside such a wander, and a step in the middle.
 fn stepped(seed: u64) -> Report {
     let lines = "at_s = 230.0\nx_arcsec = 2.0\ny_arcsec = -2.0\nz_arcsec = 3.0";

@@ -212,7 +212,7 @@ impl<'g, 'a> Ground<'g, 'a> {
     }
 
     /// Whether the motion tells an acceleration beside a slow error of the reference.
-    fn accelerates(&self) -> bool {
+    pub(super) fn accelerates(&self) -> bool {
         let arm = motion::roll_arm(&self.data().camera);
         let reference = self.reference();
         self.by_rates || reference.is_none_or(|r| motion::accelerates(r, arm))

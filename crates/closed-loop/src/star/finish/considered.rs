@@ -4,10 +4,12 @@
 
 use telemetry::report::{ConsideredEffect, FoundEffect, Unattributed};
 
+use crate::causes::SMEAR;
 use crate::findings;
 use crate::image_level;
 use crate::power::Power;
 use crate::questions::needed::{self, ToExplain};
+use crate::search::refusal::Refusal;
 use crate::search::selection::columns_of;
 use crate::star::finish::Finish;
 use crate::star::reference_wander;
@@ -42,8 +44,21 @@ pub(super) fn list(
             entry.clone_from(size);
         }
     }
+    if f.only_errors_accelerate {
+        considered.iter_mut().for_each(not_along_own_path);
+    }
     considered.retain(|c| !effects.iter().any(|e| e.id == c.id));
     considered
+}
+
+/// What sees the acceleration would see that of the path's own error alone: a size of it tells nothing.
+fn not_along_own_path(entry: &mut ConsideredEffect) {
+    if entry.id == SMEAR && entry.observable {
+        entry.observable = false;
+        entry.detectable = None;
+        entry.needed = None;
+        entry.against = Some(Refusal::OwnPath.why());
+    }
 }
 
 /// The slow error of the reference beside the residual `left`, and what speaks `against` it.
