@@ -154,78 +154,9 @@ impl EffectKind for Kind {
         known.extend(["by_middle", "by_half"]);
         known.extend(NAMES);
         let reader = Reader::new(ID, parameters, &known)?;
-        let name = reader.text("variable")?;
-        let name = name.ok_or(EffectError::MissingParameter {
-            effect: ID,
-            name: "variable",
-        })?;
-        let (name, second) = match name.split_once('*') {
-            Some((first, second)) => (first, Some(second)),
-            None => (name, None),
-        };
-        let variable = Variable::read(name, surroundings)?;
-        let by = second
-            .map(|second| Variable::read(second, surroundings))
-            .transpose()?;
-        if by
-            .as_ref()
-            .is_some_and(|by| !variable.is_place() || by.is_place())
-        {
-            return Err(EffectError::WrongType {
-                effect: ID,
-                name: "variable".to_owned(),
-                expected: "of two variables first x_px, y_px or a pixel phase, then time, mag, colour or housekeeping:<channel>",
-            });
-        }
-        let on_attitude = match reader.text("acts_on")? {
-            None | Some("stars") => false,
-            Some("attitude") if matches!(variable, Variable::Time | Variable::Channel(..)) => true,
-            Some(_) => {
-                return Err(EffectError::WrongType {
-                    effect: ID,
-                    name: "acts_on".to_owned(),
-                    expected: "\"stars\", or of time and channels \"attitude\"",
-                });
-            }
-        };
-        let positive = |name: &'static str| {
-            let value = reader.number(name)?.unwrap_or(1.0);
-            if value <= 0.0 {
-                return Err(EffectError::OutOfRange {
-                    effect: ID,
-                    name: name.to_owned(),
-                    value,
-                    expected: "positive",
-                });
-            }
-            Ok(value)
-        };
-        let half = positive("half")?;
-        let by_scale = [
-            reader.number("by_middle")?.unwrap_or(0.0),
-            positive("by_half")?,
-        ];
-        let mut values = Vec::new();
-        if let Some(list) = reader.text("coefficients")? {
-            reader.exclude("coefficients", NAMES)?;
-            for number in list.split(',') {
-                let value = number.trim().parse::<f64>().ok().filter(|v| v.is_finite());
-                let value = value.ok_or_else(|| EffectError::WrongType {
-                    effect: ID,
-                    name: "coefficients".to_owned(),
-                    expected: "an array of numbers",
-                })?;
-                values.push(Some(value));
-            }
-        } else {
-            for name in NAMES {
-                values.push(reader.number(name)?);
-            }
-        }
-        let count = values
-            .iter()
-            .rposition(Option::is_some)
-            .map_or(0, |k| k + 1);
+        let (variable, by) = variables(&reader, surroundings)?;
+        let on_attitude = acts_on_attitude(&reader, &variable)?;
+        let values = coefficients(&reader)?;
         let most = match (&variable, on_attitude) {
             _ if by.is_some() => OF_A_PAIR,
             (Variable::Phase(_), _) => 2 * (HARMONICS + ACROSS),
@@ -233,13 +164,8 @@ impl EffectKind for Kind {
             (_, true) => 3 * ORDERS,
             (_, false) => 4 * ORDERS,
         };
-        if count == 0 {
-            return Err(EffectError::MissingParameter {
-                effect: ID,
-                name: "c0",
-            });
-        }
         // of an attitude the coefficients are axis by axis: as many orders each
+        let count = values.len();
         if count > most || on_attitude && count % 3 != 0 {
             return Err(EffectError::OutOfRange {
                 effect: ID,
@@ -248,16 +174,104 @@ impl EffectKind for Kind {
                 expected: "a number of coefficients that this variable has",
             });
         }
+        let by_scale = [
+            reader.number_or("by_middle", 0.0)?,
+            positive(&reader, "by_half")?,
+        ];
         Ok(Box::new(Empirical {
             variable,
             camera: surroundings.camera.clone(),
             on_attitude,
-            middle: reader.number("middle")?.unwrap_or(0.0),
-            half,
+            middle: reader.number_or("middle", 0.0)?,
+            half: positive(&reader, "half")?,
             by: by.map(|by| (by, by_scale)),
-            values: values[..count].iter().map(|v| v.unwrap_or(0.0)).collect(),
+            values,
         }))
     }
+}
+
+/// The variable, and the one that multiplies it where there are two.
+fn variables(
+    reader: &Reader<'_>,
+    surroundings: &Surroundings<'_>,
+) -> Result<(Variable, Option<Variable>), EffectError> {
+    let name = reader.text("variable")?;
+    let name = name.ok_or(EffectError::MissingParameter {
+        effect: ID,
+        name: "variable",
+    })?;
+    let (name, second) = match name.split_once('*') {
+        Some((first, second)) => (first, Some(second)),
+        None => (name, None),
+    };
+    let variable = Variable::read(name, surroundings)?;
+    let by = second.map(|second| Variable::read(second, surroundings));
+    let by = by.transpose()?;
+    if by
+        .as_ref()
+        .is_some_and(|by| !variable.is_place() || by.is_place())
+    {
+        return Err(EffectError::WrongType {
+            effect: ID,
+            name: "variable".to_owned(),
+            expected: "of two variables first x_px, y_px or a pixel phase, then time, mag, colour or housekeeping:<channel>",
+        });
+    }
+    Ok((variable, by))
+}
+
+fn acts_on_attitude(reader: &Reader<'_>, variable: &Variable) -> Result<bool, EffectError> {
+    match reader.text("acts_on")? {
+        None | Some("stars") => Ok(false),
+        Some("attitude") if matches!(variable, Variable::Time | Variable::Channel(..)) => Ok(true),
+        Some(_) => Err(EffectError::WrongType {
+            effect: ID,
+            name: "acts_on".to_owned(),
+            expected: "\"stars\", or of time and channels \"attitude\"",
+        }),
+    }
+}
+
+/// A number above zero; 1 where it is not given.
+fn positive(reader: &Reader<'_>, name: &'static str) -> Result<f64, EffectError> {
+    let value = reader.number_or(name, 1.0)?;
+    if value <= 0.0 {
+        return Err(EffectError::OutOfRange {
+            effect: ID,
+            name: name.to_owned(),
+            value,
+            expected: "positive",
+        });
+    }
+    Ok(value)
+}
+
+/// As a list or by their names, up to the last that is given; those between that are not are zero.
+fn coefficients(reader: &Reader<'_>) -> Result<Vec<f64>, EffectError> {
+    let mut values = Vec::new();
+    if let Some(list) = reader.text("coefficients")? {
+        reader.exclude("coefficients", NAMES)?;
+        for number in list.split(',') {
+            let value = number.trim().parse::<f64>().ok().filter(|v| v.is_finite());
+            let value = value.ok_or_else(|| EffectError::WrongType {
+                effect: ID,
+                name: "coefficients".to_owned(),
+                expected: "an array of numbers",
+            })?;
+            values.push(Some(value));
+        }
+    } else {
+        for name in NAMES {
+            values.push(reader.number(name)?);
+        }
+    }
+    let given = values.iter().rposition(Option::is_some);
+    let last = given.ok_or(EffectError::MissingParameter {
+        effect: ID,
+        name: "c0",
+    })?;
+    values.truncate(last + 1);
+    Ok(values.into_iter().map(|v| v.unwrap_or(0.0)).collect())
 }
 
 impl Empirical {

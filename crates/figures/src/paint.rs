@@ -4,6 +4,7 @@
 
 use std::fmt::Write as _;
 
+use crate::Colour;
 use crate::axis::{Laid, nice_below, written};
 use crate::mark::{Mark, Shape};
 use crate::thin;
@@ -115,8 +116,13 @@ impl Arrows {
 }
 
 pub(crate) fn mark(out: &mut String, mark: &Mark, frame: &Frame) {
-    let colour = mark.colour.hex();
-    let opacity = mark.opacity;
+    let mut stroke = |d: &str, more: &str| {
+        let (colour, opacity) = (mark.colour.hex(), mark.opacity);
+        let _ = write!(
+            out,
+            r#"<path d="{d}" fill="none" stroke="{colour}" stroke-opacity="{opacity}"{more}/>"#
+        );
+    };
     match &mark.shape {
         Shape::Lines {
             lines,
@@ -134,55 +140,27 @@ pub(crate) fn mark(out: &mut String, mark: &Mark, frame: &Frame) {
             } else {
                 ""
             };
-            let _ = write!(
-                out,
-                r#"<path d="{d}" fill="none" stroke="{colour}" stroke-opacity="{opacity}" stroke-width="{width}" stroke-linejoin="round"{dash}/>"#
-            );
+            let width = format!(r#" stroke-width="{width}" stroke-linejoin="round"{dash}"#);
+            stroke(&d, &width);
         }
-        Shape::Band { x, low, high } => {
-            let mut d = String::new();
-            for run in runs(x, low, high) {
-                let there = run.clone().map(|k| frame.place(x[k], high[k]));
-                let back = run.rev().map(|k| frame.place(x[k], low[k]));
-                let points: Vec<[f64; 2]> = there.chain(back).collect();
-                path(&mut d, &points);
-                d.push('Z');
-            }
-            // a rim: where the band is thinner than a pixel, it is all that shows
-            let rim = (2.0 * opacity).min(1.0);
-            let _ = write!(
-                out,
-                r#"<path d="{d}" fill="{colour}" fill-opacity="{opacity}" stroke="{colour}" stroke-opacity="{rim}" stroke-width="0.7" stroke-linejoin="round"/>"#
-            );
-        }
+        Shape::Band { x, low, high } => band(out, mark, frame, [x, low, high]),
         Shape::Points {
             x,
             y,
             sigma,
             radius,
         } => {
-            let mut bars = String::new();
-            for ((x, y), s) in x.iter().zip(y).zip(sigma) {
-                let ends = [frame.place(*x, y - s), frame.place(*x, y + s)];
-                if ends.iter().flatten().all(|v| v.is_finite()) {
-                    path(&mut bars, &ends);
-                }
-            }
+            let bars = bars(frame, [x, y, sigma]);
             if !bars.is_empty() {
-                let _ = write!(
-                    out,
-                    r#"<path d="{bars}" fill="none" stroke="{colour}" stroke-opacity="{opacity}"/>"#
-                );
+                stroke(&bars, "");
             }
             let mut d = String::new();
             for [px, py] in thin::points(x.iter().zip(y).map(|(x, y)| frame.place(*x, *y))) {
                 let _ = write!(d, "M{px:.1} {py:.1}h0");
             }
-            let _ = write!(
-                out,
-                r#"<path d="{d}" fill="none" stroke="{colour}" stroke-opacity="{opacity}" stroke-width="{:.1}" stroke-linecap="round"/>"#,
-                2.0 * radius
-            );
+            let width = 2.0 * radius;
+            let round = format!(r#" stroke-width="{width:.1}" stroke-linecap="round""#);
+            stroke(&d, &round);
         }
         Shape::Arrows { x, y, dx, dy, .. } => {
             let Some(scale) = Arrows::of(mark, frame) else {
@@ -194,10 +172,7 @@ pub(crate) fn mark(out: &mut String, mark: &Mark, frame: &Frame) {
                 let step = [dx[k] * scale.px_per_unit, -dy[k] * scale.px_per_unit];
                 arrow(&mut d, from, step);
             }
-            let _ = write!(
-                out,
-                r#"<path d="{d}" fill="none" stroke="{colour}" stroke-opacity="{opacity}" stroke-width="1.1" stroke-linejoin="round"/>"#
-            );
+            stroke(&d, r#" stroke-width="1.1" stroke-linejoin="round""#);
         }
         Shape::Cells {
             x,
@@ -207,43 +182,77 @@ pub(crate) fn mark(out: &mut String, mark: &Mark, frame: &Frame) {
             scale,
             ..
         } => {
-            for k in 0..x.len() {
-                let low = frame.place(x[k] - 0.5 * size[0], y[k] + 0.5 * size[1]);
-                let high = frame.place(x[k] + 0.5 * size[0], y[k] - 0.5 * size[1]);
-                if value[k].is_finite() && low.iter().chain(&high).all(|v| v.is_finite()) {
-                    // a fraction of a pixel more closes the seams
-                    let _ = write!(
-                        out,
-                        r#"<rect x="{:.1}" y="{:.1}" width="{:.1}" height="{:.1}" fill="{}"/>"#,
-                        low[0],
-                        low[1],
-                        (high[0] - low[0]).max(0.8) + 0.1,
-                        (high[1] - low[1]).max(0.8) + 0.1,
-                        scale.colour(value[k]).hex()
-                    );
-                }
+            let each = x.iter().zip(y).zip(value);
+            for ((x, y), value) in each.filter(|(_, value)| value.is_finite()) {
+                cell(out, frame, [*x, *y], *size, scale.colour(*value));
             }
         }
         Shape::VerticalRule { x } => {
             let px = frame.x.at(*x);
             if px.is_finite() {
-                let _ = write!(
-                    out,
-                    r#"<path d="M{px:.1} {:.1}v{:.1}" stroke="{colour}" stroke-opacity="{opacity}" stroke-dasharray="3 3"/>"#,
-                    frame.at[1], frame.px[1]
-                );
+                let d = format!("M{px:.1} {:.1}v{:.1}", frame.at[1], frame.px[1]);
+                stroke(&d, RULE);
             }
         }
         Shape::HorizontalRule { y } => {
             let px = frame.y.at(*y);
             if px.is_finite() {
-                let _ = write!(
-                    out,
-                    r#"<path d="M{:.1} {px:.1}h{:.1}" stroke="{colour}" stroke-opacity="{opacity}" stroke-dasharray="3 3"/>"#,
-                    frame.at[0], frame.px[0]
-                );
+                let d = format!("M{:.1} {px:.1}h{:.1}", frame.at[0], frame.px[0]);
+                stroke(&d, RULE);
             }
         }
+    }
+}
+
+/// How a rule is dashed.
+const RULE: &str = r#" stroke-dasharray="3 3""#;
+
+/// The area between `low` and `high`, run by run.
+fn band(out: &mut String, mark: &Mark, frame: &Frame, [x, low, high]: [&[f64]; 3]) {
+    let mut d = String::new();
+    for run in runs(x, low, high) {
+        let there = run.clone().map(|k| frame.place(x[k], high[k]));
+        let back = run.rev().map(|k| frame.place(x[k], low[k]));
+        let points: Vec<[f64; 2]> = there.chain(back).collect();
+        path(&mut d, &points);
+        d.push('Z');
+    }
+    let (colour, opacity) = (mark.colour.hex(), mark.opacity);
+    // a rim: where the band is thinner than a pixel, it is all that shows
+    let rim = (2.0 * opacity).min(1.0);
+    let _ = write!(
+        out,
+        r#"<path d="{d}" fill="{colour}" fill-opacity="{opacity}" stroke="{colour}" stroke-opacity="{rim}" stroke-width="0.7" stroke-linejoin="round"/>"#
+    );
+}
+
+/// The bars of errors, of points that have one.
+fn bars(frame: &Frame, [x, y, sigma]: [&[f64]; 3]) -> String {
+    let mut d = String::new();
+    for ((x, y), s) in x.iter().zip(y).zip(sigma) {
+        let ends = [frame.place(*x, y - s), frame.place(*x, y + s)];
+        if ends.iter().flatten().all(|v| v.is_finite()) {
+            path(&mut d, &ends);
+        }
+    }
+    d
+}
+
+/// A cell about `[x, y]`.
+fn cell(out: &mut String, frame: &Frame, [x, y]: [f64; 2], size: [f64; 2], colour: Colour) {
+    let low = frame.place(x - 0.5 * size[0], y + 0.5 * size[1]);
+    let high = frame.place(x + 0.5 * size[0], y - 0.5 * size[1]);
+    if low.iter().chain(&high).all(|v| v.is_finite()) {
+        // a fraction of a pixel more closes the seams
+        let _ = write!(
+            out,
+            r#"<rect x="{:.1}" y="{:.1}" width="{:.1}" height="{:.1}" fill="{}"/>"#,
+            low[0],
+            low[1],
+            (high[0] - low[0]).max(0.8) + 0.1,
+            (high[1] - low[1]).max(0.8) + 0.1,
+            colour.hex()
+        );
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use assess::{Assessment, AxisNoise, RotatorFindings};
+use assess::{Assessment, AxisNoise, Ecss, GyroSolution, RotatorFindings};
 use telemetry::report::AssessMethod;
 
 /// Writing to a string cannot fail.
@@ -34,61 +34,9 @@ pub fn assess_summary(found: &Assessment) -> String {
         counts.longest_gap_s
     );
     line!(out);
-    line!(
-        out,
-        "{:<34}{:>10}{:>10}{:>10}",
-        "1 sigma, arcsec, tracker axes",
-        "X",
-        "Y",
-        "Z"
-    );
-    let total = found.report.total_arcsec.map(|x| x.map(Some));
-    row(&mut out, "total", total.unwrap_or([None; 3]));
-    let of = |f: &dyn Fn(&AxisNoise) -> Option<f64>| found.axes.each_ref().map(f);
-    row(
-        &mut out,
-        "inherent, plateau",
-        of(&|a| a.plateau.map(|p| p.sigma)),
-    );
-    row(
-        &mut out,
-        "  its uncertainty",
-        of(&|a| a.plateau.map(|p| p.error)),
-    );
-    row(
-        &mut out,
-        "Allan deviation at one frame",
-        of(&|a| a.allan.map(|r| r.sigma)),
-    );
-    row(
-        &mut out,
-        "floor of the spectrum",
-        of(&|a| a.floor.map(|r| r.sigma)),
-    );
-    row(&mut out, "flat intervals, pooled", of(&|a| a.flat_sigma));
-    row(
-        &mut out,
-        "plateau from, s",
-        of(&|a| a.plateau.map(|p| p.span_s[0])),
-    );
-    row(
-        &mut out,
-        "plateau to, s",
-        of(&|a| a.plateau.map(|p| p.span_s[1])),
-    );
-    let ecss = &found.ecss;
+    noise(&mut out, found);
     line!(out);
-    line!(
-        out,
-        "ECSS, {}, windows of {:.0} s, 99.73 % of the time",
-        ecss.interpretation,
-        ecss.window_s
-    );
-    row(&mut out, "AKE (and APE)", ecss.ake_arcsec[1].map(Some));
-    row(&mut out, "MPE", ecss.mpe_arcsec[1].map(Some));
-    row(&mut out, "RPE", ecss.rpe_arcsec[1].map(Some));
-    let pde = ecss.pde_arcsec.map(|x| x[1].map(Some));
-    row(&mut out, "PDE", pde.unwrap_or([None; 3]));
+    pointing(&mut out, &found.ecss);
     if let Some(check) = &found.requirement {
         let met = |met| if met { "met" } else { "not met" };
         line!(out);
@@ -106,25 +54,91 @@ pub fn assess_summary(found: &Assessment) -> String {
     }
     if let Some(gyro) = &found.gyro {
         line!(out);
-        for axis in 0..3 {
-            line!(
-                out,
-                "Gyro bias {} {:>10.5} +- {:.5} arcsec/s",
-                ["X", "Y", "Z"][axis],
-                gyro.bias_arcsec_s[axis],
-                gyro.bias_sigma_arcsec_s[axis]
-            );
-        }
-        line!(
-            out,
-            "Walk      {:.4} arcsec/sqrt(s), of the gyro or of the tracker",
-            gyro.walk_arcsec_rt_s
-        );
+        biases(&mut out, gyro);
     }
     for note in &found.notes {
         line!(out, "Note      {note}");
     }
     out
+}
+
+/// Total and inherent noise, axis by axis.
+fn noise(out: &mut String, found: &Assessment) {
+    line!(
+        out,
+        "{:<34}{:>10}{:>10}{:>10}",
+        "1 sigma, arcsec, tracker axes",
+        "X",
+        "Y",
+        "Z"
+    );
+    let total = found.report.total_arcsec.map(|x| x.map(Some));
+    row(out, "total", total.unwrap_or([None; 3]));
+    let of = |f: &dyn Fn(&AxisNoise) -> Option<f64>| found.axes.each_ref().map(f);
+    row(
+        out,
+        "inherent, plateau",
+        of(&|a| a.plateau.map(|p| p.sigma)),
+    );
+    row(
+        out,
+        "  its uncertainty",
+        of(&|a| a.plateau.map(|p| p.error)),
+    );
+    row(
+        out,
+        "Allan deviation at one frame",
+        of(&|a| a.allan.map(|r| r.sigma)),
+    );
+    row(
+        out,
+        "floor of the spectrum",
+        of(&|a| a.floor.map(|r| r.sigma)),
+    );
+    row(out, "flat intervals, pooled", of(&|a| a.flat_sigma));
+    row(
+        out,
+        "plateau from, s",
+        of(&|a| a.plateau.map(|p| p.span_s[0])),
+    );
+    row(
+        out,
+        "plateau to, s",
+        of(&|a| a.plateau.map(|p| p.span_s[1])),
+    );
+}
+
+/// Errors by the definitions of ECSS.
+fn pointing(out: &mut String, ecss: &Ecss) {
+    line!(
+        out,
+        "ECSS, {}, windows of {:.0} s, 99.73 % of the time",
+        ecss.interpretation,
+        ecss.window_s
+    );
+    row(out, "AKE (and APE)", ecss.ake_arcsec[1].map(Some));
+    row(out, "MPE", ecss.mpe_arcsec[1].map(Some));
+    row(out, "RPE", ecss.rpe_arcsec[1].map(Some));
+    let pde = ecss.pde_arcsec.map(|x| x[1].map(Some));
+    row(out, "PDE", pde.unwrap_or([None; 3]));
+}
+
+/// What the gyro errs by.
+fn biases(out: &mut String, gyro: &GyroSolution) {
+    for axis in 0..3 {
+        line!(
+            out,
+            "Gyro bias {} {:>10.5} +- {:.5} arcsec/s",
+            ["X", "Y", "Z"][axis],
+            gyro.bias_arcsec_s[axis],
+            gyro.bias_sigma_arcsec_s[axis]
+        );
+    }
+    line!(
+        out,
+        "Walk      {:.4} arcsec/sqrt(s), of the gyro or of the tracker",
+        gyro.walk_arcsec_rt_s
+    );
 }
 
 fn row(out: &mut String, name: &str, values: [Option<f64>; 3]) {

@@ -108,6 +108,26 @@ struct State {
     residual: Vec<f64>,
 }
 
+impl State {
+    /// Every window as it was sent.
+    fn begin(sample: &Sample) -> Self {
+        let sent = |w| Fitted {
+            at: sample.start[w],
+            flux: sample.flux[w],
+            ..Fitted::default()
+        };
+        Self {
+            fitted: (0..sample.windows()).map(sent).collect(),
+            flux: sample.flux.clone(),
+            at: sample.start.clone(),
+            weight: vec![0.0; sample.z.len()],
+            good: sample.valid.clone(),
+            model: Vec::new(),
+            residual: vec![0.0; sample.z.len()],
+        }
+    }
+}
+
 /// Learns from the frames `taken`. `length_px` is the scale of the field, px.
 /// Unless `mapped`, the map stays at zero: the spots explain what they can.
 pub(crate) fn learn(
@@ -123,22 +143,7 @@ pub(crate) fn learn(
         .par_iter()
         .map(|list| coupling::by_pixel(sample, list))
         .collect();
-    let n = sample.windows();
-    let mut state = State {
-        fitted: (0..n)
-            .map(|w| Fitted {
-                at: sample.start[w],
-                flux: sample.flux[w],
-                ..Fitted::default()
-            })
-            .collect(),
-        flux: sample.flux.clone(),
-        at: sample.start.clone(),
-        weight: vec![0.0; sample.z.len()],
-        good: sample.valid.clone(),
-        model: Vec::new(),
-        residual: vec![0.0; sample.z.len()],
-    };
+    let mut state = State::begin(sample);
     let mut learned = Learned {
         grid,
         finer: gaussian_spot::finer(&grid),
@@ -173,36 +178,7 @@ pub(crate) fn learn(
         learned.learn_noise(sample, &windows, &state);
         star_weight = weights;
     }
-    let levels: Vec<[f64; 2]> = windows
-        .par_iter()
-        .zip(&learned.spots)
-        .map(|(list, spot)| {
-            let typical = |of: &[f64]| robust_median(list.iter().map(|&w| of[w]).collect());
-            let plain = if mapped {
-                // the map holds a level that no table knows of
-                // and lies under the spot as under that Gaussian
-                let pedestal = spot.nearest.map_or(0.0, |gaussian| gaussian.pedestal);
-                typical(&state.flux).map(|flux| spot.background + flux * pedestal)
-            } else {
-                typical(&sample.background)
-            };
-            // of a window that no spot fits no value is good
-            let believed = |w: &usize| state.good[sample.cells_of(*w)].iter().any(|good| *good);
-            let believed: Vec<usize> = list.iter().copied().filter(believed).collect();
-            let following = moment_level::fit(
-                sample,
-                &believed,
-                |w| state.fitted[w].at,
-                &state.model,
-                &learned.dark.value,
-                spot.background,
-            );
-            [following, plain.unwrap_or(spot.background)]
-        })
-        .collect();
-    for (spot, [following, plain]) in learned.spots.iter_mut().zip(levels) {
-        (spot.level, spot.plain_level) = (following, plain);
-    }
+    learned.level(sample, &windows, &state);
     learned.clipped = windows
         .iter()
         .flatten()
@@ -277,6 +253,38 @@ fn weigh(sample: &Sample, windows: &[Vec<usize>], state: &mut State, noise: Pixe
 }
 
 impl Learned {
+    /// The level under each star's spot, that follows it and a plain one.
+    fn level(&mut self, sample: &Sample, windows: &[Vec<usize>], state: &State) {
+        let of_star = |(list, spot): (&Vec<usize>, &Spot)| {
+            let typical = |of: &[f64]| robust_median(list.iter().map(|&w| of[w]).collect());
+            let plain = if self.mapped {
+                // the map holds a level that no table knows of
+                // and lies under the spot as under that Gaussian
+                let pedestal = spot.nearest.map_or(0.0, |gaussian| gaussian.pedestal);
+                typical(&state.flux).map(|flux| spot.background + flux * pedestal)
+            } else {
+                typical(&sample.background)
+            };
+            // of a window that no spot fits no value is good
+            let believed = |w: &usize| state.good[sample.cells_of(*w)].iter().any(|good| *good);
+            let believed: Vec<usize> = list.iter().copied().filter(believed).collect();
+            let following = moment_level::fit(
+                sample,
+                &believed,
+                |w| state.fitted[w].at,
+                &state.model,
+                &self.dark.value,
+                spot.background,
+            );
+            [following, plain.unwrap_or(spot.background)]
+        };
+        let each = windows.par_iter().zip(&self.spots);
+        let levels: Vec<[f64; 2]> = each.map(of_star).collect();
+        for (spot, [following, plain]) in self.spots.iter_mut().zip(levels) {
+            (spot.level, spot.plain_level) = (following, plain);
+        }
+    }
+
     /// Spots at the given map, the map at these spots, until both stand still; then the Gaussians, exactly in the
     /// `last` round. Returns the sums they were made of.
     fn learn_spots_and_dark(

@@ -60,7 +60,8 @@ impl Field {
         let mut grid = vec![NOTHING; cells[0] * cells[1]];
         for &sx in shifts(0) {
             for &sy in shifts(1) {
-                found.extend(self.transform(cells, [sx, sy], variance, own, &mut grid));
+                let lattice = Lattice::new(cells, [sx, sy]);
+                found.extend(self.transform(&lattice, variance, own, &mut grid));
             }
         }
         found.sort_by(|a, b| b.0.total_cmp(&a.0));
@@ -93,51 +94,14 @@ impl Field {
     /// The strongest wave of every column of the transform, with its power less its price.
     fn transform(
         &self,
-        cells: [usize; 2],
-        shift: [f64; 2],
+        lattice: &Lattice,
         variance: [f64; 2],
         own: &Own,
         grid: &mut [Complex<f32>],
     ) -> Vec<(f32, [f64; 2])> {
-        let [nx, ny] = cells;
-        let plans = cells.map(fourier::forward_single);
-        let twist = |axis: usize| -> Vec<Complex<f32>> {
-            let n = cells[axis];
-            (0..n)
-                .map(|j| {
-                    let (s, c) = (-TAU * shift[axis] * j as f64 / n as f64).sin_cos();
-                    Complex::new(narrow(c), narrow(s))
-                })
-                .collect()
-        };
-        let twists = [twist(0), twist(1)];
-        let scale = variance.map(|v| 1.0 / v.sqrt());
-        let low = [&self.x_px, &self.y_px].map(|v| v.iter().copied().fold(f64::INFINITY, f64::min));
-        let cell = |axis: usize, at: f64| -> (usize, Complex<f32>) {
-            #[expect(
-                clippy::cast_possible_truncation,
-                clippy::cast_sign_loss,
-                reason = "half pixels from the lowest position"
-            )]
-            let j = (CELLS * (at - low[axis])) as usize;
-            let n = cells[axis];
-            // beyond the grid a half step has turned by pi a period
-            let turned = shift[axis] > 0.0 && (j / n) % 2 == 1;
-            let twist = twists[axis][j % n];
-            (j % n, if turned { -twist } else { twist })
-        };
-        grid.fill(NOTHING);
-        // most lines lie between the stars' paths and hold nothing
-        let mut used = vec![false; ny];
-        for (rows, weight) in self.stars.iter().zip(&self.weight) {
-            for row in rows.clone() {
-                let (i, ti) = cell(0, self.x_px[row]);
-                let (j, tj) = cell(1, self.y_px[row]);
-                let r = [0, 1].map(|a| narrow(weight * self.residual[a][row] * scale[a]));
-                grid[j * nx + i] += Complex::new(r[0], r[1]) * ti * tj;
-                used[j] = true;
-            }
-        }
+        let [nx, ny] = lattice.cells;
+        let used = self.put_on(lattice, variance, grid);
+        let plans = lattice.cells.map(fourier::forward_single);
         grid.par_chunks_mut(nx)
             .zip(&used)
             .filter(|(_, used)| **used)
@@ -146,43 +110,11 @@ impl Field {
                 |scratch, (line, _)| plans[0].process_with_scratch(line, scratch),
             );
         let grid = &*grid;
-        let frequency = |axis: usize, i: usize| {
-            let n = cells[axis] as f64;
-            let i = i as f64;
-            (if i < 0.5 * n { i } else { i - n } + shift[axis]) * CELLS / n
-        };
-        let opposite = |axis: usize, i: usize| {
-            let first = usize::from(shift[axis] > 0.0);
-            // there are a power of two
-            (2 * cells[axis] - i - first) & (cells[axis] - 1)
-        };
-        // the square of a wave's residuals is that of noise, a row each, times the power
-        let rows = self.weighed_rows();
-        let octaves: Vec<(f64, f32)> = own
-            .prices()
-            .map(|(up_to, trials)| (up_to, narrow(2.0 * rows * trials.ln())))
-            .collect();
-        let upwards: Vec<usize> = (0..=ny / 2).collect();
+        let octaves = self.octaves(own);
         let strongest = |i: usize, line: &[Complex<f32>], other: &[Complex<f32>]| {
-            let wave = |j: usize| [frequency(0, i), frequency(1, j)];
-            let mut best: Option<(f32, [f64; 2])> = None;
-            let mut rest = upwards.as_slice();
-            for (up_to, price) in &octaves {
-                let within = rest.partition_point(|&j| own.scale(wave(j)) < *up_to);
-                let (octave, longer) = rest.split_at(within);
-                rest = longer;
-                for &j in octave {
-                    let power = line[j].norm_sqr() + other[opposite(1, j)].norm_sqr();
-                    let worth = power - price;
-                    // few are higher than all before them: others need not be asked whose they are
-                    if best.is_none_or(|(most, _)| worth >= most) && !own.excludes(wave(j)) {
-                        best = Some((worth, wave(j)));
-                    }
-                }
-            }
-            best
+            lattice.strongest(i, [line, other], &octaves, own)
         };
-        let leading: Vec<usize> = (0..nx).filter(|&i| i <= opposite(0, i)).collect();
+        let leading: Vec<usize> = (0..nx).filter(|&i| i <= lattice.opposite(0, i)).collect();
         let mut strong: Vec<(usize, (f32, [f64; 2]))> = leading
             .par_chunks(STRIP)
             .map_init(
@@ -194,14 +126,14 @@ impl Field {
                     columns.fill(NOTHING);
                     for (j, line) in grid.chunks(nx).enumerate().filter(|(j, _)| used[*j]) {
                         for (pair, &i) in columns.chunks_mut(2 * ny).zip(strip) {
-                            (pair[j], pair[ny + j]) = (line[i], line[opposite(0, i)]);
+                            (pair[j], pair[ny + j]) = (line[i], line[lattice.opposite(0, i)]);
                         }
                     }
                     let mut found = Vec::new();
                     for (pair, &i) in columns.chunks_mut(2 * ny).zip(strip) {
                         plans[1].process_with_scratch(pair, scratch);
                         let (own, other) = pair.split_at(ny);
-                        let back = opposite(0, i);
+                        let back = lattice.opposite(0, i);
                         found.extend(strongest(i, own, other).map(|s| (i, s)));
                         if back != i {
                             found.extend(strongest(back, other, own).map(|s| (back, s)));
@@ -214,5 +146,120 @@ impl Field {
             .collect();
         strong.sort_by_key(|(i, _)| *i);
         strong.into_iter().map(|(_, strongest)| strongest).collect()
+    }
+
+    /// Puts the residuals into the cells of `grid`; says which lines hold any: most lie between the stars' paths.
+    fn put_on(
+        &self,
+        lattice: &Lattice,
+        variance: [f64; 2],
+        grid: &mut [Complex<f32>],
+    ) -> Vec<bool> {
+        let [nx, ny] = lattice.cells;
+        let twists = [lattice.twists(0), lattice.twists(1)];
+        let scale = variance.map(|v| 1.0 / v.sqrt());
+        let low = [&self.x_px, &self.y_px].map(|v| v.iter().copied().fold(f64::INFINITY, f64::min));
+        let cell = |axis: usize, at: f64| -> (usize, Complex<f32>) {
+            #[expect(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "half pixels from the lowest position"
+            )]
+            let j = (CELLS * (at - low[axis])) as usize;
+            let n = lattice.cells[axis];
+            // beyond the grid a half step has turned by pi a period
+            let turned = lattice.shift[axis] > 0.0 && (j / n) % 2 == 1;
+            let twist = twists[axis][j % n];
+            (j % n, if turned { -twist } else { twist })
+        };
+        grid.fill(NOTHING);
+        let mut used = vec![false; ny];
+        for (rows, weight) in self.stars.iter().zip(&self.weight) {
+            for row in rows.clone() {
+                let (i, ti) = cell(0, self.x_px[row]);
+                let (j, tj) = cell(1, self.y_px[row]);
+                let r = [0, 1].map(|a| narrow(weight * self.residual[a][row] * scale[a]));
+                grid[j * nx + i] += Complex::new(r[0], r[1]) * ti * tj;
+                used[j] = true;
+            }
+        }
+        used
+    }
+
+    /// Up to which scale each octave goes, and what a wave in it pays of its power.
+    fn octaves(&self, own: &Own) -> Vec<(f64, f32)> {
+        // the square of a wave's residuals is that of noise, a row each, times the power
+        let rows = self.weighed_rows();
+        let prices = own.prices();
+        prices
+            .map(|(up_to, trials)| (up_to, narrow(2.0 * rows * trials.ln())))
+            .collect()
+    }
+}
+
+/// The cells of a transform, a power of two an axis, and the share of a step by which its frequencies are shifted.
+struct Lattice {
+    cells: [usize; 2],
+    shift: [f64; 2],
+    /// Indices along the second axis whose frequencies rise from zero.
+    upwards: Vec<usize>,
+}
+
+impl Lattice {
+    fn new(cells: [usize; 2], shift: [f64; 2]) -> Self {
+        Self {
+            cells,
+            shift,
+            upwards: (0..=cells[1] / 2).collect(),
+        }
+    }
+
+    /// What turns each cell, so that frequencies are shifted.
+    fn twists(&self, axis: usize) -> Vec<Complex<f32>> {
+        let n = self.cells[axis];
+        let twist = |j: usize| {
+            let (s, c) = (-TAU * self.shift[axis] * j as f64 / n as f64).sin_cos();
+            Complex::new(narrow(c), narrow(s))
+        };
+        (0..n).map(twist).collect()
+    }
+
+    /// The frequency of an index, cycles/px.
+    fn frequency(&self, axis: usize, i: usize) -> f64 {
+        let (n, i) = (self.cells[axis] as f64, i as f64);
+        (if i < 0.5 * n { i } else { i - n } + self.shift[axis]) * CELLS / n
+    }
+
+    /// The index of minus that frequency.
+    fn opposite(&self, axis: usize, i: usize) -> usize {
+        let first = usize::from(self.shift[axis] > 0.0);
+        (2 * self.cells[axis] - i - first) & (self.cells[axis] - 1)
+    }
+
+    /// The strongest wave of column `i`, of the transform there and at the opposite one.
+    fn strongest(
+        &self,
+        i: usize,
+        [line, other]: [&[Complex<f32>]; 2],
+        octaves: &[(f64, f32)],
+        own: &Own,
+    ) -> Option<(f32, [f64; 2])> {
+        let wave = |j: usize| [self.frequency(0, i), self.frequency(1, j)];
+        let mut best: Option<(f32, [f64; 2])> = None;
+        let mut rest = self.upwards.as_slice();
+        for (up_to, price) in octaves {
+            let within = rest.partition_point(|&j| own.scale(wave(j)) < *up_to);
+            let (octave, longer) = rest.split_at(within);
+            rest = longer;
+            for &j in octave {
+                let power = line[j].norm_sqr() + other[self.opposite(1, j)].norm_sqr();
+                let worth = power - price;
+                // few are higher than all before them: others need not be asked whose they are
+                if best.is_none_or(|(most, _)| worth >= most) && !own.excludes(wave(j)) {
+                    best = Some((worth, wave(j)));
+                }
+            }
+        }
+        best
     }
 }
