@@ -137,6 +137,10 @@ impl Grounds<'_> {
         }
         answer.added = self.effects.iter().any(|e| e.id == id);
         let against = considered.and_then(|c| c.against.as_deref());
+        let unseen = !answer.added && considered.is_some_and(|c| !c.observable);
+        if let Some(why) = against.filter(|_| unseen) {
+            (answer.observable, answer.reason) = (false, Some(why.to_owned()));
+        }
         answer.finding = finding(&answer, against, !self.effects.is_empty(), &self.rest());
         answer
     }

@@ -4,6 +4,8 @@
 //! Sizes are ten standard errors of these very runs. An honest estimate is off by more than 4 sigma
 //! once in 16 000 runs.
 
+use closed_loop::{Questions, close_asking};
+use scenarios::simulate;
 use telemetry::report::{Report, Selector, Verdict};
 
 use crate::kit::{Case, Path, VELOCITY, closed, named, power, reported};
@@ -169,7 +171,12 @@ fn a_smear_is_found_beside_a_wander() {
 fn a_wander_alone_tells_no_smear() {
     for (path, seen) in [(Path::Drift, false), (Path::Turns, true)] {
         let case = Case::new(path, 1).reference("rates = false\nwander_arcsec = [0.5, 0.5, 0.5]\n");
-        let report = reported(&case.quiet(1.0));
+        let scenario = case.quiet(1.0);
+        let bundle = simulate(&scenario).unwrap();
+        let asked = Questions::about(["exposure_smear"]).unwrap();
+        let closed = close_asking(&scenario.model_without_effects(), &bundle, &asked, &|_| {});
+        let report = closed.unwrap().report;
+        assert_eq!(report.hypotheses[0].observable, seen);
         let smear = report.considered.iter().find(|c| c.id == "exposure_smear");
         let smear = smear.expect("it is not named");
         let told = [
