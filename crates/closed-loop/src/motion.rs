@@ -46,6 +46,9 @@ use stencil::Stencil;
 
 /// Largest ratio of prediction error to step at which the motion is resolved.
 const RESOLVED: f64 = 0.3;
+/// Squares of the prediction error over those of second differences beyond which a path's own errors make most of these:
+/// of a walk alone they are 5/18, of white noise 35/108. What else accelerates then makes less than 0.4 of what a walk does.
+const ERRORS_ALONE: f64 = 0.2;
 /// Samples whose means are tried where single ones resolve nothing.
 const AVERAGED: [usize; 3] = [2, 4, 8];
 /// Share of a step that is one: jitter is no shorter.
@@ -55,27 +58,37 @@ const THINNED: [f64; 4] = [16.0, 8.0, 4.0, 2.0];
 
 /// Whether a series of attitudes tells how the tracker moved between them.
 fn resolved(t_s: &[f64], q: &[UnitQuaternion<f64>], arm: f64) -> bool {
-    predicts(t_s, q, arm, |_, [_, next]| *next)
+    let error = prediction_error(t_s, q, arm, |_, [_, next]| *next);
+    error.is_some_and(|error| error <= RESOLVED * RESOLVED)
 }
 
 /// Whether it tells how that motion changed: the same against second differences, of which a walk of variance
 /// s^2 a step has 2 s^2 and the error 20/36 s^2. What such a walk seems to accelerate by goes with itself, where
 /// the path is one through attitudes ([`Around::by_rates`]).
 pub(crate) fn accelerates(series: &AttitudeSeries, arm: f64) -> bool {
+    error_of_change(series, arm).is_some_and(|error| error <= RESOLVED * RESOLVED)
+}
+
+/// Whether all that it seems to accelerate by is its own error: see [`ERRORS_ALONE`].
+pub(crate) fn only_errs(series: &AttitudeSeries, arm: f64) -> bool {
+    error_of_change(series, arm).is_some_and(|error| error > ERRORS_ALONE)
+}
+
+fn error_of_change(series: &AttitudeSeries, arm: f64) -> Option<f64> {
     let change = |[before, after]: [f64; 2], [last, next]: [&Vector3<f64>; 2]| {
         2.0 * (last * after - next * before) / (after - before)
     };
-    predicts(series.t_s(), series.quaternions(), arm, change)
+    prediction_error(series.t_s(), series.quaternions(), arm, change)
 }
 
-/// Whether samples are predicted by their neighbours within a share of `size`, of the times to those before and
-/// after, and the turns.
-fn predicts(
+/// The squares of what samples are off from where their neighbours predict them over those of `size`, of the times to
+/// those before and after, and the turns; `None` without neighbours.
+fn prediction_error(
     t_s: &[f64],
     q: &[UnitQuaternion<f64>],
     arm: f64,
     size: impl Fn([f64; 2], [&Vector3<f64>; 2]) -> Vector3<f64>,
-) -> bool {
+) -> Option<f64> {
     const AROUND: [usize; 4] = [0, 1, 3, 4];
     let longest = longest_step(t_s);
     let (mut error, mut step, mut count) = (0.0, 0.0, 0_u32);
@@ -93,7 +106,8 @@ fn predicts(
         step += size.component_mul(&moves).norm_squared();
         count += 1;
     }
-    count > 0 && error <= RESOLVED * RESOLVED * step
+    // what does not move at all is predicted
+    (count > 0).then(|| if error > 0.0 { error / step } else { 0.0 })
 }
 
 /// What values at four places weigh in the cubic through them, at 0: Lagrange's polynomials.
@@ -331,8 +345,9 @@ mod tests {
         };
         let drift = series(&|t| 2e-4 * t);
         assert!(resolved(drift.t_s(), drift.quaternions(), 1.0) && !accelerates(&drift, 1.0));
+        assert!(only_errs(&drift, 1.0));
         let swing = series(&|t| 1e-3 * (0.2 * t).sin());
-        assert!(accelerates(&swing, 1.0));
+        assert!(accelerates(&swing, 1.0) && !only_errs(&swing, 1.0));
     }
 
     /// A path of 3e-5 rad a step, and holes across which it turns by up to 1e-2.

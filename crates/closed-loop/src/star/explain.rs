@@ -223,7 +223,7 @@ fn conclude(
         slow,
         oversize,
         wander: searched.wander.as_ref(),
-        only_errors_accelerate: searched.slow_error().is_some() && !ground.accelerates(),
+        only_errors_accelerate: searched.slow_error().is_some() && ground.only_errors_accelerate(),
         orbit: look,
         settled,
         image: match known.as_measured {

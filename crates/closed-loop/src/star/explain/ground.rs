@@ -212,10 +212,17 @@ impl<'g, 'a> Ground<'g, 'a> {
     }
 
     /// Whether the motion tells an acceleration beside a slow error of the reference.
-    pub(super) fn accelerates(&self) -> bool {
+    fn accelerates(&self) -> bool {
         let arm = motion::roll_arm(&self.data().camera);
         let reference = self.reference();
         self.by_rates || reference.is_none_or(|r| motion::accelerates(r, arm))
+    }
+
+    /// Whether all that accelerates is the error of the reference's own path.
+    pub(super) fn only_errors_accelerate(&self) -> bool {
+        let arm = motion::roll_arm(&self.data().camera);
+        let reference = self.reference();
+        !self.by_rates && reference.is_some_and(|r| motion::only_errs(r, arm))
     }
 
     /// What is left in sample beside what was `named`.
