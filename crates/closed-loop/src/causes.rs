@@ -152,7 +152,7 @@ pub(crate) fn run<'a>(
 ) -> Result<Outcome<'a>, CloseError> {
     let mut so_far = SoFar::begin(white, folds, inquiry)?;
     for number in 0.. {
-        let last = number == MOST_REFUSALS;
+        let last = number >= MOST_REFUSALS;
         let beside = white.keeping(&so_far.kept);
         let candidates = (inquiry.candidates)();
         let may = so_far.may_be_named(&candidates);
@@ -202,7 +202,7 @@ pub(crate) fn run<'a>(
         {
             continue;
         }
-        // nothing that is still spoken against is named
+        // what is spoken against without another search is not named
         let spoken = if last { case.spoken_against() } else { None };
         let Case {
             described, sought, ..

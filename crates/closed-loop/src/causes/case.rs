@@ -6,7 +6,6 @@ use std::cell::OnceCell;
 
 use block_regression::Estimate;
 
-use crate::causes::Inquiry;
 use crate::causes::description::{Described, InTwo, Part};
 use crate::causes::invariance::{Change, changing};
 use crate::causes::one_star::is_one_star;
@@ -48,14 +47,20 @@ impl<'r, 'a> Case<'r, 'a> {
             so_far.found_terms.extend(terms::turning(level.data));
         }
         let wander = round.searched.wander.as_ref();
-        let usual = inquiry.terms_beside(wander.is_some());
+        let all = (inquiry.terms)();
+        let is_usual = |term: &Empirical| wander.is_none() || (inquiry.beside_slow)(term);
+        let usual: Vec<Empirical> = all.iter().filter(|t| is_usual(t)).cloned().collect();
         let sought = inside.map_or_else(Vec::new, |inside| terms::sought(level, inside, &usual));
         // what follows the path with its error takes the place of that error, and is asked along one without it
         let instead = wander.filter(|_| !round.last && !for_own_path(&so_far.refused));
         let (folds, ways) = (round.folds, inquiry.ways);
         let (described, plain) = if let Some(wander) = instead {
             let frames = wanders::terms(level.data, wander, inside, &level.weight);
-            let terms = in_two(inquiry, &sought, &so_far.found_terms, frames);
+            let all = all.into_iter().map(|term| InTwo {
+                is_in: [is_usual(&term), true],
+                term,
+            });
+            let terms = in_two(all, &sought, &so_far.found_terms, frames);
             let [described, plain] =
                 Described::twice(level, &round.beside, folds, found, terms, ways)?;
             (described, Some(plain))
@@ -147,15 +152,11 @@ impl<'r, 'a> Case<'r, 'a> {
 /// The terms of an outcome beside a slow error of the reference, and of the same under white noise: there frames may turn
 /// with the time, and of what was `sought`, forms of channels alone take part.
 fn in_two(
-    inquiry: &Inquiry<'_>,
+    usual: impl Iterator<Item = InTwo>,
     sought: &[Empirical],
     found: &[Empirical],
     frames: Vec<Empirical>,
 ) -> Vec<InTwo> {
-    let usual = (inquiry.terms)().into_iter().map(|term| InTwo {
-        is_in: [(inquiry.beside_slow)(&term), true],
-        term,
-    });
     let sought = sought.iter().map(|term| InTwo {
         is_in: [true, term.is_of_a_form()],
         term: term.clone(),

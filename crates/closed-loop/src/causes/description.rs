@@ -19,7 +19,7 @@ use crate::follows::{self, Followed};
 use crate::search::empirical::{Empirical, Variable};
 use crate::search::group::Group;
 use crate::search::selection::{FAMILY_ALPHA, Judgement, columns_of, each};
-use crate::search::{Fitted, Found, borrowed, fit};
+use crate::search::{Fitted, Found, borrowed, fit_beside};
 use crate::star::columns::star_columns_of;
 use crate::star::evidence::StarEvidence;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -63,7 +63,8 @@ pub(crate) struct Described {
     pub(crate) channels: Vec<Option<String>>,
     /// Whether each turns whole frames.
     pub(crate) turns: Vec<bool>,
-    /// What having looked for each chosen effect costs, nats ([`costs`]).
+    /// What having looked for each chosen effect among all candidates costs, nats
+    /// ([`crate::search::selection::costs`]): those that were refused since were looked at, too.
     pub(crate) paid: Vec<f64>,
     /// What describes best what is left beside them, and its likelihood after all prices, once it was asked for.
     pub(crate) rest: OnceLock<Option<(f64, Vec<Part>)>>,
@@ -258,7 +259,8 @@ pub(crate) fn offer(
         return Ok(());
     };
     found.candidates.push(Arc::new(term.clone()));
-    found.fitted = fit(evidence, folds, &borrowed(&found.candidates))?;
+    let all = borrowed(&found.candidates);
+    found.fitted = fit_beside(evidence, folds, &all, &found.selection.chosen)?;
     let (fitted, selection) = (&found.fitted, &mut found.selection);
     let cost = vec![terms.len() as f64; fitted.groups.len()];
     let last = fitted.groups.len() - 1;

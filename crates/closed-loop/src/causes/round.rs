@@ -70,7 +70,7 @@ impl<'a> Round<'_, 'a> {
         Some(slow).filter(Slow::is_of_the_stars)
     }
 
-    /// What having looked for each chosen effect costs, nats.
+    /// What having looked for each chosen effect among those that may be named costs, nats.
     pub(super) fn paid(&self) -> Vec<f64> {
         let found = &self.searched.found;
         let cost = costs(&found.fitted.groups, &self.may);

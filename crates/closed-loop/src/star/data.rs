@@ -42,6 +42,8 @@ const NEAR_SHARE: f64 = 1.0 / 16.0;
 const RESTS: f64 = 100.0;
 /// Frames with a smaller share of stars that stayed are unrelated.
 const SAME_SHARE: f64 = 0.1;
+/// Rows of which a run is long.
+const LONG_ROWS: usize = 300_000;
 /// Rows whose centroid errors one thread evaluates.
 const TOGETHER: usize = 4096;
 
@@ -447,6 +449,11 @@ impl StarData {
     /// Where the light falls, as far as is known, px.
     pub(crate) fn landed(&self) -> [&[f64]; 2] {
         self.landed.each_ref().map(Vec::as_slice)
+    }
+
+    /// Whether products of columns take long, and much room.
+    pub(crate) fn is_long(&self) -> bool {
+        self.t_s.len() > LONG_ROWS
     }
 
     /// Whether stars are not known to move.

@@ -33,8 +33,6 @@ use crate::star::reference_noise;
 use crate::star::slow_price::SlowPrice;
 use crate::star::weights;
 
-/// Rows of a long run, whose products take long and much room.
-const LONG_ROWS: usize = 300_000;
 /// Blocks of which those of a long run are made where fewer do.
 const JOINED: usize = 3;
 /// Chunks of frames whose shifts are held at once.
@@ -101,14 +99,9 @@ impl<'a> StarEvidence<'a> {
         }
     }
 
-    /// Whether the products of its columns take much room.
-    pub(crate) fn is_long(&self) -> bool {
-        self.data.t_s.len() > LONG_ROWS
-    }
-
     /// The folds in fewer blocks, where the run is long.
     pub(crate) fn coarser(&self, folds: &Folds) -> Option<Folds> {
-        self.is_long().then(|| folds.coarser(JOINED))
+        self.data.is_long().then(|| folds.coarser(JOINED))
     }
 
     /// Whether the centroids were learned outside each fold.

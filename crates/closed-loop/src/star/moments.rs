@@ -43,10 +43,7 @@ pub(crate) const MOST_BINS: usize = 1200;
 /// be noise of the centroids.
 pub(crate) const MOST_RESTLESS_BINS: usize = 6000;
 
-/// Rows from which on slow columns are not taken at every frame: with a fortieth of them it saves nothing.
-const PACED_ROWS: usize = 300_000;
-
-/// Frames by columns of which every frame's own rotations are kept at most: 100 MB.
+/// Frames by columns of which every frame's moments are kept at most: 100 MB.
 const MOST_BY_FRAME: usize = 100_000_000 / (3 * size_of::<f64>());
 
 /// Blocks at least that one scratch is for.
@@ -67,8 +64,9 @@ pub(crate) enum Keep<'a> {
     Free,
     /// Every frame's own, with this prior precision about each axis: the reference has white noise.
     Drawn([f64; 3]),
-    /// Means over bins; and, where there is room, every frame's own as well.
+    /// Means over bins.
     Bins(&'a Bins),
+    /// The same and, where there is room, the moments of every frame.
     BinsAndFrames(&'a Bins),
 }
 
@@ -97,7 +95,7 @@ struct Block {
     inverse: Vec<Option<Matrix3<f64>>>,
     /// What the log-likelihood of the scalars lacks, nats.
     log_scale: f64,
-    /// Every frame's rotation, where these are kept and no bin is without an attitude.
+    /// M and N of every frame, where these are kept and no bin has too few stars.
     by_frame: Option<ByFrame>,
 }
 
@@ -160,7 +158,8 @@ pub(crate) struct StarMoments {
 impl StarMoments {
     /// One pass over `columns`.
     pub(crate) fn accumulate(columns: &StarColumns<'_>, folds: &Folds, keep: Keep<'_>) -> Self {
-        let long = columns.data.t_s.len() >= PACED_ROWS;
+        // with a fortieth of the rows it saves nothing
+        let long = columns.data.is_long();
         let paced = match keep {
             _ if !long => None,
             Keep::None => Paced::of(columns, &folds.blocks),
@@ -306,10 +305,14 @@ impl StarMoments {
         })
     }
 
-    /// Sums what every hypothesis needs. Two that are scored side by side must find it there: a thread that waits
-    /// for the parts of a sum may take up the other, which would wait for the same sum on the same thread.
-    pub(crate) fn sum_up(&self) {
+    /// Sums what hypotheses need, those in `all` under white noise, too. Two that are scored side by side must find it
+    /// there: a thread that waits for the parts of a sum may take up the other, which would wait for the same sum on the
+    /// same thread.
+    pub(crate) fn sum_up(&self, all: bool) {
         self.rest();
+        if all {
+            self.white_sum();
+        }
     }
 
     /// The sum over the blocks of R.

@@ -213,26 +213,29 @@ fn prepared(
         return Ok(Prepared::Candidates(candidates));
     };
     let part = coarse.thinned(PARTS);
-    let found = match start {
+    let searched = match start {
         Some(start) => {
             let explored = explored(white, &part, candidates.clone(), may, start, None);
             explored.map(|explored| match explored {
-                Explored::White(found) => Some(*found),
-                Explored::Coloured(coloured) => Some(coloured.searched.found),
+                Explored::White(found) => Some(Searched::plain(*found)),
+                Explored::Coloured(coloured) => Some(coloured.searched),
                 Explored::Elsewhere(_) => None,
             })
         }
-        None => search(white, &part, candidates.clone(), may, None).map(Some),
+        None => {
+            let found = search(white, &part, candidates.clone(), may, None);
+            found.map(|found| Some(Searched::plain(found)))
+        }
     };
-    let Ok(Some(found)) = found else {
+    let Ok(Some(searched)) = searched else {
         return Ok(Prepared::Candidates(candidates));
     };
     if let Some(phase) = sight
-        && let Some(to) = first_sight::of_part(white, folds, &found, phase)?
+        && let Some(to) = first_sight::of_part(white, folds, &searched, phase)?
     {
         return Ok(Prepared::Elsewhere(to));
     }
-    Ok(Prepared::Candidates(found.candidates))
+    Ok(Prepared::Candidates(searched.found.candidates))
 }
 
 impl Searched<'_> {
@@ -282,8 +285,6 @@ impl Instead {
         }
         let only = found.only(chosen);
         let moments = white.moments(folds, &only.candidates);
-        // what threads would wait for each other with
-        moments.sum_up();
         let groups = only.groups(&found.fitted.groups, chosen);
         let cost = costs(&found.fitted.groups, may);
         let trial = Trial {
@@ -297,6 +298,7 @@ impl Instead {
             all: None,
             single: false,
         };
+        trial.sum_up();
         let all: Vec<usize> = (0..chosen.len()).collect();
         let turns = all.iter().copied().filter(|&at| turns(&chosen[at]));
         // the first is the choice as it is

@@ -57,6 +57,7 @@ fn not_along_own_path(entry: &mut ConsideredEffect) {
         entry.observable = false;
         entry.detectable = None;
         entry.needed = None;
+        entry.refused = None;
         entry.against = Some(Refusal::OwnPath.why());
     }
 }

@@ -260,21 +260,21 @@ impl<'a> Alone<'a> {
     ) -> Self {
         let turns = chosen.iter().copied();
         let turns = turns.filter(|&g| begun.candidates[g].acts_on_attitude());
-        // what threads would wait for each other with
-        begun.moments.sum_up();
+        let trial = Trial {
+            moments: &begun.moments,
+            folds,
+            precision: white.precision(),
+            variance: fitted.variance_beside(chosen).unwrap_or(1.0),
+            slow_price: white.slow_price,
+            groups: &fitted.groups,
+            cost,
+            all: None,
+            single: true,
+        };
+        trial.sum_up();
         Self {
             turns: turns.collect(),
-            trial: Trial {
-                moments: &begun.moments,
-                folds,
-                precision: white.precision(),
-                variance: fitted.variance_beside(chosen).unwrap_or(1.0),
-                slow_price: white.slow_price,
-                groups: &fitted.groups,
-                cost,
-                all: None,
-                single: true,
-            },
+            trial,
             chosen,
         }
     }

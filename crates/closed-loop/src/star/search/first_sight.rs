@@ -11,6 +11,7 @@ use std::sync::Arc;
 use block_regression::Folds;
 use effects::Candidate;
 
+use super::Searched;
 use crate::declared::OnCentroids;
 use crate::error::CloseError;
 use crate::search::{Choice, Found, polish};
@@ -36,11 +37,13 @@ pub(super) fn of_choice(
 pub(super) fn of_part(
     white: &StarEvidence<'_>,
     folds: &Folds,
-    found: &Found,
+    searched: &Searched<'_>,
     phase: &OnCentroids,
 ) -> Result<Option<Box<Elsewhere>>, CloseError> {
-    let choice = found.choice();
-    if !seems_to_move_it(white, folds, choice, phase)? {
+    let choice = searched.found.choice();
+    // what was fitted beside a slow error is in the unit of its noise
+    let level = searched.evidence.as_ref().unwrap_or(white);
+    if !seems_to_move_it(level, folds, choice, phase)? {
         return Ok(None);
     }
     of_forms(white, folds, choice.candidates, choice.chosen, phase)
@@ -48,12 +51,12 @@ pub(super) fn of_part(
 
 /// Whether a choice, as it is, takes the light so far that it is worth polishing for that.
 pub(super) fn seems_to_move_it(
-    white: &StarEvidence<'_>,
+    level: &StarEvidence<'_>,
     folds: &Folds,
     choice: Choice<'_>,
     phase: &OnCentroids,
 ) -> Result<bool, CloseError> {
-    Ok(choice.moves_light() && takes_light_along(white, folds, choice, phase)?)
+    Ok(choice.moves_light() && takes_light_along(level, folds, choice, phase)?)
 }
 
 /// Where the chosen of `candidates` take the light, fitted as they are.

@@ -81,7 +81,7 @@ impl Forms {
             ..
         } = Begun::on(white, folds, candidates)?;
         let mut forms = Self {
-            moments: (!white.is_long()).then_some(moments),
+            moments: (!white.data.is_long()).then_some(moments),
             candidates: candidates.clone(),
         };
         let found = search(white, folds, candidates, may, Some(plain))?;
@@ -102,7 +102,7 @@ impl Forms {
         let moments = kept.unwrap_or_else(|| white.moments(folds, &all));
         let grams = level.under(&moments);
         // of a long run there is no room for these beside those of other forms
-        self.moments = (!white.is_long()).then_some(moments);
+        self.moments = (!white.data.is_long()).then_some(moments);
         let fitted = fit_grams(level, &grams, folds, &all)?;
         drop(grams);
         search(level, folds, self.candidates.clone(), may, Some(fitted))

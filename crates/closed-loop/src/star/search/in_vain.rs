@@ -39,7 +39,6 @@ pub(crate) fn in_vain(
     let own = chosen.iter().map(|&g| &found.candidates[g]);
     let own: Vec<_> = own.chain(put_forward).cloned().collect();
     let own = Begun::on(white, folds, own)?;
-    own.moments.sum_up();
     let known: Vec<usize> = (0..chosen.len()).collect();
     let new: Vec<usize> = (chosen.len()..own.candidates.len()).collect();
 
@@ -62,6 +61,7 @@ pub(crate) fn in_vain(
         all: None,
         single: false,
     };
+    trial.sum_up();
     let worth = |set: &[usize]| Some(trial.worth(&trial.score(set, &wander.noise)?));
 
     let turns = known.iter().copied();

@@ -62,7 +62,7 @@ pub(super) struct Trial<'a> {
     pub(super) cost: Vec<f64>,
     /// Fits of all groups: what their scatter says of the noise.
     pub(super) all: Option<&'a Fits>,
-    /// Whether it scores one hypothesis: sums of all columns are then not worth their while.
+    /// Whether it scores a few hypotheses of few columns each: white sums of all columns are then not worth their while.
     pub(super) single: bool,
 }
 
@@ -105,10 +105,15 @@ impl Trial<'_> {
         self.moments.rotations(columns, &solution, solution.len())
     }
 
+    /// What is scored side by side has to find there.
+    pub(super) fn sum_up(&self) {
+        self.moments.sum_up(!self.single);
+    }
+
     /// `chosen` at the better of two starts: all that fits taken out, or `noise`.
     pub(super) fn score(&self, chosen: &[usize], noise: &CommonNoise) -> Option<Scored> {
         let columns = self.columns(chosen);
-        self.moments.sum_up();
+        self.sum_up();
         let (out, given) = rayon::join(
             || self.climb(&columns, &self.taken_out(&columns)?),
             || self.climb(&columns, noise),
@@ -230,7 +235,7 @@ impl Trial<'_> {
         scored.loglik - paid_by_slow - effects
     }
 
-    /// What the last of the candidates of `with` adds to `without`.
+    /// What the candidate of `with` in place `at` adds to `without`.
     pub(super) fn judge(
         &self,
         with: &Scored,
