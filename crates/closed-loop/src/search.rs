@@ -121,19 +121,25 @@ impl Fitted {
         }))
     }
 
-    /// Selects, and again where what was chosen leaves much less noise than the priors were weighed against: on other
+    /// Chooses, and again where what was chosen leaves much less noise than the priors were weighed against: on other
     /// fits then.
-    pub(crate) fn selected(
+    pub(crate) fn chosen(
         &self,
         folds: &Folds,
         candidates: &[Arc<dyn Candidate>],
         may: &[bool],
-    ) -> Result<(Selection, Option<Self>), CloseError> {
-        let select = |f: &Self| f.trials(&costs(&f.groups, may)).select(may);
-        let selection = select(self);
-        let quieter = self.quieter(folds, &borrowed(candidates), &selection.chosen)?;
-        let selection = quieter.as_ref().map_or(selection, select);
-        Ok((selection, quieter))
+    ) -> Result<(Vec<usize>, Option<Self>), CloseError> {
+        let choose = |f: &Self| f.trials(&costs(&f.groups, may)).choose(may);
+        let chosen = choose(self);
+        let quieter = self.quieter(folds, &borrowed(candidates), &chosen)?;
+        let chosen = quieter.as_ref().map_or(chosen, choose);
+        Ok((chosen, quieter))
+    }
+
+    /// What was `chosen` of those that `may` be, with the standing of all beside it.
+    pub(crate) fn selection(&self, chosen: Vec<usize>, may: &[bool]) -> Selection {
+        let judged = self.trials(&costs(&self.groups, may)).judged(&chosen);
+        Selection { chosen, judged }
     }
 }
 
@@ -468,25 +474,17 @@ pub(crate) fn search(
             Some(fitted) => fitted,
             None => fit(evidence, folds, &borrowed(&candidates))?,
         };
-        let (selection, quieter) = fitted.selected(folds, &candidates, may)?;
+        let (chosen, quieter) = fitted.chosen(folds, &candidates, may)?;
         let fitted = quieter.unwrap_or(fitted);
-        let settled = selection.chosen == before || round == ROUNDS;
-        if selection.chosen.is_empty() || settled {
+        let settled = chosen.is_empty() || chosen == before || round == ROUNDS;
+        if settled || !polish(evidence, folds, &mut candidates, &fitted, &chosen)? {
             return Ok(Found {
+                selection: fitted.selection(chosen, may),
                 candidates,
                 fitted,
-                selection,
             });
         }
-        let changed = polish(evidence, folds, &mut candidates, &fitted, &selection.chosen)?;
-        if !changed {
-            return Ok(Found {
-                candidates,
-                fitted,
-                selection,
-            });
-        }
-        before.clone_from(&selection.chosen);
+        before = chosen;
     }
     Err(CloseError::Singular)
 }

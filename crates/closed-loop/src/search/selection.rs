@@ -178,8 +178,8 @@ pub(crate) struct Trials<'a> {
 }
 
 impl Trials<'_> {
-    /// Runs the search: groups that `may` be chosen are added while one stands, each at its `cost`.
-    pub(crate) fn select(&self, may: &[bool]) -> Selection {
+    /// Runs the search: groups that `may` be chosen are added while one stands, each at its `cost`. In the order added.
+    pub(crate) fn choose(&self, may: &[bool]) -> Vec<usize> {
         let mut chosen: Vec<usize> = Vec::new();
         // Each round adds one or stops; a group dropped by the backward check may
         // not return, so the search ends.
@@ -207,8 +207,7 @@ impl Trials<'_> {
             exchanges -= 1;
             chosen = better;
         }
-        let judged = self.judged(&chosen);
-        Selection { chosen, judged }
+        chosen
     }
 
     /// All groups that may be tried beside `chosen` and gain out of fold, the largest gain after the price of

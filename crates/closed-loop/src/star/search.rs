@@ -126,11 +126,11 @@ pub(crate) fn attempt<'a>(
     let Some(start) = start else {
         let fitted = fit(white, folds, &borrowed(&candidates))?;
         if let Some(phase) = sight {
-            let (selection, quieter) = fitted.selected(folds, &candidates, may)?;
+            let (chosen, quieter) = fitted.chosen(folds, &candidates, may)?;
             let choice = Choice {
                 candidates: &candidates,
                 fitted: quieter.as_ref().unwrap_or(&fitted),
-                chosen: &selection.chosen,
+                chosen: &chosen,
             };
             if let Some(to) = first_sight::of_choice(white, folds, choice, phase)? {
                 return Ok(Attempt::Elsewhere(to));

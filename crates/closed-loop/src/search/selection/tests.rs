@@ -136,7 +136,7 @@ fn two_that_hide_each_other_are_found() {
         tried(&hiding(size, &folds), &groups, |trials, may| {
             let alone = trials.judged(&[]);
             assert!(alone.iter().all(|j| !j.stands()), "{alone:?}");
-            trials.select(may).chosen
+            trials.choose(may)
         })
     };
     assert_eq!(chosen(12.0 / (rows as f64).sqrt()).len(), 2);
@@ -174,7 +174,7 @@ fn another_form_beside_another_effect_is_found() {
         tried(&on_a_ramp(seed), &groups, |trials, may| {
             let first = &trials.tried(may, &[])[0];
             assert!(first.group < 5, "{seed}: step {}", first.group);
-            let mut chosen = trials.select(may).chosen;
+            let mut chosen = trials.choose(may);
             chosen.sort_unstable();
             chosen == [7, 9]
         })
@@ -209,7 +209,7 @@ fn two_effects_are_found_in_the_place_of_one() {
     let found = (0..10).filter(|&seed| {
         tried(&between(0.7, seed), &groups, |trials, may| {
             assert_eq!(trials.tried(may, &[])[0].group, 2);
-            let mut chosen = trials.select(may).chosen;
+            let mut chosen = trials.choose(may);
             chosen.sort_unstable();
             chosen == [0, 1]
         })

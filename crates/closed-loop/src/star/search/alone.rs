@@ -137,16 +137,15 @@ pub(super) fn without_slow(
     // what was chosen before, in the forms that it has now, by itself
     let mut known: Option<Scored> = None;
     for _ in 0..ROUNDS {
-        let (selection, quieter) = begun.plain.selected(folds, &begun.candidates, may)?;
+        let (chosen, quieter) = begun.plain.chosen(folds, &begun.candidates, may)?;
         let fitted = quieter.as_ref().unwrap_or(&begun.plain);
-        let chosen = &selection.chosen;
         let turns = |g: &&usize| begun.candidates[**g].acts_on_attitude();
         if chosen.is_empty() || chosen.iter().filter(turns).count() > MOST_SETS_OF {
             break;
         }
         let cost = costs(&fitted.groups, may);
         if before.is_empty()
-            && Alone::new(white, folds, &begun, fitted, chosen, cost.clone())
+            && Alone::new(white, folds, &begun, fitted, &chosen, cost.clone())
                 .is_hopeless(fitted, &start)
         {
             break;
@@ -154,7 +153,7 @@ pub(super) fn without_slow(
         let choice = Choice {
             candidates: &begun.candidates,
             fitted,
-            chosen,
+            chosen: &chosen,
         };
         let sight = match sight.take() {
             Some(phase) if first_sight::seems_to_move_it(white, folds, choice, phase)? => {
@@ -163,26 +162,27 @@ pub(super) fn without_slow(
             _ => None,
         };
         let mut polished = begun.candidates.clone();
-        let changed = *chosen != before && {
+        let changed = chosen != before && {
             let on_frames = OnFrames::of(white, &begun.moments);
-            polish(&on_frames, folds, &mut polished, fitted, chosen)?
+            polish(&on_frames, folds, &mut polished, fitted, &chosen)?
         };
         if let Some(phase) = sight
-            && let Some(to) = first_sight::of_forms(white, folds, &polished, chosen, phase)?
+            && let Some(to) = first_sight::of_forms(white, folds, &polished, &chosen, phase)?
         {
             return Ok(Outcome::Elsewhere(to));
         }
         if !changed {
-            let alone = Alone::new(white, folds, &begun, fitted, chosen, cost);
-            let known = known.filter(|_| *chosen == before);
+            let alone = Alone::new(white, folds, &begun, fitted, &chosen, cost);
+            let known = known.filter(|_| chosen == before);
             let whole = known.or_else(|| alone.held_against(&start)?.likely());
             if !whole.is_some_and(|whole| alone.stands(&whole, &start)) {
                 break;
             }
+            let fitted = quieter.unwrap_or(begun.plain);
             return Ok(Outcome::Settled(Box::new(Found {
                 candidates: begun.candidates,
-                fitted: quieter.unwrap_or(begun.plain),
-                selection,
+                selection: fitted.selection(chosen, may),
+                fitted,
             })));
         }
         // by themselves first, which costs little
@@ -197,7 +197,7 @@ pub(super) fn without_slow(
         if known.is_none() {
             break;
         }
-        before.clone_from(chosen);
+        before = chosen;
         drop(quieter);
         begun = begun.in_forms(white, folds, polished)?;
     }
@@ -216,10 +216,10 @@ pub(super) fn is_hopeless(
     if begun.hopeless {
         return Ok(true);
     }
-    let (selection, quieter) = begun.plain.selected(folds, &begun.candidates, may)?;
+    let (chosen, quieter) = begun.plain.chosen(folds, &begun.candidates, may)?;
     let fitted = quieter.as_ref().unwrap_or(&begun.plain);
     let cost = costs(&fitted.groups, may);
-    let alone = Alone::new(white, folds, begun, fitted, &selection.chosen, cost);
+    let alone = Alone::new(white, folds, begun, fitted, &chosen, cost);
     Ok(alone.is_hopeless(fitted, noise))
 }
 
