@@ -307,18 +307,21 @@ impl Fits {
         Self::new(&self.grams, folds, &self.layout, variance)
     }
 
-    /// Noise variance of a scalar where no candidate is in the model, from a first guess.
-    /// `total`: the sum of all blocks, and its scalars.
-    pub fn noise_alone(
+    /// Noise variance of a scalar beside the candidate columns `set` alone, as far as they show, where priors are weighed
+    /// against `variance`. `total`: the sum of all blocks, and its scalars.
+    pub fn noise_beside(
         (gram, scalars): &(DMatrix<f64>, f64),
         layout: &Layout,
-        guess: f64,
+        set: &[usize],
+        variance: f64,
     ) -> Option<f64> {
         let n = layout.nuisance_precision.nrows();
-        let kept: Vec<usize> = (0..n).chain(n + layout.candidates..gram.ncols()).collect();
+        let residuals = n + layout.candidates..gram.ncols();
+        let candidates = set.iter().map(|c| n + c);
+        let kept: Vec<usize> = (0..n).chain(candidates).chain(residuals).collect();
         let alone = gram.select_columns(&kept).select_rows(&kept);
         let layout = Layout {
-            candidates: 0,
+            candidates: set.len(),
             ..layout.clone()
         };
         let alone = BlockGrams {
@@ -328,7 +331,9 @@ impl Fits {
             known: None,
             by_source: Vec::new(),
         };
-        Self::whole(&alone, &layout, guess)?.variance(&[])
+        let fits = Self::whole(&alone, &layout, variance)?;
+        let shown: Vec<usize> = (0..set.len()).filter(|&c| fits.shows(c)).collect();
+        fits.variance(&shown)
     }
 
     /// As [`new`](Self::new), on all data alone: for what asks nothing of folds and blocks. Neither

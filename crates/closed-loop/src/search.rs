@@ -108,7 +108,7 @@ impl Fitted {
         chosen: &[usize],
     ) -> Result<Option<Self>, CloseError> {
         let left = self.variance_beside(chosen);
-        let Some(variance) = left.filter(|v| *v > 0.0 && LOUDER * v < self.variance) else {
+        let Some(variance) = left.filter(|v| is_much_less(*v, self.variance)) else {
             return Ok(None);
         };
         let fits = self.fits.reweighed(folds, variance);
@@ -143,6 +143,11 @@ impl Fitted {
     }
 }
 
+/// Whether a noise variance is so much less than another that priors are to be weighed against it.
+fn is_much_less(variance: f64, than: f64) -> bool {
+    variance > 0.0 && LOUDER * variance < than
+}
+
 /// Accumulates and eliminates; the noise variance that weighs the priors is
 /// estimated, never taken as declared.
 pub(crate) fn fit(
@@ -165,7 +170,8 @@ pub(crate) fn fit_beside(
     candidates: &[&dyn Candidate],
     chosen: &[usize],
 ) -> Result<Fitted, CloseError> {
-    fit(evidence, folds, candidates)?.beside(folds, candidates, chosen)
+    let grams = evidence.grams(folds, candidates);
+    fit_grams_beside(evidence, &grams, folds, candidates, chosen)
 }
 
 /// As [`fit`], on columns that are there already.
@@ -186,9 +192,20 @@ pub(crate) fn fit_grams(
     folds: &Folds,
     candidates: &[&dyn Candidate],
 ) -> Result<Fitted, CloseError> {
+    fit_grams_beside(evidence, grams, folds, candidates, &[])
+}
+
+/// As [`fit_beside`], on normal equations that are there already.
+pub(crate) fn fit_grams_beside(
+    evidence: &dyn Evidence,
+    grams: &BlockGrams,
+    folds: &Folds,
+    candidates: &[&dyn Candidate],
+    chosen: &[usize],
+) -> Result<Fitted, CloseError> {
     let sums = grams.by_fold(folds);
     let of = |layout: &Layout, v| Fits::of(grams, &sums, folds, layout, v);
-    fitted(evidence, candidates, &sums.all, grams.log_scale, of)
+    fitted(evidence, candidates, chosen, &sums.all, grams.log_scale, of)
 }
 
 /// As [`fit`], for what asks nothing of folds and blocks ([`Fits::whole`]).
@@ -199,23 +216,40 @@ pub(crate) fn fit_whole(
 ) -> Result<Fitted, CloseError> {
     let grams = evidence.grams_in_all(folds, candidates);
     let of = |layout: &Layout, v| Fits::whole(&grams, layout, v);
-    fitted(evidence, candidates, &grams.total(), grams.log_scale, of)
+    fitted(
+        evidence,
+        candidates,
+        &[],
+        &grams.total(),
+        grams.log_scale,
+        of,
+    )
 }
 
 /// The fits that `of` makes of normal equations whose sum is `total`: by the columns, and the variance that priors are
-/// weighed against.
+/// weighed against, that beside `chosen` where it is much less than with no candidate.
 fn fitted(
     evidence: &dyn Evidence,
     candidates: &[&dyn Candidate],
+    chosen: &[usize],
     total: &(DMatrix<f64>, f64),
     log_scale: f64,
     of: impl FnOnce(&Layout, f64) -> Option<Fits>,
 ) -> Result<Fitted, CloseError> {
     let layout = layout_of(evidence, candidates);
     let guess = evidence.variance_guess();
-    let variance = Fits::noise_alone(total, &layout, guess)
-        .unwrap_or(guess)
-        .max(f64::MIN_POSITIVE);
+    let alone = Fits::noise_beside(total, &layout, &[], guess);
+    let alone = alone.unwrap_or(guess).max(f64::MIN_POSITIVE);
+    let beside = || {
+        let columns = |&g: &usize| {
+            let first: usize = candidates[..g].iter().map(|c| c.coefficients().len()).sum();
+            first..first + candidates[g].coefficients().len()
+        };
+        let own: Vec<usize> = chosen.iter().flat_map(columns).collect();
+        Fits::noise_beside(total, &layout, &own, alone)
+    };
+    let beside = (!chosen.is_empty()).then(beside).flatten();
+    let variance = beside.filter(|v| is_much_less(*v, alone)).unwrap_or(alone);
     let fits = of(&layout, variance).ok_or(CloseError::Singular)?;
     Ok(Fitted {
         groups: grouped(&fits, candidates),

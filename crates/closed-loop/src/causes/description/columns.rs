@@ -13,7 +13,7 @@ use crate::causes::description::{Described, Term};
 use crate::error::CloseError;
 use crate::search::empirical::Empirical;
 use crate::search::selection::costs;
-use crate::search::{Found, fit_grams};
+use crate::search::{Found, fit_grams_beside};
 use crate::star::evidence::StarEvidence;
 
 /// A term, and in which of two descriptions it is ([`Described::twice`]).
@@ -95,8 +95,7 @@ impl<'f> Columns<'f> {
         let n = self.chosen.len();
         let own: Vec<usize> = (0..n).collect();
         let all = self.candidates();
-        let fitted = fit_grams(evidence, grams, folds, &all)?;
-        let fitted = fitted.beside(folds, &all, &own)?;
+        let fitted = fit_grams_beside(evidence, grams, folds, &all, &own)?;
         let mut first = self.changes().start;
         let mut changes = vec![Vec::new(); n];
         for (k, changing) in self.changing.iter().enumerate() {

@@ -19,7 +19,7 @@ use super::{Searched, Wander};
 use crate::error::CloseError;
 use crate::evidence::Evidence;
 use crate::search::selection::{Judgement, Selection, costs, price};
-use crate::search::{Fitted, Found, borrowed, fit_grams, polish, without};
+use crate::search::{Fitted, Found, borrowed, fit_grams_beside, polish, without};
 use crate::star::evidence::StarEvidence;
 use crate::star::moments::StarMoments;
 
@@ -159,7 +159,7 @@ impl<'s> Search<'s, '_> {
         let level = self.white.with_noise(&self.noise);
         let grams = level.under(moments);
         let candidates = borrowed(&self.candidates);
-        self.beside(fit_grams(&level, &grams, self.folds, &candidates)?)
+        fit_grams_beside(&level, &grams, self.folds, &candidates, &self.chosen)
     }
 
     fn trial<'t>(
