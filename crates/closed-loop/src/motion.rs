@@ -58,7 +58,11 @@ const THINNED: [f64; 4] = [16.0, 8.0, 4.0, 2.0];
 
 /// Whether a series of attitudes tells how the tracker moved between them.
 fn resolved(t_s: &[f64], q: &[UnitQuaternion<f64>], arm: f64) -> bool {
-    let error = prediction_error(t_s, q, arm, |_, [_, next]| *next);
+    is_small(prediction_error(t_s, q, arm, |_, [_, next]| *next))
+}
+
+/// Whether there is a prediction error, and it is one at which what is predicted is told.
+fn is_small(error: Option<f64>) -> bool {
     error.is_some_and(|error| error <= RESOLVED * RESOLVED)
 }
 
@@ -66,7 +70,7 @@ fn resolved(t_s: &[f64], q: &[UnitQuaternion<f64>], arm: f64) -> bool {
 /// s^2 a step has 2 s^2 and the error 20/36 s^2. What such a walk seems to accelerate by goes with itself, where
 /// the path is one through attitudes ([`Around::by_rates`]).
 pub(crate) fn accelerates(series: &AttitudeSeries, arm: f64) -> bool {
-    error_of_change(series, arm).is_some_and(|error| error <= RESOLVED * RESOLVED)
+    is_small(error_of_change(series, arm))
 }
 
 /// Whether all that it seems to accelerate by is its own error: see [`ERRORS_ALONE`].
@@ -74,6 +78,7 @@ pub(crate) fn only_errs(series: &AttitudeSeries, arm: f64) -> bool {
     error_of_change(series, arm).is_some_and(|error| error > ERRORS_ALONE)
 }
 
+/// [`prediction_error`] over second differences.
 fn error_of_change(series: &AttitudeSeries, arm: f64) -> Option<f64> {
     let change = |[before, after]: [f64; 2], [last, next]: [&Vector3<f64>; 2]| {
         2.0 * (last * after - next * before) / (after - before)
@@ -107,7 +112,8 @@ fn prediction_error(
         count += 1;
     }
     // what does not move at all is predicted
-    (count > 0).then(|| if error > 0.0 { error / step } else { 0.0 })
+    let still = error <= 0.0;
+    (count > 0).then(|| if still { 0.0 } else { error / step })
 }
 
 /// What values at four places weigh in the cubic through them, at 0: Lagrange's polynomials.
