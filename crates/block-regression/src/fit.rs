@@ -324,14 +324,7 @@ impl Fits {
             candidates: set.len(),
             ..layout.clone()
         };
-        let alone = BlockGrams {
-            gram: vec![Gram::whole(alone)],
-            scalars: vec![*scalars],
-            log_scale: 0.0,
-            known: None,
-            by_source: Vec::new(),
-        };
-        let fits = Self::whole(&alone, &layout, variance)?;
+        let fits = Self::whole(&BlockGrams::whole(alone, *scalars), &layout, variance)?;
         let shown: Vec<usize> = (0..set.len()).filter(|&c| fits.shows(c)).collect();
         fits.variance(&shown)
     }

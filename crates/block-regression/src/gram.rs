@@ -231,6 +231,17 @@ fn sum<'a>(
 }
 
 impl BlockGrams {
+    /// One block that is there already, in the unit of the measurements.
+    pub fn whole(gram: impl Into<Arc<DMatrix<f64>>>, scalars: f64) -> Self {
+        Self {
+            gram: vec![Gram::whole(gram)],
+            scalars: vec![scalars],
+            log_scale: 0.0,
+            known: None,
+            by_source: Vec::new(),
+        }
+    }
+
     /// One pass over `design`, blocks in parallel.
     pub fn accumulate(design: &dyn Design, folds: &Folds) -> Self {
         let width = design.width();
@@ -282,11 +293,8 @@ impl BlockGrams {
     pub fn in_all(&self, folds: &Folds) -> Self {
         let (gram, scalars) = self.by_fold(folds).all;
         Self {
-            gram: vec![Gram::whole(gram)],
-            scalars: vec![scalars],
             log_scale: self.log_scale,
-            known: None,
-            by_source: Vec::new(),
+            ..Self::whole(gram, scalars)
         }
     }
 

@@ -99,10 +99,15 @@ pub(crate) struct Inquiry<'a> {
 }
 
 impl Inquiry<'_> {
-    /// Terms that describe, beside a slow error of the reference or not.
+    /// Whether a term describes, beside a slow error of the reference or not.
+    fn describes(&self, term: &Empirical, slow: bool) -> bool {
+        !slow || (self.beside_slow)(term)
+    }
+
+    /// Terms that do.
     fn terms_beside(&self, slow: bool) -> Vec<Empirical> {
         let mut terms = (self.terms)();
-        terms.retain(|term| !slow || (self.beside_slow)(term));
+        terms.retain(|term| self.describes(term, slow));
         terms
     }
 }

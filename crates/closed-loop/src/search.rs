@@ -9,6 +9,7 @@
 //! Source: variable projection (Golub & Pereyra 1973): linear amplitudes are
 //! solved for at every trial value of the non-linear ones.
 
+use std::ops::Deref;
 use std::sync::Arc;
 
 use block_regression::{Estimate, Folds};
@@ -300,7 +301,10 @@ pub(crate) fn joined(
 }
 
 /// The place of the first column of candidate `g` among those of all.
-pub(crate) fn first_column(candidates: &[Arc<dyn Candidate>], g: usize) -> usize {
+pub(crate) fn first_column<'c, C>(candidates: &[C], g: usize) -> usize
+where
+    C: Deref<Target = dyn Candidate + 'c>,
+{
     candidates[..g].iter().map(|c| c.coefficients().len()).sum()
 }
 

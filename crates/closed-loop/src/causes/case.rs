@@ -48,7 +48,7 @@ impl<'r, 'a> Case<'r, 'a> {
         }
         let wander = round.searched.wander.as_ref();
         let all = (inquiry.terms)();
-        let is_usual = |term: &Empirical| wander.is_none() || (inquiry.beside_slow)(term);
+        let is_usual = |term: &Empirical| inquiry.describes(term, wander.is_some());
         let usual: Vec<Empirical> = all.iter().filter(|t| is_usual(t)).cloned().collect();
         let sought = inside.map_or_else(Vec::new, |inside| terms::sought(level, inside, &usual));
         // what follows the path with its error takes the place of that error, and is asked along one without it

@@ -63,7 +63,7 @@ impl Inner<'_> {
 }
 
 /// An effect at its estimate, times how it changes: columns of one way behind those of another.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Changing<'a> {
     inner: Inner<'a>,
     values: Vec<f64>,

@@ -96,31 +96,28 @@ impl Described {
         terms: Vec<InTwo>,
         ways: &[Way],
     ) -> Result<[Self; 2], CloseError> {
-        let of = |which: usize| {
-            let own = terms.iter().filter(move |t| t.is_in[which]);
-            own.map(|t| t.term.clone()).collect::<Vec<_>>()
-        };
-        // where the reference has white noise, white evidence is another pass
-        if level.noise.is_none() || white.drawn.is_some() {
-            let plain = Self::new(white, folds, found, of(1), &[])?;
-            return Ok([Self::new(level, folds, found, of(0), ways)?, plain]);
-        }
         let coarse = level.coarser(folds);
         let folds = coarse.as_ref().unwrap_or(folds);
-        let all = terms.iter().map(|t| t.term.clone()).collect();
-        let all = Columns::of(found, all, ways);
-        let moments = level.moments(folds, &all.candidates());
+        let (terms, is_in): (_, Vec<_>) = terms.into_iter().map(|t| (t.term, t.is_in)).unzip();
+        let all = Columns::of(found, terms, ways);
+        // where the reference has white noise, white evidence is another pass
+        let shared = level.noise.is_some() && white.drawn.is_none();
+        let moments = shared.then(|| level.moments(folds, &all.candidates()));
         let first = level.precision().nrows();
-        let own = all.in_two(&terms).map(|own| {
-            let own = own.into_iter().map(|c| first + c);
-            let residuals = moments.width() - level.residual_columns()..moments.width();
-            (0..first).chain(own).chain(residuals).collect::<Vec<_>>()
-        });
-        let of_these = |evidence: &StarEvidence<'_>, which: usize, ways: &[Way]| {
-            let grams = evidence.under_of(&moments, &own[which]);
-            Columns::of(found, of(which), ways).described(evidence, folds, &grams)
+        let of_part = |evidence: &StarEvidence<'_>, which: usize| {
+            let (part, places) = all.part(&is_in, which);
+            let grams = match &moments {
+                Some(moments) => {
+                    let residuals = moments.width() - level.residual_columns()..moments.width();
+                    let own = places.into_iter().map(|c| first + c);
+                    let own: Vec<usize> = (0..first).chain(own).chain(residuals).collect();
+                    evidence.under_of(moments, &own)
+                }
+                None => evidence.grams(folds, &part.candidates()),
+            };
+            part.described(evidence, folds, &grams)
         };
-        Ok([of_these(level, 0, ways)?, of_these(white, 1, &[])?])
+        Ok([of_part(level, 0)?, of_part(white, 1)?])
     }
 }
 

@@ -13,7 +13,7 @@ use nalgebra::DMatrix;
 
 use super::group::Group;
 use super::selection::{Selection, Trials, columns_of, costs};
-use super::{borrowed, family};
+use super::{borrowed, family, first_column};
 use crate::error::CloseError;
 use crate::evidence::Evidence;
 
@@ -218,7 +218,7 @@ fn fitted(
     let alone = alone.unwrap_or(guess).max(f64::MIN_POSITIVE);
     let beside = || {
         let columns = |&g: &usize| {
-            let first: usize = candidates[..g].iter().map(|c| c.coefficients().len()).sum();
+            let first = first_column(candidates, g);
             first..first + candidates[g].coefficients().len()
         };
         let own: Vec<usize> = chosen.iter().flat_map(columns).collect();

@@ -253,13 +253,7 @@ impl StarMoments {
 
     /// Their sum, as one block.
     fn white_as_one(&self, sum: DMatrix<f64>) -> BlockGrams {
-        BlockGrams {
-            gram: vec![Gram::whole(sum)],
-            scalars: vec![self.blocks.iter().map(|b| b.scalars).sum()],
-            log_scale: 0.0,
-            known: None,
-            by_source: Vec::new(),
-        }
+        BlockGrams::whole(sum, self.blocks.iter().map(|b| b.scalars).sum())
     }
 
     /// The sum over the blocks of the products under white noise.
@@ -379,12 +373,10 @@ impl StarMoments {
         for e in innovations {
             gram.gemm(1.0, &e.transpose(), &e, 1.0);
         }
+        let scalars = self.blocks.iter().map(Block::solved_scalars).sum();
         BlockGrams {
-            gram: vec![Gram::whole(gram)],
-            scalars: vec![self.blocks.iter().map(Block::solved_scalars).sum()],
             log_scale,
-            known: None,
-            by_source: Vec::new(),
+            ..BlockGrams::whole(gram, scalars)
         }
     }
 

@@ -60,22 +60,31 @@ impl<'f> Columns<'f> {
         all
     }
 
-    /// Of these candidates the columns that each of two descriptions has whose terms `terms` are.
-    pub(super) fn in_two(&self, terms: &[InTwo]) -> [Vec<usize>; 2] {
+    /// Those of one of two descriptions, of which the first alone has changes, and where its columns stand among these.
+    pub(super) fn part(&self, is_in: &[[bool; 2]], which: usize) -> (Self, Vec<usize>) {
         let changes = self.changes();
+        let (changing, before) = match which {
+            0 => (self.changing.clone(), changes.end),
+            _ => (Vec::new(), changes.start),
+        };
         let mut at = changes.end;
-        let mut own = [
-            (0..at).collect(),
-            (0..changes.start).collect::<Vec<usize>>(),
-        ];
-        for term in terms {
-            let end = at + term.term.coefficients().len();
-            for (own, _) in own.iter_mut().zip(term.is_in).filter(|(_, is_in)| *is_in) {
-                own.extend(at..end);
+        let mut places: Vec<usize> = (0..before).collect();
+        let mut terms = Vec::new();
+        for (term, is_in) in self.terms.iter().zip(is_in) {
+            let end = at + term.coefficients().len();
+            if is_in[which] {
+                places.extend(at..end);
+                terms.push(term.clone());
             }
             at = end;
         }
-        own
+        let part = Self {
+            found: self.found,
+            chosen: self.chosen.clone(),
+            changing,
+            terms,
+        };
+        (part, places)
     }
 
     /// Where the columns of the changes stand.

@@ -155,7 +155,7 @@ pub(super) fn without_slow(
             fitted,
             chosen: &chosen,
         };
-        let sight = match sight.take() {
+        let moved = match sight.take() {
             Some(phase) if first_sight::seems_to_move_it(white, folds, choice, phase)? => {
                 Some(phase)
             }
@@ -166,7 +166,7 @@ pub(super) fn without_slow(
             let on_frames = OnFrames::of(white, &begun.moments);
             polish(&on_frames, folds, &mut polished, fitted, &chosen)?
         };
-        if let Some(phase) = sight
+        if let Some(phase) = moved
             && let Some(to) = first_sight::of_forms(white, folds, &polished, &chosen, phase)?
         {
             return Ok(Outcome::Elsewhere(to));
