@@ -324,7 +324,7 @@ impl Fits {
             candidates: set.len(),
             ..layout.clone()
         };
-        let fits = Self::whole(&BlockGrams::whole(alone, *scalars), &layout, variance)?;
+        let fits = Self::whole(&BlockGrams::whole(&alone, *scalars), &layout, variance)?;
         let shown: Vec<usize> = (0..set.len()).filter(|&c| fits.shows(c)).collect();
         fits.variance(&shown)
     }

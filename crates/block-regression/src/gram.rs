@@ -19,6 +19,7 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use crate::folds::Folds;
+use crate::symmetric::Symmetric;
 
 /// Scalars handed to the matrix product at once: large enough that the product
 /// dominates, small enough to stay in cache.
@@ -55,13 +56,13 @@ impl Design for DMatrix<f64> {
 #[derive(Clone, Debug)]
 pub struct Gram {
     weight: f64,
-    shared: Arc<DMatrix<f64>>,
+    shared: Arc<Symmetric>,
     rows: Arc<DMatrix<f64>>,
 }
 
 impl Gram {
-    /// `weight * shared + rows^T rows`; `shared` is symmetric, width x width, and `rows` any number x width.
-    pub fn new(weight: f64, shared: Arc<DMatrix<f64>>, rows: DMatrix<f64>) -> Self {
+    /// `weight * shared + rows^T rows`; `shared` is width x width, and `rows` any number x width.
+    pub fn new(weight: f64, shared: Arc<Symmetric>, rows: DMatrix<f64>) -> Self {
         Self {
             weight,
             shared,
@@ -69,15 +70,15 @@ impl Gram {
         }
     }
 
-    /// A matrix as it is: symmetric, width x width.
-    pub fn whole(shared: impl Into<Arc<DMatrix<f64>>>) -> Self {
+    /// A matrix as it is, width x width.
+    pub fn whole(shared: impl Into<Arc<Symmetric>>) -> Self {
         let shared = shared.into();
-        let rows = DMatrix::zeros(0, shared.ncols());
+        let rows = DMatrix::zeros(0, shared.size());
         Self::new(1.0, shared, rows)
     }
 
     pub(crate) fn at(&self, i: usize, j: usize) -> f64 {
-        self.weight * self.shared[(i, j)] + self.rows.column(i).dot(&self.rows.column(j))
+        self.weight * self.shared.at(i, j) + self.rows.column(i).dot(&self.rows.column(j))
     }
 
     /// Products of each of `columns` with column `last` less `beta` times the columns.
@@ -93,10 +94,9 @@ impl Gram {
             left.axpy(-b, &self.rows.column(c), 1.0);
         }
         for (&row, out) in columns.iter().zip(out.iter_mut()) {
-            // the matrix is symmetric: a column lies together
-            let own = self.shared.column(row);
+            let own = |c: usize| self.shared.at(row, c);
             let each = columns.iter().zip(beta.iter());
-            let shared = own[last] - each.map(|(&c, b)| own[c] * b).sum::<f64>();
+            let shared = own(last) - each.map(|(&c, b)| own(c) * b).sum::<f64>();
             *out = self.weight * shared + self.rows.column(row).dot(&left);
         }
     }
@@ -104,21 +104,14 @@ impl Gram {
     /// `z^T G z`.
     pub(crate) fn quadratic(&self, z: &DVector<f64>) -> f64 {
         let own = (&*self.rows * z).norm_squared();
-        self.weight * z.dot(&(&*self.shared * z)) + own
+        self.weight * self.shared.quadratic(z) + own
     }
 
     /// `G_n W - 2 G_nc` with the first columns n and the columns c.
     pub(crate) fn inner(&self, w: &DMatrix<f64>, columns: &[usize]) -> DMatrix<f64> {
         let n = w.nrows();
-        let mut out = DMatrix::zeros(n, columns.len());
-        for (&column, mut out) in columns.iter().zip(out.column_iter_mut()) {
-            out.axpy(
-                -2.0 * self.weight,
-                &self.shared.column(column).rows(0, n),
-                0.0,
-            );
-        }
-        out.gemm(self.weight, &self.shared.view((0, 0), (n, n)), w, 1.0);
+        let mut out = self.shared.first_rows(n, columns, -2.0 * self.weight);
+        self.shared.add_first_times(self.weight, w, &mut out);
         if self.rows.nrows() > 0 {
             let first = self.rows.columns(0, n);
             let mut left = self.rows.select_columns(columns);
@@ -131,9 +124,7 @@ impl Gram {
     /// Adds what lies below the diagonal, M only where it is not `known`.
     fn add_to(&self, sum: &mut DMatrix<f64>, known: bool) {
         if !known {
-            for (sum, own) in sum.iter_mut().zip(self.shared.iter()) {
-                *sum += self.weight * own;
-            }
+            self.shared.add_lower_to(self.weight, sum);
         }
         if self.rows.nrows() > 0 {
             add_products(1.0, &self.rows, sum);
@@ -231,10 +222,10 @@ fn sum<'a>(
 }
 
 impl BlockGrams {
-    /// One block that is there already, in the unit of the measurements.
-    pub fn whole(gram: impl Into<Arc<DMatrix<f64>>>, scalars: f64) -> Self {
+    /// One block that is there already, in the unit of the measurements: by what lies on its diagonal and below.
+    pub fn whole(gram: &DMatrix<f64>, scalars: f64) -> Self {
         Self {
-            gram: vec![Gram::whole(gram)],
+            gram: vec![Gram::whole(Symmetric::of_lower(gram))],
             scalars: vec![scalars],
             log_scale: 0.0,
             known: None,
@@ -246,14 +237,14 @@ impl BlockGrams {
     pub fn accumulate(design: &dyn Design, folds: &Folds) -> Self {
         let width = design.width();
         let blocks = folds.blocks.par_iter().map(|block| {
-            let mut gram = DMatrix::zeros(width, width);
+            let mut gram = Symmetric::zeros(width);
             let mut rows = DMatrix::zeros(0, width);
             let mut scalars = 0;
             let mut at = block.start;
             while at < block.end {
                 let end = (at + CHUNK_FRAMES).min(block.end);
                 scalars += design.fill(at..end, &mut rows);
-                gram.gemm(1.0, &rows.transpose(), &rows, 1.0);
+                gram.add_products(1.0, &rows);
                 at = end;
             }
             (Gram::whole(gram), scalars as f64)
@@ -269,7 +260,7 @@ impl BlockGrams {
     }
 
     fn width(&self) -> usize {
-        self.gram.first().map_or(0, |g| g.shared.ncols())
+        self.gram.first().map_or(0, |g| g.shared.size())
     }
 
     /// The sums over the folds.
@@ -294,7 +285,7 @@ impl BlockGrams {
         let (gram, scalars) = self.by_fold(folds).all;
         Self {
             log_scale: self.log_scale,
-            ..Self::whole(gram, scalars)
+            ..Self::whole(&gram, scalars)
         }
     }
 

@@ -19,6 +19,8 @@
 //!
 //! Source: effects catalogue, `thermal_misalignment`, `lag_s`; derivation above.
 
+use std::sync::Arc;
+
 /// Why a channel cannot be built.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -61,10 +63,11 @@ pub enum SeriesError {
 /// assert!(bracket.at(20.0).expect("inside") < 22.0);
 /// # Ok::<(), focal_plane::SeriesError>(())
 /// ```
+/// A copy, and a lagged channel beside the one that it follows, share what they have in common.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Series {
-    t_s: Vec<f64>,
-    value: Vec<f64>,
+    t_s: Arc<[f64]>,
+    value: Arc<[f64]>,
     max_gap_s: f64,
     lag: Option<Lag>,
 }
@@ -73,7 +76,7 @@ pub struct Series {
 #[derive(Clone, Debug, PartialEq)]
 struct Lag {
     lag_s: f64,
-    input: Vec<f64>,
+    input: Arc<[f64]>,
 }
 
 impl Series {
@@ -100,14 +103,11 @@ impl Series {
             }
             last_s = t_s;
         }
-        let (t_s, value) = t_s
-            .into_iter()
-            .zip(value)
-            .filter(|(_, v)| !v.is_nan())
-            .unzip();
+        let valid = t_s.into_iter().zip(value).filter(|(_, v)| !v.is_nan());
+        let (t_s, value): (Vec<f64>, Vec<f64>) = valid.unzip();
         Ok(Self {
-            t_s,
-            value,
+            t_s: t_s.into(),
+            value: value.into(),
             max_gap_s: f64::INFINITY,
             lag: None,
         })
@@ -230,7 +230,7 @@ impl Series {
         if lag_s == 0.0 {
             return self.clone();
         }
-        let mut value = Vec::with_capacity(self.len());
+        let mut value: Vec<f64> = Vec::with_capacity(self.len());
         for i in 0..self.len() {
             let x = match value.last() {
                 None => self.value[0],
@@ -243,7 +243,7 @@ impl Series {
         }
         Self {
             t_s: self.t_s.clone(),
-            value,
+            value: value.into(),
             max_gap_s: self.max_gap_s,
             lag: Some(Lag {
                 lag_s,

@@ -1,6 +1,7 @@
 //! Fits from sums against fits of every row.
 
 use super::*;
+use crate::Symmetric;
 use crate::gram::Design;
 use nalgebra::{Cholesky, Matrix2};
 use rand_core::SeedableRng;
@@ -366,7 +367,7 @@ fn products_of_few_columns_are_those_of_all() {
     let parts = BlockGrams {
         gram: split
             .into_iter()
-            .map(|(shared, rows)| Gram::new(weight, shared.into(), rows))
+            .map(|(shared, rows)| Gram::new(weight, Symmetric::of_lower(&shared).into(), rows))
             .collect(),
         known: Some(std::sync::Arc::new(known)),
         ..whole.clone()
@@ -599,7 +600,7 @@ fn trend(size: f64, drift: f64, apart: bool, seed: u64) -> Fits {
     let folds = Folds::cut(PICTURES);
     let mut grams = BlockGrams::accumulate(&table, &folds);
     if apart {
-        let nothing = std::sync::Arc::new(DMatrix::zeros(3, 3));
+        let nothing = std::sync::Arc::new(Symmetric::zeros(3));
         let of_source = |s: usize| {
             let rows: Vec<usize> = (0..PICTURES).map(|k| k * SOURCES + s).collect();
             Gram::new(0.0, nothing.clone(), table.0.select_rows(&rows))

@@ -58,6 +58,8 @@ const LEAST_PRODUCTS: f64 = 300.0;
 const LEAST_FREEDOM: f64 = 3.0;
 /// Noise is not quite white where nothing is wrong: what was fitted takes some of it.
 const WIDER: f64 = 1.3;
+/// Frames whose stars are looked at together.
+const TOGETHER: usize = 4096;
 
 /// Slow parts over all of the noise.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -186,44 +188,50 @@ pub(crate) fn slow(
     let weight = weights(data, residual);
     let root: Vec<f64> = data.star.iter().map(|&s| weight[s].sqrt()).collect();
     let turns = Turns::of(data, [x, y], &root).frames;
-    let parts: Vec<Option<Parts>> = turns
-        .par_iter()
-        .enumerate()
-        .map(|(k, turn)| Parts::of(data, [x, y], &root, (k, turn.as_ref()?)))
-        .collect();
     let mut left = vec![[f64::NAN; 2]; data.t_s.len()];
     let mut rows_of: Vec<Vec<usize>> = vec![Vec::new(); data.stars.len()];
     // directions that a row stands for
     let mut freedom = vec![0.0; data.t_s.len()];
-    for parts in parts.iter().flatten() {
-        let n = parts.left.len() as f64;
-        for &(row, own) in &parts.left {
-            left[row] = own;
-            freedom[row] = (2.0 * n - 3.0) / n;
-            rows_of[data.star[row]].push(row);
+    let mut turned: Vec<Option<Vector3<f64>>> = Vec::with_capacity(turns.len());
+    // some at a time: all would be as large again as what comes of them
+    for turns in turns.chunks(TOGETHER) {
+        let first = turned.len();
+        let some = turns.par_iter().enumerate();
+        let some: Vec<Option<Parts>> = some
+            .map(|(k, turn)| Parts::of(data, [x, y], &root, (first + k, turn.as_ref()?)))
+            .collect();
+        turned.extend(some.iter().map(|parts| Some(parts.as_ref()?.turn)));
+        for parts in some.into_iter().flatten() {
+            let n = parts.left.len() as f64;
+            for (row, own) in parts.left {
+                left[row] = own;
+                freedom[row] = (2.0 * n - 3.0) / n;
+                rows_of[data.star[row]].push(row);
+            }
         }
     }
+    drop((turns, root));
     let noise = normalised(&mut left, &rows_of, &freedom);
     let t_s = &data.frames.t_s;
     let near = |now: f64, before: f64| now - before <= (lags as f64 + 0.5) * step;
     let asked: Vec<usize> = (0..3).filter(|&a| axes[a]).collect();
     // products with the frames before, and how many
-    let with_others = |(k, now): (usize, &Option<Parts>)| {
+    let with_others = |(k, now): (usize, &Option<Vector3<f64>>)| {
         let mut sum = (0.0, 0.0);
         let Some(now) = now else { return sum };
         for before in (k.saturating_sub(lags)..k).rev() {
             if !near(t_s[k], t_s[before]) {
                 break;
             }
-            if let Some(before) = &parts[before] {
-                let products = asked.iter().map(|&a| now.turn[a] * before.turn[a]);
+            if let Some(before) = &turned[before] {
+                let products = asked.iter().map(|&a| now[a] * before[a]);
                 sum.0 += products.sum::<f64>();
                 sum.1 += asked.len() as f64;
             }
         }
         sum
     };
-    let each: Vec<(f64, f64)> = parts.par_iter().enumerate().map(with_others).collect();
+    let each: Vec<(f64, f64)> = turned.par_iter().enumerate().map(with_others).collect();
     let rotation = each.iter().map(|e| e.0).sum::<f64>();
     let of_rotation = each.iter().map(|e| e.1).sum::<f64>();
     let each: Vec<Products> = rows_of

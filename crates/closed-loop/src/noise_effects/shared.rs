@@ -76,12 +76,7 @@ fn variables(situation: &Situation<'_>, level: &StarEvidence<'_>) -> Vec<(String
 /// too few tell them.
 fn about_axes(data: &StarData, motions: [&[Vec<f64>; 2]; 2]) -> [[Vec<f64>; 3]; 2] {
     let scale = data.camera.arcsec_per_px();
-    let shifts = motions.map(|motion| -> Vec<Vec<f64>> {
-        let axes = motion.iter().zip(scale);
-        axes.map(|(axis, scale)| axis.iter().map(|v| v * scale).collect())
-            .collect()
-    });
-    let shifts = shifts.each_ref().map(Vec::as_slice);
+    let shifts = |row: usize| motions.map(|motion| [0, 1].map(|a| motion[a][row] * scale[a]));
     let unknown = [Vector3::repeat(f64::NAN); 2];
     let each: Vec<[Vector3<f64>; 2]> = (0..data.frames.frames())
         .into_par_iter()

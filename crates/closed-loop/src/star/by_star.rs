@@ -14,7 +14,7 @@
 
 use std::sync::Arc;
 
-use block_regression::{Folds, Gram};
+use block_regression::{Folds, Gram, Symmetric};
 use nalgebra::{DMatrix, RowVector3};
 
 use crate::star::columns::StarColumns;
@@ -81,14 +81,16 @@ pub(super) fn parts(columns: &StarColumns<'_>, parts: usize) -> Vec<Gram> {
             part.extend(left.row(i).iter().chain(left.row(n + i).iter()));
         }
     }
-    let nothing = Arc::new(DMatrix::zeros(width, width));
+    let nothing = Arc::new(Symmetric::zeros(width));
     let each = rows_of_part.into_iter();
     each.map(|values| {
         let rows = DMatrix::from_row_slice(values.len() / width, width, &values);
         if rows.nrows() < width {
             Gram::new(0.0, nothing.clone(), rows)
         } else {
-            Gram::whole(rows.tr_mul(&rows))
+            let mut products = Symmetric::zeros(width);
+            products.add_products(1.0, &rows);
+            Gram::whole(products)
         }
     })
     .collect()

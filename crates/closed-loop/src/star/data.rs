@@ -73,6 +73,11 @@ impl Light {
         })
     }
 
+    /// Whether it is off anywhere.
+    fn is_beside(&self) -> bool {
+        self.beside_px.iter().flatten().any(|&off| off != 0.0)
+    }
+
     /// Where the reference has it.
     pub(crate) fn as_modelled(rows: usize) -> Self {
         let zeros = || [vec![0.0; rows], vec![0.0; rows]];
@@ -119,8 +124,8 @@ pub(crate) struct StarData {
     pub(crate) modelled: [Vec<f64>; 2],
     /// How far the reference puts them off, [`crate::star::light`].
     pub(super) light: Light,
-    /// Where the light falls, as far as is known, px.
-    landed: [Vec<f64>; 2],
+    /// Where the light falls, as far as is known, px; `None`: where it is modelled.
+    landed: Option<[Vec<f64>; 2]>,
     /// Axes along which it is not known to move.
     still: [bool; 2],
     /// Velocity and acceleration of the image, px/s and px/s^2; zero where the
@@ -341,7 +346,7 @@ impl StarData {
             projected: pair(),
             modelled: pair(),
             light: Light::as_modelled(n),
-            landed: pair(),
+            landed: None,
             still: [false; 2],
             velocity: pair(),
             acceleration: pair(),
@@ -387,7 +392,7 @@ impl StarData {
                 beside_px: pair(&self.light.beside_px),
                 variance_px2: pair(&self.light.variance_px2),
             },
-            landed: pair(&self.landed),
+            landed: self.landed.as_ref().map(pair),
             velocity: pair(&self.velocity),
             acceleration: pair(&self.acceleration),
             phase_error: pair(&self.phase_error),
@@ -448,7 +453,8 @@ impl StarData {
 
     /// Where the light falls, as far as is known, px.
     pub(crate) fn landed(&self) -> [&[f64]; 2] {
-        self.landed.each_ref().map(Vec::as_slice)
+        let landed = self.landed.as_ref().unwrap_or(&self.modelled);
+        landed.each_ref().map(Vec::as_slice)
     }
 
     /// Whether products of columns take long, and much room.
@@ -504,20 +510,18 @@ impl StarData {
         if rests {
             self.hold_still(&modelled);
         }
-        self.landed = self.light.beside(carried.as_ref().unwrap_or(&modelled));
+        let own = carried.is_some() || !rests && self.light.is_beside();
+        let landed = own.then(|| self.light.beside(carried.as_ref().unwrap_or(&modelled)));
         self.modelled = match rests {
             true => self.light.beside(&modelled),
             false => modelled,
         };
-        self.phase_error = self.centroid_error_px(&self.landed, phase);
+        self.landed = landed;
+        self.phase_error = self.centroid_error_px(self.landed(), phase);
     }
 
     /// What the declared model does to centroids of light that falls `at` these places, px.
-    pub(super) fn centroid_error_px(
-        &self,
-        at: &[Vec<f64>; 2],
-        phase: &OnCentroids,
-    ) -> [Vec<f64>; 2] {
+    pub(super) fn centroid_error_px(&self, at: [&[f64]; 2], phase: &OnCentroids) -> [Vec<f64>; 2] {
         let rows = self.t_s.len();
         let mut error = [vec![0.0; rows], vec![0.0; rows]];
         let [x, y] = &mut error;
@@ -531,7 +535,7 @@ impl StarData {
             let some = first..first + x.len();
             let variance = self.light.variance_px2.each_ref();
             let variance = variance.map(|v| &v[some.clone()]);
-            let [at_x, at_y] = at.each_ref().map(|at| &at[some.clone()]);
+            let [at_x, at_y] = at.map(|at| &at[some.clone()]);
             let out = PointsMut {
                 x: &mut *x,
                 y: &mut *y,

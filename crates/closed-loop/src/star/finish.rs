@@ -9,6 +9,8 @@
 //!
 //! Not physics: the order of the report.
 
+use std::borrow::Cow;
+
 use block_regression::Folds;
 use star_images::Formed;
 use telemetry::Model;
@@ -76,12 +78,12 @@ impl Finish<'_> {
 
     /// The declared model at its best. Where it declares a slow error of the
     /// reference, under which all fits are, so is this one: what is added is held against it.
-    fn before(&self, effects: &[FoundEffect]) -> Result<AtBest, CloseError> {
+    fn before(&self, effects: &[FoundEffect]) -> Result<AtBest<'_>, CloseError> {
         let claimed = effects.iter().any(|e| e.id == REFERENCE_ERROR);
         let landed = self.settled.phase_error.is_some();
         if self.level.noise.is_some() && !claimed && !landed && self.image.is_none() {
             return Ok(AtBest {
-                residual: self.residuals(&[])?,
+                residual: Cow::Owned(self.residuals(&[])?),
                 loglik: self.found.fitted.data_loglik(&[]),
             });
         }
@@ -92,13 +94,13 @@ impl Finish<'_> {
             None => fit(self.measured, self.folds, &[])?.data_loglik(&[]),
         };
         Ok(AtBest {
-            residual: self.settled.before.clone(),
+            residual: Cow::Borrowed(&self.settled.before),
             loglik,
         })
     }
 
     /// The better model at its best: `residual` is what the `added` groups leave.
-    fn after(&self, added: &[usize], residual: Residuals) -> AtBest {
+    fn after<'r>(&self, added: &[usize], residual: Cow<'r, Residuals>) -> AtBest<'r> {
         let set = columns_of(&self.found.fitted.groups, added);
         AtBest {
             residual,
@@ -124,7 +126,7 @@ impl Finish<'_> {
     }
 
     /// `model` is the declared one, or that with what was added.
-    fn errors(&self, model: &Model, best: &AtBest, attitude: Option<[f64; 3]>) -> Errors {
+    fn errors(&self, model: &Model, best: &AtBest<'_>, attitude: Option<[f64; 3]>) -> Errors {
         let rms = residual_size::star_rms(&best.residual, self.data);
         Errors {
             star_rms_arcsec: Some(rms),
@@ -146,10 +148,9 @@ impl Finish<'_> {
 }
 
 /// A model at its best.
-#[derive(Clone)]
-struct AtBest {
+struct AtBest<'a> {
     /// What it leaves out of fold.
-    residual: Residuals,
+    residual: Cow<'a, Residuals>,
     loglik: Option<f64>,
 }
 
@@ -205,10 +206,15 @@ pub(crate) fn finish(
     let nothing_added = effects.is_empty();
     // one fit, one figure
     let after = if nothing_added {
-        before.clone()
+        drop(plain);
+        AtBest {
+            residual: Cow::Borrowed(&*before.residual),
+            ..before
+        }
     } else {
-        f.after(&groups, with_term.unwrap_or(plain))
+        f.after(&groups, Cow::Owned(with_term.unwrap_or(plain)))
     };
+    drop(inside);
     let hypotheses = hypothesis::answer(
         f.situation.questions,
         &Grounds {
@@ -246,7 +252,7 @@ pub(crate) fn finish(
     Ok(Closed {
         report,
         model,
-        stars: Some(tables::stars(f, before.residual, after.residual)),
+        stars: Some(tables::stars(f, &before.residual, &after.residual)),
         attitude,
         dark_map: tables::dark_map(f),
         rivals: rivals.unwrap_or_default(),

@@ -56,22 +56,22 @@ pub(crate) fn rotation_of(
     frame: usize,
     shift: &[Vec<f64>],
 ) -> Option<Vector3<f64>> {
-    rotations_of(data, frame, [shift]).map(|[theta]| theta)
+    rotations_of(data, frame, |row| [[0, 1].map(|axis| shift[axis][row])]).map(|[theta]| theta)
 }
 
 /// The rotations that several shifts of the same stars amount to.
 pub(crate) fn rotations_of<const N: usize>(
     data: &StarData,
     frame: usize,
-    shifts: [&[Vec<f64>]; N],
+    shifts: impl Fn(usize) -> [[f64; 2]; N],
 ) -> Option<[Vector3<f64>; N]> {
     let inverse = rotation_inverse(data, frame)?;
     let mut moments = [Vector3::zeros(); N];
     for row in data.frames.rows_of(frame).filter(|&r| !data.outlier[r]) {
         let jacobian = rotation_row(data, row).map(Vector3::from);
-        for (moment, shift) in moments.iter_mut().zip(shifts) {
-            for (axis, turns) in jacobian.iter().enumerate() {
-                *moment += turns * shift[axis][row];
+        for (moment, shift) in moments.iter_mut().zip(shifts(row)) {
+            for (turns, shift) in jacobian.iter().zip(shift) {
+                *moment += turns * shift;
             }
         }
     }

@@ -259,7 +259,7 @@ impl StarData {
     ) -> bool {
         let at = self.light.beside(&self.shifted(shift_arcsec));
         let known = self.landed();
-        let error = self.centroid_error_px(&at, phase);
+        let error = self.centroid_error_px(at.each_ref().map(Vec::as_slice), phase);
         let scale = self.camera.arcsec_per_px();
         let mut along = 0.0;
         for axis in 0..2 {

@@ -25,7 +25,7 @@ mod tests;
 
 use std::sync::{Arc, OnceLock};
 
-use block_regression::{BlockGrams, Folds, Gram, add_products, mirror_lower};
+use block_regression::{BlockGrams, Folds, Gram, Symmetric, add_products, mirror_lower};
 use coloured_noise::{CommonNoise, Filter, Rotations};
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use rayon::prelude::*;
@@ -83,9 +83,9 @@ impl<'a> Keep<'a> {
 #[derive(Clone, Debug)]
 struct Block {
     /// R; G where no rotation is kept apart.
-    rest: Arc<DMatrix<f64>>,
+    rest: Arc<Symmetric>,
     /// Products of the rows of bins without an attitude; they are not in R.
-    lost: Option<DMatrix<f64>>,
+    lost: Option<Symmetric>,
     /// Scalars of G and of R.
     scalars: f64,
     rest_scalars: f64,
@@ -102,10 +102,10 @@ struct Block {
 impl Block {
     /// G of some columns.
     fn gram(&self, columns: &[usize]) -> Gram {
-        let rest = match &self.lost {
-            Some(lost) => Arc::new(pick(&self.rest, columns) + pick(lost, columns)),
-            None => shared(&self.rest, columns),
-        };
+        let mut rest = shared(&self.rest, columns);
+        if let Some(lost) = &self.lost {
+            Arc::make_mut(&mut rest).add(1.0, &lost.picked(columns));
+        }
         Gram::new(1.0, rest, self.whitened(columns))
     }
 
@@ -132,7 +132,7 @@ impl Block {
         Self {
             lost: None,
             scalars: self.rest_scalars,
-            theta: DMatrix::zeros(0, self.rest.ncols()),
+            theta: DMatrix::zeros(0, self.rest.size()),
             inverse: Vec::new(),
             by_frame: None,
             ..self
@@ -253,7 +253,7 @@ impl StarMoments {
 
     /// Their sum, as one block.
     fn white_as_one(&self, sum: DMatrix<f64>) -> BlockGrams {
-        BlockGrams::whole(sum, self.blocks.iter().map(|b| b.scalars).sum())
+        BlockGrams::whole(&sum, self.blocks.iter().map(|b| b.scalars).sum())
     }
 
     /// The sum over the blocks of the products under white noise.
@@ -266,7 +266,7 @@ impl StarMoments {
                 let mut sum = DMatrix::zeros(width, width);
                 for block in blocks {
                     if let Some(lost) = &block.lost {
-                        sum += lost;
+                        lost.add_lower_to(1.0, &mut sum);
                     }
                     add_products(1.0, &block.whitened(&all), &mut sum);
                 }
@@ -293,7 +293,10 @@ impl StarMoments {
             let of = |f| {
                 let own = self.blocks.iter().zip(&self.fold_of_block);
                 let own = own.filter(|(_, of)| **of == f);
-                own.fold(DMatrix::zeros(width, width), |sum, (b, _)| sum + &*b.rest)
+                let mut sum = DMatrix::zeros(width, width);
+                own.for_each(|(b, _)| b.rest.add_lower_to(1.0, &mut sum));
+                mirror_lower(&mut sum);
+                sum
             };
             Arc::new(folds.into_par_iter().map(of).collect())
         })
@@ -333,7 +336,7 @@ impl StarMoments {
 
     /// Columns of the pass.
     pub(crate) fn width(&self) -> usize {
-        self.blocks.first().map_or(0, |b| b.rest.ncols())
+        self.blocks.first().map_or(0, |b| b.rest.size())
     }
 
     /// The products of `columns` under `noise`: of scalars of unit variance.
@@ -376,7 +379,7 @@ impl StarMoments {
         let scalars = self.blocks.iter().map(Block::solved_scalars).sum();
         BlockGrams {
             log_scale,
-            ..BlockGrams::whole(gram, scalars)
+            ..BlockGrams::whole(&gram, scalars)
         }
     }
 
@@ -466,11 +469,11 @@ fn is_all(columns: &[usize], width: usize) -> bool {
 }
 
 /// As [`pick`], without a copy where that is all.
-fn shared(matrix: &Arc<DMatrix<f64>>, columns: &[usize]) -> Arc<DMatrix<f64>> {
-    if is_all(columns, matrix.ncols()) {
+fn shared(matrix: &Arc<Symmetric>, columns: &[usize]) -> Arc<Symmetric> {
+    if is_all(columns, matrix.size()) {
         matrix.clone()
     } else {
-        Arc::new(pick(matrix, columns))
+        Arc::new(matrix.picked(columns))
     }
 }
 
@@ -495,13 +498,7 @@ impl Block {
                 .map(|k| root[(k, k)].ln() - 0.5 * precision[k].ln())
                 .sum::<f64>();
         }
-        add_products(-1.0, &whitened, Arc::make_mut(&mut self.rest));
-        self.complete();
-    }
-
-    /// Makes R symmetric by what lies below its diagonal.
-    fn complete(&mut self) {
-        mirror_lower(Arc::make_mut(&mut self.rest));
+        Arc::make_mut(&mut self.rest).add_products(-1.0, &whitened);
     }
 
     /// Takes the rotations of bins with these M and N out of R.
@@ -530,15 +527,13 @@ impl Block {
         }
         let rest = Arc::make_mut(&mut self.rest);
         let whole = rest.diagonal();
-        add_products(-1.0, &whitened, rest);
-        for k in 0..rest.ncols() {
+        rest.add_products(-1.0, &whitened);
+        for k in 0..rest.size() {
             // what rounding leaves of a column that is a rotation of every bin
-            if rest[(k, k)] < SINGULAR * whole[k] {
-                rest.row_mut(k).fill(0.0);
-                rest.column_mut(k).fill(0.0);
+            if rest.at(k, k) < SINGULAR * whole[k] {
+                rest.clear(k);
             }
         }
-        self.complete();
         self.theta = moments;
     }
 }

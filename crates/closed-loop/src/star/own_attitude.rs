@@ -35,22 +35,7 @@ pub(crate) fn residuals(
         return None;
     }
     let scale = data.camera.arcsec_per_px();
-    let by_effects = moved_by_declared_effects(data);
-    let shift = |residual: &Residuals, phase_error: &[Vec<f64>; 2]| -> Vec<Vec<f64>> {
-        (0..2)
-            .map(|a| {
-                (0..data.t_s.len())
-                    .map(|r| {
-                        let declared = phase_error[a][r] + by_effects[a][r];
-                        residual.modelled[a][r] + declared * scale[a]
-                    })
-                    .collect()
-            })
-            .collect()
-    };
     let declared = settled.phase_error.as_ref().unwrap_or(&data.phase_error);
-    let shift_before = shift(before, declared);
-    let shift_after = shift(after, &data.phase_error);
     let fold = folds.column();
     let own: BTreeMap<u64, usize> = table
         .t_s
@@ -63,7 +48,17 @@ pub(crate) fn residuals(
         // the shifts hold the whole misalignment, and so does the error against the bare reference
         let theta = rotation_vector(&table.q[at], &data.attitude[k]) * focal_plane::ARCSEC_PER_RAD
             + data.misalignment;
-        let [b, a] = rotations_of(data, k, [&shift_before, &shift_after])?;
+        let shifts = |row: usize| {
+            let bare = data.bare_projection(k, row);
+            let of = |residual: &Residuals, phase_error: &[Vec<f64>; 2]| {
+                [0, 1].map(|a| {
+                    let by_effects = data.projected[a][row] - bare[a];
+                    residual.modelled[a][row] + (phase_error[a][row] + by_effects) * scale[a]
+                })
+            };
+            [of(before, declared), of(after, &data.phase_error)]
+        };
+        let [b, a] = rotations_of(data, k, shifts)?;
         Some((k, theta - b, theta - a))
     };
     let frames = (0..data.frames.frames()).into_par_iter();
@@ -82,15 +77,4 @@ pub(crate) fn residuals(
         standing_out::mark(before, &mut out.outlier);
     }
     (!out.t_s.is_empty()).then_some(out)
-}
-
-/// What the declared effects move the image of each row by, per axis, px.
-fn moved_by_declared_effects(data: &StarData) -> [Vec<f64>; 2] {
-    let mut moved = data.projected.clone();
-    for (row, bare) in data.bare_projections().into_iter().enumerate() {
-        for axis in 0..2 {
-            moved[axis][row] -= bare[axis];
-        }
-    }
-    moved
 }

@@ -48,13 +48,17 @@ impl StarData {
     /// Projection of every row by its frame's attitude, before any effect, px.
     pub(crate) fn bare_projections(&self) -> Vec<[f64; 2]> {
         let of_frame = |k: usize| {
-            self.frames.rows_of(k).map(move |row| {
-                let u = self.stars[self.star[row]].direction;
-                self.position(&self.attitude[k], &u)
-            })
+            let rows = self.frames.rows_of(k);
+            rows.map(move |row| self.bare_projection(k, row))
         };
         let frames = (0..self.frames.frames()).into_par_iter();
         frames.flat_map_iter(of_frame).collect()
+    }
+
+    /// That of a row of this frame.
+    pub(crate) fn bare_projection(&self, frame: usize, row: usize) -> [f64; 2] {
+        let star = &self.stars[self.star[row]];
+        self.position(&self.attitude[frame], &star.direction)
     }
 
     /// Projected positions.

@@ -36,9 +36,8 @@ pub(super) fn attitude_rms(attitude: Option<&AttitudeResiduals>) -> [Option<[f64
 }
 
 /// The residuals of the stars.
-pub(super) fn stars(f: &Finish<'_>, before: Residuals, after: Residuals) -> StarResiduals {
-    let [ax, ay]: [Vec<f64>; 2] = after.axes.try_into().unwrap_or_default();
-    let [bx, by]: [Vec<f64>; 2] = before.axes.try_into().unwrap_or_default();
+pub(super) fn stars(f: &Finish<'_>, before: &Residuals, after: &Residuals) -> StarResiduals {
+    let axes = |residual: &Residuals| [0, 1].map(|a| residual.axes[a].clone());
     let fold_of_frame = f.folds.column();
     let frames = &f.data.frames;
     let fold = (0..frames.frames())
@@ -50,8 +49,8 @@ pub(super) fn stars(f: &Finish<'_>, before: Residuals, after: Residuals) -> Star
         star_id: frames.star_id.clone(),
         x_px: frames.x_px.clone(),
         y_px: frames.y_px.clone(),
-        before_arcsec: [bx, by],
-        after_arcsec: [ax, ay],
+        before_arcsec: axes(before),
+        after_arcsec: axes(after),
         fold,
         outlier: f.data.outlier.clone(),
     }

@@ -11,11 +11,11 @@
 
 use std::sync::Arc;
 
-use block_regression::BlockGrams;
+use block_regression::{BlockGrams, Symmetric};
 use nalgebra::{DMatrix, Matrix3, Vector3};
 use rayon::prelude::*;
 
-use super::{Block, SINGULAR, StarMoments, pick};
+use super::{Block, SINGULAR, StarMoments};
 
 /// M of each frame of a block, three rows a frame, and N.
 #[derive(Clone, Debug)]
@@ -196,8 +196,8 @@ impl Block {
     /// Some of the columns.
     fn picked(&self, columns: &[usize]) -> Self {
         Self {
-            rest: Arc::new(pick(&self.rest, columns)),
-            lost: self.lost.as_ref().map(|lost| pick(lost, columns)),
+            rest: Arc::new(self.rest.picked(columns)),
+            lost: self.lost.as_ref().map(|lost| lost.picked(columns)),
             theta: self.theta.select_columns(columns),
             inverse: self.inverse.clone(),
             by_frame: self.by_frame.as_ref().map(|by_frame| ByFrame {
@@ -211,10 +211,10 @@ impl Block {
     /// All columns with others before the last `residuals` that turn the camera by `turns`; every frame's moments are
     /// not kept.
     fn beside_turns(&self, residuals: usize, turns: &DMatrix<f64>, frames: &[usize]) -> Self {
-        let first = self.rest.ncols() - residuals;
+        let first = self.rest.size() - residuals;
         let added = turns.ncols();
         let mut block = Self {
-            rest: Arc::new(widened(&self.rest, first, added).insert_rows(first, added, 0.0)),
+            rest: Arc::new(self.rest.widened(first, added)),
             lost: None,
             theta: widened(&self.theta, first, added),
             inverse: self.inverse.clone(),
@@ -276,24 +276,23 @@ impl Binned {
         which: &[usize],
         whole: &DMatrix<f64>,
         theta: &DMatrix<f64>,
-        rest: &mut DMatrix<f64>,
+        rest: &mut Symmetric,
     ) {
         let mut left = whole.clone();
         left.gemm(-1.0, &theta.transpose(), &self.moments, 1.0);
-        for (left, &column) in left.column_iter().zip(which) {
-            rest.column_mut(column).copy_from(&left);
-            rest.row_mut(column).tr_copy_from(&left);
-        }
         // what rounding leaves of rotations of every bin
         for (k, &column) in which.iter().enumerate() {
-            if rest[(column, column)] < SINGULAR * whole[(column, k)] {
-                rest[(column, column)] = 0.0;
+            if left[(column, k)] < SINGULAR * whole[(column, k)] {
+                left[(column, k)] = 0.0;
             }
         }
-        let nothing: Vec<usize> = (0..rest.ncols()).filter(|&c| rest[(c, c)] == 0.0).collect();
-        for other in nothing {
-            rest.column_mut(other).fill(0.0);
-            rest.row_mut(other).fill(0.0);
+        for (left, &column) in left.column_iter().zip(which) {
+            rest.put_column(column, left.as_slice());
+        }
+        for c in 0..rest.size() {
+            if rest.at(c, c) == 0.0 {
+                rest.clear(c);
+            }
         }
     }
 }

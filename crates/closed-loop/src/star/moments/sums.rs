@@ -14,6 +14,7 @@ use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
 
+use block_regression::Symmetric;
 use nalgebra::{DMatrix, DMatrixView, DMatrixViewMut, DVector, Dyn, Matrix3, Vector3};
 
 use super::by_frame::ByFrame;
@@ -208,21 +209,6 @@ fn is_zero(values: &[f64]) -> bool {
     let mut chunks = values.chunks_exact(LANES);
     let bits = |values: &[f64]| values.iter().fold(0, |all, v| all | v.to_bits());
     chunks.all(|some| bits(some) << 1 == 0) && bits(chunks.remainder()) << 1 == 0
-}
-
-/// Puts a matrix whose rows and columns stand at these places of `out` there, below the diagonal: of one whose rows
-/// are its columns what lies below its own.
-fn put(from: &DMatrix<f64>, rows: &[usize], columns: &[usize], out: &mut DMatrix<f64>) {
-    let square = rows == columns;
-    for start in (0..columns.len()).step_by(TURNED) {
-        let some = start..(start + TURNED).min(columns.len());
-        for (i, &row) in rows.iter().enumerate().skip(if square { start } else { 0 }) {
-            for j in some.clone().filter(|&j| !square || j <= i) {
-                let column = columns[j];
-                out[(row.max(column), row.min(column))] = from[(i, j)];
-            }
-        }
-    }
 }
 
 /// A matrix of what was in `space`.
@@ -475,22 +461,21 @@ impl Sums {
         }
     }
 
-    /// The products, in the order of the Gram matrix; above the diagonal there may be anything.
-    fn product(&self, places: &[usize]) -> DMatrix<f64> {
+    /// The products, in the order of the Gram matrix.
+    fn product(&self, places: &[usize]) -> Symmetric {
         let (shared, own) = (self.layout.shared, self.layout.own.len());
-        let width = self.layout.width();
-        let mut out = DMatrix::zeros(width, width);
+        let mut out = Symmetric::zeros(self.layout.width());
         let (polynomials, rest) = places.split_at(2 * shared);
         let own = &rest[..own];
         for axis in polynomials.chunks_exact(shared.max(1)) {
-            put(&self.shared, axis, axis, &mut out);
+            out.put(&self.shared, axis, axis);
         }
-        put(&self.own, own, own, &mut out);
-        put(&self.cross, polynomials, own, &mut out);
-        put(&self.turn, places, &rest[own.len()..], &mut out);
+        out.put(&self.own, own, own);
+        out.put(&self.cross, polynomials, own);
+        out.put(&self.turn, places, &rest[own.len()..]);
         if let Some((which, better)) = &self.fast {
             let which: Vec<usize> = which.iter().map(|&k| own[k]).collect();
-            put(better, &which, &which, &mut out);
+            out.put(better, &which, &which);
         }
         out
     }
@@ -498,9 +483,8 @@ impl Sums {
     /// R, with the rotations of the bins kept apart.
     pub(super) fn block(self, scratch: &mut Scratch) -> Block {
         let (mut block, bins) = self.apart(scratch);
-        match bins {
-            Some((moments, normals)) => block.keep_apart(moments, &normals),
-            None => block.complete(),
+        if let Some((moments, normals)) = bins {
+            block.keep_apart(moments, &normals);
         }
         block
     }
@@ -508,14 +492,13 @@ impl Sums {
     /// What rotations of the frames that have a prior of this `precision` do not explain.
     pub(super) fn drawn(self, precision: [f64; 3], scratch: &mut Scratch) -> Block {
         let (mut block, bins) = self.apart(scratch);
-        match bins {
-            Some((moments, normals)) => block.draw(&moments, &normals, precision),
-            None => block.complete(),
+        if let Some((moments, normals)) = bins {
+            block.draw(&moments, &normals, precision);
         }
         block
     }
 
-    /// G, where it lies on the diagonal and below, and M and N of the bins. What they were summed in goes back.
+    /// G, and M and N of the bins. What they were summed in goes back.
     fn apart(self, scratch: &mut Scratch) -> (Block, Option<Turned>) {
         let places = self.layout.places();
         let mut order = vec![0; places.len()];
@@ -523,10 +506,11 @@ impl Sums {
             order[to] = from;
         }
         let mut rest = self.product(&places);
-        let lost = self.lost.as_ref().map(|(lost, _)| pick(lost, &order));
+        let lost = self.lost.as_ref();
+        let lost = lost.map(|(lost, _)| Symmetric::of_lower(&pick(lost, &order)));
         let mut scalars = self.scalars;
         if let (Some((_, count)), Some(lost)) = (&self.lost, &lost) {
-            rest -= lost;
+            rest.add(-1.0, lost);
             scalars -= count;
         }
         let width = order.len();

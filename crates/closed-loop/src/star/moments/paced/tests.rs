@@ -141,7 +141,7 @@ fn products_are_those_of_every_frame() {
                 let sums = sums(b.clone(), &mut scratch);
                 sums.block(&mut scratch)
             });
-            each.map(|b| (b.rest.as_ref().clone(), b.scalars))
+            each.map(|b| (DMatrix::from(&*b.rest), b.scalars))
                 .reduce(|a, b| (a.0 + b.0, a.1 + b.1))
                 .unwrap()
         };
