@@ -627,3 +627,47 @@ fn set_aside_lost(inputs: &Inputs<'_>, attitude: &mut [Option<UnitQuaternion<f64
         attitude[k] = None;
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use telemetry::Model;
+
+    use super::*;
+    use crate::star::harness::at_rest;
+
+    /// Stars that drift by a pixel a frame, and a reference that puts them off by a tenth of it.
+    #[test]
+    fn light_falls_beside_where_it_is_modelled_or_carried() {
+        let mut data = at_rest((0..40).map(f64::from).collect());
+        let phase = OnCentroids::from(&Model::default());
+        let rows = data.t_s.len();
+        let moved = |by: f64| -> [Vec<f64>; 2] {
+            data.projected.each_ref().map(|axis| {
+                let frame = |row: usize| (row / data.stars.len()) as f64;
+                axis.iter()
+                    .enumerate()
+                    .map(|(row, p)| p + frame(row) + by)
+                    .collect()
+            })
+        };
+        let [modelled, beside, carried] = [0.0, 0.1, 30.1].map(moved);
+        data.fall_at(modelled.clone(), None, &phase);
+        assert_eq!(data.landed().map(<[f64]>::to_vec), modelled);
+        data.light.beside_px = [0, 1].map(|_| vec![0.1; rows]);
+        for (from, falls) in [(None, &beside), (Some(moved_back(&carried)), &carried)] {
+            data.fall_at(modelled.clone(), from, &phase);
+            assert_eq!(data.modelled, modelled);
+            for (ours, other) in data.landed().iter().zip(falls) {
+                let off = ours.iter().zip(other).map(|(a, b)| (a - b).abs());
+                assert!(off.fold(0.0, f64::max) < 1e-9);
+            }
+        }
+    }
+
+    /// Less what the reference puts them off by.
+    fn moved_back(places: &[Vec<f64>; 2]) -> [Vec<f64>; 2] {
+        places
+            .each_ref()
+            .map(|axis| axis.iter().map(|p| p - 0.1).collect())
+    }
+}
