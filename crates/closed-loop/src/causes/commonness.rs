@@ -37,7 +37,7 @@ use telemetry::report::{Dependence, Unattributed};
 use crate::causes::recurrence;
 use crate::follows;
 use crate::star::data::StarData;
-use crate::star::frame_rotation::{Turn, Turns, counts, rotation_row};
+use crate::star::frame_rotation::{Turn, counts, rotation_row};
 
 /// Chance below which stars that wander are told.
 const ALPHA: f64 = 0.002;
@@ -187,30 +187,12 @@ pub(crate) fn slow(
     let [x, y] = residual else { return None };
     let weight = weights(data, residual);
     let root: Vec<f64> = data.star.iter().map(|&s| weight[s].sqrt()).collect();
-    let turns = Turns::of(data, [x, y], &root).frames;
-    let mut left = vec![[f64::NAN; 2]; data.t_s.len()];
-    let mut rows_of: Vec<Vec<usize>> = vec![Vec::new(); data.stars.len()];
-    // directions that a row stands for
-    let mut freedom = vec![0.0; data.t_s.len()];
-    let mut turned: Vec<Option<Vector3<f64>>> = Vec::with_capacity(turns.len());
-    // some at a time: all would be as large again as what comes of them
-    for turns in turns.chunks(TOGETHER) {
-        let first = turned.len();
-        let some = turns.par_iter().enumerate();
-        let some: Vec<Option<Parts>> = some
-            .map(|(k, turn)| Parts::of(data, [x, y], &root, (first + k, turn.as_ref()?)))
-            .collect();
-        turned.extend(some.iter().map(|parts| Some(parts.as_ref()?.turn)));
-        for parts in some.into_iter().flatten() {
-            let n = parts.left.len() as f64;
-            for (row, own) in parts.left {
-                left[row] = own;
-                freedom[row] = (2.0 * n - 3.0) / n;
-                rows_of[data.star[row]].push(row);
-            }
-        }
-    }
-    drop((turns, root));
+    let InParts {
+        turned,
+        mut left,
+        freedom,
+        rows_of,
+    } = InParts::of(data, [x, y], &root);
     let noise = normalised(&mut left, &rows_of, &freedom);
     let t_s = &data.frames.t_s;
     let near = |now: f64, before: f64| now - before <= (lags as f64 + 0.5) * step;
@@ -281,6 +263,49 @@ fn normalised(left: &mut [[f64; 2]], rows_of: &[Vec<usize>], freedom: &[f64]) ->
     }
 }
 
+/// All frames in units of their white noise.
+struct InParts {
+    /// Their rotations, of those that have enough stars.
+    turned: Vec<Option<Vector3<f64>>>,
+    /// What these leave of each row, both axes, and directions that it stands for.
+    left: Vec<[f64; 2]>,
+    freedom: Vec<f64>,
+    /// The rows of each star.
+    rows_of: Vec<Vec<usize>>,
+}
+
+impl InParts {
+    /// `root`: of each row, one over its white noise.
+    fn of(data: &StarData, residual: [&[f64]; 2], root: &[f64]) -> Self {
+        let (frames, rows) = (data.frames.frames(), data.t_s.len());
+        let mut out = Self {
+            turned: Vec::with_capacity(frames),
+            left: vec![[f64::NAN; 2]; rows],
+            freedom: vec![0.0; rows],
+            rows_of: vec![Vec::new(); data.stars.len()],
+        };
+        // some at a time: all would be as large again as what comes of them
+        for first in (0..frames).step_by(TOGETHER) {
+            let some = first..(first + TOGETHER).min(frames);
+            let parts = some.into_par_iter();
+            let parts: Vec<Option<Parts>> = parts
+                .map(|frame| Parts::of(data, residual, root, frame))
+                .collect();
+            out.turned
+                .extend(parts.iter().map(|parts| Some(parts.as_ref()?.turn)));
+            for parts in parts.into_iter().flatten() {
+                let n = parts.left.len() as f64;
+                for (row, own) in parts.left {
+                    out.left[row] = own;
+                    out.freedom[row] = (2.0 * n - 3.0) / n;
+                    out.rows_of[data.star[row]].push(row);
+                }
+            }
+        }
+        out
+    }
+}
+
 /// A frame in units of its white noise.
 struct Parts {
     /// Its rotation.
@@ -291,12 +316,8 @@ struct Parts {
 
 impl Parts {
     /// `root`: of each row, one over its white noise. `None` for a frame that has too few.
-    fn of(
-        data: &StarData,
-        residual: [&[f64]; 2],
-        root: &[f64],
-        (frame, turn): (usize, &Turn),
-    ) -> Option<Self> {
+    fn of(data: &StarData, residual: [&[f64]; 2], root: &[f64], frame: usize) -> Option<Self> {
+        let turn = Turn::of(data, frame, residual, root)?;
         let left = |r: usize| {
             let columns = rotation_row(data, r).map(Vector3::from);
             let left = [0, 1].map(|a| root[r] * (residual[a][r] - columns[a].dot(&turn.theta)));

@@ -352,7 +352,7 @@ impl Trials<'_> {
     }
 
     /// Log-likelihood in sample less the price of all parameters and choices, up to a constant.
-    fn fit(&self, set: &[usize]) -> Option<f64> {
+    pub(crate) fn fit(&self, set: &[usize]) -> Option<f64> {
         let variance = self.fits.variance(&columns_of(self.groups, set))?;
         Some(-0.5 * self.scalars * variance.ln() - self.paid(set))
     }
@@ -408,6 +408,13 @@ impl Trials<'_> {
         let gain = self.gain(&others, g, &base);
         let standing = gain.and_then(|gain| self.standing(&others, g, gain));
         Some(standing.map_or(Judgement::UNSEEN, |(judgement, _)| judgement))
+    }
+
+    /// The p-value of a group beside `others`, as the blocks scatter or if the noise were white, whichever is less, times
+    /// what the search costs it; `None` if it cannot be told from them.
+    pub(crate) fn chance(&self, others: &[usize], g: usize) -> Option<f64> {
+        let (judgement, white) = self.standing(others, g, 0.0)?;
+        Some(judgement.p_value.min(white))
     }
 
     /// What a group adds to the log-likelihood out of fold of `others`, which is `base`.

@@ -143,7 +143,13 @@ pub(crate) fn counts(data: &StarData, residual: [&[f64]; 2], row: usize) -> bool
 }
 
 impl Turn {
-    fn of(data: &StarData, frame: usize, residual: [&[f64]; 2], weight: &[f64]) -> Option<Self> {
+    /// Of one frame, as [`Turns::of`] of all.
+    pub(crate) fn of(
+        data: &StarData,
+        frame: usize,
+        residual: [&[f64]; 2],
+        weight: &[f64],
+    ) -> Option<Self> {
         let rows = data.frames.rows_of(frame);
         let (mut normal, mut moment) = (Matrix3::zeros(), Vector3::zeros());
         let (mut whole, mut count) = (0.0, 0_u32);
