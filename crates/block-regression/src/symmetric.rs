@@ -29,6 +29,39 @@ pub struct Symmetric {
     values: Vec<f64>,
 }
 
+/// A part of a symmetric matrix: the places of its rows and columns, and what is there. Of one whose rows are its columns
+/// what lies on its diagonal and below counts.
+#[derive(Clone, Copy, Debug)]
+pub struct Part<'p> {
+    /// Of any shape.
+    pub values: &'p DMatrix<f64>,
+    /// As many as it has rows.
+    pub rows: &'p [usize],
+    /// As many as it has columns.
+    pub columns: &'p [usize],
+}
+
+impl Part<'_> {
+    /// Puts it into what is kept of a matrix whose columns would begin at `places` if they began with the first row.
+    fn put(&self, places: &[usize], kept: &mut [f64]) {
+        let Self {
+            values,
+            rows,
+            columns,
+        } = *self;
+        let square = rows == columns;
+        for start in (0..columns.len()).step_by(TURNED) {
+            let some = start..(start + TURNED).min(columns.len());
+            for (i, &row) in rows.iter().enumerate().skip(if square { start } else { 0 }) {
+                for j in some.clone().filter(|&j| !square || j <= i) {
+                    let column = columns[j];
+                    kept[places[row.min(column)] + row.max(column)] = values[(i, j)];
+                }
+            }
+        }
+    }
+}
+
 /// A panel: where it lies in the matrix and in memory.
 struct Panel {
     /// Its columns; its rows begin where these do.
@@ -58,6 +91,17 @@ impl Symmetric {
             size,
             values: vec![0.0; room],
         }
+    }
+
+    /// Of parts, each at its places, a later one in the place of what an earlier one has there.
+    pub fn of_parts<'p>(size: usize, parts: impl IntoIterator<Item = Part<'p>>) -> Self {
+        let mut out = Self::zeros(size);
+        let places: Vec<usize> = (0..size).map(|j| place_of(j, size)).collect();
+        for part in parts {
+            part.put(&places, &mut out.values);
+        }
+        out.complete();
+        out
     }
 
     /// Of a square matrix, by what lies on its diagonal and below.
@@ -252,23 +296,6 @@ impl Symmetric {
         }
     }
 
-    /// Puts a matrix whose rows and columns stand at these places there: of one whose rows are its columns what lies on
-    /// its diagonal and below.
-    pub fn put(&mut self, from: &DMatrix<f64>, rows: &[usize], columns: &[usize]) {
-        let places: Vec<usize> = (0..self.size).map(|j| place_of(j, self.size)).collect();
-        let square = rows == columns;
-        for start in (0..columns.len()).step_by(TURNED) {
-            let some = start..(start + TURNED).min(columns.len());
-            for (i, &row) in rows.iter().enumerate().skip(if square { start } else { 0 }) {
-                for j in some.clone().filter(|&j| !square || j <= i) {
-                    let column = columns[j];
-                    self.values[places[row.min(column)] + row.max(column)] = from[(i, j)];
-                }
-            }
-        }
-        self.complete();
-    }
-
     fn view(&self, panel: &Panel) -> DMatrixView<'_, f64> {
         let values = &self.values[panel.values.clone()];
         DMatrixView::from_slice(values, self.size - panel.columns.start, panel.columns.len())
@@ -402,16 +429,25 @@ mod tests {
         let order: Vec<usize> = (0..SIZE).map(|k| (k * 2) % SIZE).collect();
         let turned = dense.select_columns(&order).select_rows(&order);
         let (first, last) = order.split_at(80);
-        let mut ours = Symmetric::zeros(SIZE);
-        for (rows, columns) in [(first, first), (last, first), (last, last)] {
-            let from: Vec<usize> = rows.to_vec();
-            let part = dense.select_rows(&from).select_columns(columns);
-            ours.put(&part, rows, columns);
-        }
+        let parts = [(first, first), (last, first), (last, last)];
+        let parts = parts.map(|(rows, columns)| {
+            let values = dense.select_rows(rows).select_columns(columns);
+            (values, rows, columns)
+        });
+        let parts = parts.each_ref().map(|(values, rows, columns)| Part {
+            values,
+            rows,
+            columns,
+        });
+        let ours = Symmetric::of_parts(SIZE, parts);
         close(&DMatrix::from(&ours), &dense);
         let whole = Symmetric::of_lower(&turned);
-        let mut back = Symmetric::zeros(SIZE);
-        back.put(&DMatrix::from(&whole), &order, &order);
+        let part = Part {
+            values: &DMatrix::from(&whole),
+            rows: &order,
+            columns: &order,
+        };
+        let back = Symmetric::of_parts(SIZE, [part]);
         assert_eq!(back, Symmetric::of_lower(&dense));
     }
 }

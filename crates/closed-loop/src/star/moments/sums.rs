@@ -14,7 +14,7 @@ use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
 
-use block_regression::Symmetric;
+use block_regression::{Part, Symmetric};
 use nalgebra::{DMatrix, DMatrixView, DMatrixViewMut, DVector, Dyn, Matrix3, Vector3};
 
 use super::by_frame::ByFrame;
@@ -464,20 +464,29 @@ impl Sums {
     /// The products, in the order of the Gram matrix.
     fn product(&self, places: &[usize]) -> Symmetric {
         let (shared, own) = (self.layout.shared, self.layout.own.len());
-        let mut out = Symmetric::zeros(self.layout.width());
         let (polynomials, rest) = places.split_at(2 * shared);
-        let own = &rest[..own];
-        for axis in polynomials.chunks_exact(shared.max(1)) {
-            out.put(&self.shared, axis, axis);
-        }
-        out.put(&self.own, own, own);
-        out.put(&self.cross, polynomials, own);
-        out.put(&self.turn, places, &rest[own.len()..]);
-        if let Some((which, better)) = &self.fast {
+        let (own, turns) = rest.split_at(own);
+        let fast = self.fast.as_ref();
+        let fast = fast.map(|(which, better)| {
             let which: Vec<usize> = which.iter().map(|&k| own[k]).collect();
-            out.put(better, &which, &which);
-        }
-        out
+            (better, which)
+        });
+        let part = |values, rows, columns| Part {
+            values,
+            rows,
+            columns,
+        };
+        let axes = polynomials.chunks_exact(shared.max(1));
+        let axes = axes.map(|axis| part(&self.shared, axis, axis));
+        let others = [
+            part(&self.own, own, own),
+            part(&self.cross, polynomials, own),
+            part(&self.turn, places, turns),
+        ];
+        let fast = fast
+            .iter()
+            .map(|(better, which)| part(better, which, which));
+        Symmetric::of_parts(self.layout.width(), axes.chain(others).chain(fast))
     }
 
     /// R, with the rotations of the bins kept apart.
