@@ -22,7 +22,7 @@ const PANEL: usize = 64;
 /// Columns that are turned over at once.
 const TURNED: usize = 8;
 
-/// A symmetric matrix of which what lies below the diagonal is kept.
+/// A symmetric matrix of which what lies on the diagonal and below is kept.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Symmetric {
     size: usize,
@@ -33,11 +33,11 @@ pub struct Symmetric {
 /// what lies on its diagonal and below counts.
 #[derive(Clone, Copy, Debug)]
 pub struct Part<'p> {
-    /// Of any shape.
+    /// As many rows and columns as there are places for.
     pub values: &'p DMatrix<f64>,
-    /// As many as it has rows.
+    /// Places of its rows.
     pub rows: &'p [usize],
-    /// As many as it has columns.
+    /// Places of its columns.
     pub columns: &'p [usize],
 }
 
@@ -50,6 +50,9 @@ impl Part<'_> {
             columns,
         } = *self;
         let square = rows == columns;
+        assert_eq!(values.shape(), (rows.len(), columns.len()), "places");
+        let outside = |place: &usize| *place >= places.len();
+        assert!(!rows.iter().chain(columns).any(outside), "a place outside");
         for start in (0..columns.len()).step_by(TURNED) {
             let some = start..(start + TURNED).min(columns.len());
             for (i, &row) in rows.iter().enumerate().skip(if square { start } else { 0 }) {
@@ -94,6 +97,10 @@ impl Symmetric {
     }
 
     /// Of parts, each at its places, a later one in the place of what an earlier one has there.
+    ///
+    /// # Panics
+    ///
+    /// Where a part has another shape than its places, or one of these lies outside.
     pub fn of_parts<'p>(size: usize, parts: impl IntoIterator<Item = Part<'p>>) -> Self {
         let mut out = Self::zeros(size);
         let places: Vec<usize> = (0..size).map(|j| place_of(j, size)).collect();
@@ -150,7 +157,12 @@ impl Symmetric {
     }
 
     /// Adds `factor E^T E`; `rows` is E, any number x [`size`](Self::size).
+    ///
+    /// # Panics
+    ///
+    /// Where E has another number of columns.
     pub fn add_products(&mut self, factor: f64, rows: &DMatrix<f64>) {
+        assert_eq!(rows.ncols(), self.size, "columns");
         let flipped = rows.transpose();
         for panel in panels(self.size) {
             let start = panel.columns.start;
@@ -274,6 +286,10 @@ impl Symmetric {
     }
 
     /// Makes a row and column zero.
+    ///
+    /// # Panics
+    ///
+    /// Where there is no such column.
     pub fn clear(&mut self, column: usize) {
         self.put_column(column, &vec![0.0; self.size]);
     }
@@ -282,8 +298,10 @@ impl Symmetric {
     ///
     /// # Panics
     ///
-    /// Where there are more numbers than rows.
+    /// Unless there is such a column, and a number for each row.
     pub fn put_column(&mut self, column: usize, values: &[f64]) {
+        assert!(column < self.size, "column {column} of {}", self.size);
+        assert_eq!(values.len(), self.size, "a number for each row");
         for (row, &value) in values.iter().enumerate() {
             let (i, j) = (row.max(column), row.min(column));
             let below = place_of(j, self.size) + i;
@@ -347,7 +365,7 @@ mod tests {
     fn close(ours: &DMatrix<f64>, other: &DMatrix<f64>) {
         assert_eq!(ours.shape(), other.shape());
         let off = (ours - other).norm();
-        assert!(off < 1e-12 * other.norm(), "off by {off}");
+        assert!(off <= 1e-12 * other.norm(), "off by {off}");
     }
 
     #[test]
@@ -362,7 +380,10 @@ mod tests {
         }
         close(&DMatrix::from(&half), &dense);
         assert_eq!(half.diagonal(), dense.diagonal());
-        assert_eq!(Symmetric::zeros(0).size(), 0);
+        for size in [0, 1, PANEL - 1, PANEL, PANEL + 1, 2 * PANEL] {
+            let some = dense.view((0, 0), (size, size)).into_owned();
+            close(&DMatrix::from(&Symmetric::of_lower(&some)), &some);
+        }
     }
 
     #[test]

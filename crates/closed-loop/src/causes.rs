@@ -127,6 +127,8 @@ pub(crate) struct Named<'a> {
     pub(crate) inside: Option<Vec<Vec<f64>>>,
     /// What is left of the stars themselves, and slow.
     pub(crate) slow: Option<Slow>,
+    /// Whether something is described beside it in every fit.
+    pub(crate) keeps: bool,
     /// What the first search refused by size alone: a description that is kept since takes its place.
     pub(crate) oversize: Vec<ConsideredEffect>,
     /// What was found and is not named.

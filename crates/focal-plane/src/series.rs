@@ -51,7 +51,8 @@ pub enum SeriesError {
     },
 }
 
-/// A channel of housekeeping: valid samples in time order, linear in between.
+/// A channel of housekeeping: valid samples in time order, linear in between. Copies, and lagged channels beside the one
+/// that they follow, share what they have in common.
 ///
 /// ```
 /// use focal_plane::Series;
@@ -63,7 +64,6 @@ pub enum SeriesError {
 /// assert!(bracket.at(20.0).expect("inside") < 22.0);
 /// # Ok::<(), focal_plane::SeriesError>(())
 /// ```
-/// A copy, and a lagged channel beside the one that it follows, share what they have in common.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Series {
     t_s: Arc<[f64]>,

@@ -5,7 +5,7 @@
 //! ```
 //!
 //! B: blocks that hold the column's information. [`Fits::scatter`] says the same of any few columns together;
-//! here a block's products are gone through as they lie in memory.
+//! here many columns go through a block at a time.
 //!
 //! Source: Liang & Zeger 1986 (cluster-robust variance).
 

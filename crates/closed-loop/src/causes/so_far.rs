@@ -149,6 +149,7 @@ impl SoFar {
             described: standing.described,
             inside: standing.inside,
             slow: standing.slow,
+            keeps: !self.kept.is_empty(),
             oversize: self.oversize,
             refused: self.refused,
         }))

@@ -363,7 +363,7 @@ impl Trials<'_> {
     }
 
     /// Log-likelihood out of fold less the price of all parameters and choices.
-    fn worth(&self, set: &[usize]) -> Option<f64> {
+    pub(crate) fn worth(&self, set: &[usize]) -> Option<f64> {
         Some(self.out_of_fold(set)?.total_loglik() - self.paid(set))
     }
 
@@ -410,11 +410,10 @@ impl Trials<'_> {
         Some(standing.map_or(Judgement::UNSEEN, |(judgement, _)| judgement))
     }
 
-    /// The p-value of a group beside `others`, as the blocks scatter or if the noise were white, whichever is less, times
-    /// what the search costs it; `None` if it cannot be told from them.
-    pub(crate) fn chance(&self, others: &[usize], g: usize) -> Option<f64> {
-        let (judgement, white) = self.standing(others, g, 0.0)?;
-        Some(judgement.p_value.min(white))
+    /// The p-value of a group beside `others` if the noise were white, times what the search costs it: none that stands
+    /// has more. `None` if it cannot be told from them.
+    pub(crate) fn white_chance(&self, others: &[usize], g: usize) -> Option<f64> {
+        Some(self.standing(others, g, 0.0)?.1)
     }
 
     /// What a group adds to the log-likelihood out of fold of `others`, which is `base`.

@@ -203,10 +203,10 @@ fn conclude(
     let Named {
         mut searched,
         described,
-        inside: _,
         slow,
         oversize,
         refused,
+        ..
     } = named;
     if situation.questions.empirical {
         ground.offer(&mut searched, &described)?;

@@ -99,11 +99,23 @@ impl Finish<'_> {
         })
     }
 
-    /// The better model at its best: `residual` is what the `added` groups leave.
-    fn after<'r>(&self, added: &[usize], residual: Cow<'r, Residuals>) -> AtBest<'r> {
+    /// The better model at its best: `residual` is what the `added` groups leave. Where nothing at all was added that is
+    /// the declared one, `before`: one fit, one figure.
+    fn after<'r>(
+        &self,
+        before: &'r AtBest<'_>,
+        added: Option<&[usize]>,
+        residual: Residuals,
+    ) -> AtBest<'r> {
+        let Some(added) = added else {
+            return AtBest {
+                residual: Cow::Borrowed(&*before.residual),
+                loglik: before.loglik,
+            };
+        };
         let set = columns_of(&self.found.fitted.groups, added);
         AtBest {
-            residual,
+            residual: Cow::Owned(residual),
             loglik: self.found.fitted.data_loglik(&set),
         }
     }
@@ -204,17 +216,8 @@ pub(crate) fn finish(
     let rows = f.rows();
     let before = f.before(&effects)?;
     let nothing_added = effects.is_empty();
-    // one fit, one figure
-    let after = if nothing_added {
-        drop(plain);
-        AtBest {
-            residual: Cow::Borrowed(&*before.residual),
-            ..before
-        }
-    } else {
-        f.after(&groups, Cow::Owned(with_term.unwrap_or(plain)))
-    };
-    drop(inside);
+    let added = (!nothing_added).then_some(groups.as_slice());
+    let after = f.after(&before, added, with_term.unwrap_or(plain));
     let hypotheses = hypothesis::answer(
         f.situation.questions,
         &Grounds {

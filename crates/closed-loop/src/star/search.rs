@@ -46,14 +46,13 @@ use crate::star::evidence::StarEvidence;
 use crate::star::landing::Elsewhere;
 use alone::{Begun, Outcome};
 use beside_slow::{Coloured, beside_slow};
-pub(crate) use in_vain::in_vain;
 use trial::{Trial, taken_out_in_turn};
 
 mod alone;
 mod beside_slow;
 mod first_sight;
 mod foreknown;
-mod in_vain;
+pub(crate) mod in_vain;
 mod on_frames;
 mod trial;
 

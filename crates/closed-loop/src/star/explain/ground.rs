@@ -91,8 +91,7 @@ impl<'g, 'a> Ground<'g, 'a> {
         let series = inside.as_ref().map(|(_, series)| series);
         let look = self.look(series);
         let put_forward = self.put_forward(&outcome.searched, series, look)?;
-        let (level, folds) = (self.level, self.begun.folds);
-        if !put_forward.is_empty() && !in_vain(level, folds, &outcome.searched, &put_forward)? {
+        if !put_forward.is_empty() && !self.is_in_vain(&outcome, &put_forward)? {
             progress("searching again with the line, jump or orbit that is left");
             let first = self.listed().len() + also.len();
             let count = put_forward.len();
@@ -122,6 +121,20 @@ impl<'g, 'a> Ground<'g, 'a> {
             inside,
             look,
         }))
+    }
+
+    /// Whether a search with what is `put_forward` is needless. What is described in every fit hides more than it leaves.
+    fn is_in_vain(
+        &self,
+        named: &Named<'_>,
+        put_forward: &[Arc<dyn Candidate>],
+    ) -> Result<bool, CloseError> {
+        let (level, folds, searched) = (self.level, self.begun.folds, &named.searched);
+        match searched.wander {
+            None if named.keeps => Ok(false),
+            None => in_vain::without_slow(level, folds, searched, put_forward),
+            Some(_) => in_vain::beside_slow(level, folds, searched, put_forward),
+        }
     }
 
     /// The first search: with what an earlier one put forward, if that is named again.
