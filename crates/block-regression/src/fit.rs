@@ -71,6 +71,7 @@ use rayon::prelude::*;
 
 use crate::folds::Folds;
 use crate::gram::{BlockGrams, FoldSums, Gram};
+use crate::symmetric::Symmetric;
 
 mod alone;
 mod elimination;
@@ -324,7 +325,8 @@ impl Fits {
             candidates: set.len(),
             ..layout.clone()
         };
-        let fits = Self::whole(&BlockGrams::whole(&alone, *scalars), &layout, variance)?;
+        let alone = BlockGrams::whole(Symmetric::of_lower(&alone), *scalars);
+        let fits = Self::whole(&alone, &layout, variance)?;
         let shown: Vec<usize> = (0..set.len()).filter(|&c| fits.shows(c)).collect();
         fits.variance(&shown)
     }

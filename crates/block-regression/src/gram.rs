@@ -121,55 +121,13 @@ impl Gram {
         out
     }
 
-    /// Adds what lies below the diagonal, M only where it is not `known`.
-    fn add_to(&self, sum: &mut DMatrix<f64>, known: bool) {
+    /// Adds it, M only where that is not `known`.
+    fn add_to(&self, sum: &mut Symmetric, known: bool) {
         if !known {
-            self.shared.add_lower_to(self.weight, sum);
+            sum.add(self.weight, &self.shared);
         }
         if self.rows.nrows() > 0 {
-            add_products(1.0, &self.rows, sum);
-        }
-    }
-}
-
-/// Columns of a product that are formed at once.
-const PANEL: usize = 96;
-
-/// Adds `factor E^T E` to `sum`, where it lies on the diagonal and below; above, `sum` may change too and means
-/// nothing. `rows` is E, any number x n; `sum` is n x n.
-pub fn add_products(factor: f64, rows: &DMatrix<f64>, sum: &mut DMatrix<f64>) {
-    let (flipped, n) = (rows.transpose(), rows.ncols());
-    for start in (0..n).step_by(PANEL) {
-        let panel = PANEL.min(n - start);
-        let below = flipped.rows(start, n - start);
-        sum.view_mut((start, start), (n - start, panel)).gemm(
-            factor,
-            &below,
-            &rows.columns(start, panel),
-            1.0,
-        );
-    }
-}
-
-/// Rows and columns that are turned over at once.
-const TILE: usize = 32;
-
-/// Makes a square matrix symmetric by what lies below its diagonal.
-///
-/// # Panics
-///
-/// Where the matrix is not square.
-pub fn mirror_lower(matrix: &mut DMatrix<f64>) {
-    assert!(matrix.is_square(), "only a square matrix is symmetric");
-    let n = matrix.nrows();
-    let values = matrix.as_mut_slice();
-    for first in (0..n).step_by(TILE) {
-        for start in (first..n).step_by(TILE) {
-            for j in first..(first + TILE).min(n) {
-                for i in start.max(j + 1)..(start + TILE).min(n) {
-                    values[i * n + j] = values[j * n + i];
-                }
-            }
+            sum.add_products(1.0, &self.rows);
         }
     }
 }
@@ -185,7 +143,7 @@ pub struct BlockGrams {
     /// may have been whitened. No fit uses it.
     pub log_scale: f64,
     /// Where it is known, the sum of M over the blocks of each fold; the weight is then the same in all blocks.
-    pub known: Option<Arc<Vec<DMatrix<f64>>>>,
+    pub known: Option<Arc<Vec<Symmetric>>>,
     /// The same in all, cut by what was measured and not by when: parts whose noise is each its own however long it
     /// lasts. None where the data is not cut so.
     pub by_source: Vec<Gram>,
@@ -222,10 +180,10 @@ fn sum<'a>(
 }
 
 impl BlockGrams {
-    /// One block that is there already, in the unit of the measurements: by what lies on its diagonal and below.
-    pub fn whole(gram: &DMatrix<f64>, scalars: f64) -> Self {
+    /// One block that is there already, in the unit of the measurements.
+    pub fn whole(gram: Symmetric, scalars: f64) -> Self {
         Self {
-            gram: vec![Gram::whole(Symmetric::of_lower(gram))],
+            gram: vec![Gram::whole(gram)],
             scalars: vec![scalars],
             log_scale: 0.0,
             known: None,
@@ -285,7 +243,7 @@ impl BlockGrams {
         let (gram, scalars) = self.by_fold(folds).all;
         Self {
             log_scale: self.log_scale,
-            ..Self::whole(&gram, scalars)
+            ..Self::whole(Symmetric::of_lower(&gram), scalars)
         }
     }
 
@@ -298,20 +256,18 @@ impl BlockGrams {
     fn sum(
         &self,
         wanted: impl Fn(usize) -> bool,
-        known: Option<&DMatrix<f64>>,
+        known: Option<&Symmetric>,
     ) -> (DMatrix<f64>, f64) {
-        let width = self.width();
-        let mut gram = match (known, self.gram.first()) {
+        let mut gram = Symmetric::zeros(self.width());
+        if let (Some(known), Some(first)) = (known, self.gram.first()) {
             // the blocks are of one noise
-            (Some(known), Some(gram)) => known * gram.weight,
-            _ => DMatrix::zeros(width, width),
-        };
+            gram.add(first.weight, known);
+        }
         let mut scalars = 0.0;
         for b in (0..self.gram.len()).filter(|&b| wanted(b)) {
             self.gram[b].add_to(&mut gram, known.is_some());
             scalars += self.scalars[b];
         }
-        mirror_lower(&mut gram);
-        (gram, scalars)
+        (DMatrix::from(&gram), scalars)
     }
 }

@@ -17,7 +17,7 @@
 //! | how time is cut: five folds, up to sixty blocks | [`Folds`] |
 //! | rows of regressors and residual | [`Design`], [`Layout`] |
 //! | one pass over them | [`BlockGrams::accumulate`] |
-//! | sums that were formed in another way | [`Gram`], [`Symmetric`], [`Part`], [`add_products`], [`mirror_lower`] |
+//! | sums that were formed in another way | [`Gram`], [`Symmetric`], [`Part`] |
 //! | fits of any set of candidates | [`Fits`] |
 //! | what they predict where they were not fitted | [`Fits::out_of_fold`], [`OutOfFold`] |
 //! | amplitudes, standard errors, p-values | [`Fits::estimate`], [`Estimate`] |
@@ -82,6 +82,6 @@ mod tail;
 
 pub use fit::{Estimate, Fits, Layout, OutOfFold};
 pub use folds::Folds;
-pub use gram::{BlockGrams, Design, FoldSums, Gram, add_products, mirror_lower};
+pub use gram::{BlockGrams, Design, FoldSums, Gram};
 pub use symmetric::{Part, Symmetric};
 pub use tail::beyond;

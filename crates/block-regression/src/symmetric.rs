@@ -15,12 +15,12 @@ use std::ops::Range;
 
 use nalgebra::{DMatrix, DMatrixView, DMatrixViewMut, DVector};
 
-use crate::gram::mirror_lower;
-
 /// Columns of a panel: enough for products of panels to pay, few enough for their squares to be a small share.
 const PANEL: usize = 64;
 /// Columns that are turned over at once.
 const TURNED: usize = 8;
+/// Rows and columns of a tile of them.
+const TILE: usize = 32;
 
 /// A symmetric matrix of which what lies on the diagonal and below is kept.
 #[derive(Clone, Debug, PartialEq)]
@@ -94,6 +94,13 @@ impl Symmetric {
             size,
             values: vec![0.0; room],
         }
+    }
+
+    /// `E^T E`; `rows` is E, any number x size.
+    pub fn of_products(rows: &DMatrix<f64>) -> Self {
+        let mut out = Self::zeros(rows.ncols());
+        out.add_products(1.0, rows);
+        out
     }
 
     /// Of parts, each at its places, a later one in the place of what an earlier one has there.
@@ -185,20 +192,6 @@ impl Symmetric {
         }
     }
 
-    /// Adds `factor` times it to `sum` of its size, on the diagonal and below; above, `sum` may change too and means
-    /// nothing.
-    pub fn add_lower_to(&self, factor: f64, sum: &mut DMatrix<f64>) {
-        for panel in panels(self.size) {
-            let own = self.view(&panel);
-            let start = panel.columns.start;
-            for (from, column) in own.column_iter().zip(panel.columns) {
-                let mut into = sum.column_mut(column);
-                into.rows_mut(start, self.size - start)
-                    .axpy(factor, &from, 1.0);
-            }
-        }
-    }
-
     /// Adds `factor` times its first rows and columns, as many as `right` has rows, times `right` to `out`.
     pub(crate) fn add_first_times(
         &self,
@@ -235,7 +228,7 @@ impl Symmetric {
     }
 
     /// `z^T M z`.
-    pub(crate) fn quadratic(&self, z: &DVector<f64>) -> f64 {
+    pub fn quadratic(&self, z: &DVector<f64>) -> f64 {
         let mut sum = 0.0;
         for (j, &own) in z.iter().enumerate().filter(|(_, own)| **own != 0.0) {
             let first = place_of(j, self.size) + j;
@@ -328,9 +321,23 @@ impl Symmetric {
 
 impl From<&Symmetric> for DMatrix<f64> {
     fn from(matrix: &Symmetric) -> Self {
-        let mut out = Self::zeros(matrix.size, matrix.size);
-        matrix.add_lower_to(1.0, &mut out);
-        mirror_lower(&mut out);
+        let n = matrix.size;
+        let mut out = Self::zeros(n, n);
+        for panel in panels(n) {
+            let start = panel.columns.start;
+            let mut into = out.view_mut((start, start), (n - start, panel.columns.len()));
+            into.copy_from(&matrix.view(&panel));
+        }
+        let values = out.as_mut_slice();
+        for first in (0..n).step_by(TILE) {
+            for start in (first..n).step_by(TILE) {
+                for j in first..(first + TILE).min(n) {
+                    for i in start.max(j + 1)..(start + TILE).min(n) {
+                        values[i * n + j] = values[j * n + i];
+                    }
+                }
+            }
+        }
         out
     }
 }

@@ -1,7 +1,6 @@
 //! Fits from sums against fits of every row.
 
 use super::*;
-use crate::Symmetric;
 use crate::gram::Design;
 use nalgebra::{Cholesky, Matrix2};
 use rand_core::SeedableRng;
@@ -361,7 +360,8 @@ fn products_of_few_columns_are_those_of_all() {
         .map(|f| {
             let own = split.iter().zip(&folds.fold_of_block);
             let own = own.filter(|(_, of)| **of == f);
-            own.fold(DMatrix::zeros(width, width), |sum, (s, _)| sum + &s.0)
+            let sum = own.fold(DMatrix::zeros(width, width), |sum, (s, _)| sum + &s.0);
+            Symmetric::of_lower(&sum)
         })
         .collect();
     let parts = BlockGrams {

@@ -88,9 +88,7 @@ pub(super) fn parts(columns: &StarColumns<'_>, parts: usize) -> Vec<Gram> {
         if rows.nrows() < width {
             Gram::new(0.0, nothing.clone(), rows)
         } else {
-            let mut products = Symmetric::zeros(width);
-            products.add_products(1.0, &rows);
-            Gram::whole(products)
+            Gram::whole(Symmetric::of_products(&rows))
         }
     })
     .collect()

@@ -25,7 +25,7 @@ mod tests;
 
 use std::sync::{Arc, OnceLock};
 
-use block_regression::{BlockGrams, Folds, Gram, Symmetric, add_products, mirror_lower};
+use block_regression::{BlockGrams, Folds, Gram, Symmetric};
 use coloured_noise::{CommonNoise, Filter, Rotations};
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use rayon::prelude::*;
@@ -149,9 +149,9 @@ pub(crate) struct StarMoments {
     /// Frames of each bin.
     frames: Vec<usize>,
     /// Sums over the blocks, once they are asked for: of R, and of the products under white noise.
-    rest: OnceLock<DMatrix<f64>>,
-    rest_by_fold: OnceLock<Arc<Vec<DMatrix<f64>>>>,
-    white: OnceLock<DMatrix<f64>>,
+    rest: OnceLock<Symmetric>,
+    rest_by_fold: OnceLock<Arc<Vec<Symmetric>>>,
+    white: OnceLock<Symmetric>,
     fold_of_block: Vec<usize>,
 }
 
@@ -248,54 +248,50 @@ impl StarMoments {
 
     /// The sum over the blocks of the products under white noise, of some of the columns.
     pub(crate) fn white_in_all(&self, columns: &[usize]) -> BlockGrams {
-        self.white_as_one(pick(self.white_sum(), columns))
+        self.white_as_one(self.white_sum().picked(columns))
     }
 
     /// Their sum, as one block.
-    fn white_as_one(&self, sum: DMatrix<f64>) -> BlockGrams {
-        BlockGrams::whole(&sum, self.blocks.iter().map(|b| b.scalars).sum())
+    fn white_as_one(&self, sum: Symmetric) -> BlockGrams {
+        BlockGrams::whole(sum, self.blocks.iter().map(|b| b.scalars).sum())
     }
 
     /// The sum over the blocks of the products under white noise.
-    fn white_sum(&self) -> &DMatrix<f64> {
+    fn white_sum(&self) -> &Symmetric {
         self.white.get_or_init(|| {
-            let width = self.width();
-            let all: Vec<usize> = (0..width).collect();
+            let all: Vec<usize> = (0..self.width()).collect();
             let some = self.blocks.par_chunks(ADDED);
             let parts = some.map(|blocks| {
-                let mut sum = DMatrix::zeros(width, width);
+                let mut sum = Symmetric::zeros(all.len());
                 for block in blocks {
                     if let Some(lost) = &block.lost {
-                        lost.add_lower_to(1.0, &mut sum);
+                        sum.add(1.0, lost);
                     }
-                    add_products(1.0, &block.whitened(&all), &mut sum);
+                    sum.add_products(1.0, &block.whitened(&all));
                 }
                 sum
             });
-            let parts: Vec<DMatrix<f64>> = parts.collect();
-            let mut sum = parts
-                .iter()
-                .fold(self.rest().clone(), |sum, part| sum + part);
-            mirror_lower(&mut sum);
+            let parts: Vec<Symmetric> = parts.collect();
+            let mut sum = self.rest().clone();
+            parts.iter().for_each(|part| sum.add(1.0, part));
             sum
         })
     }
 
     /// The sums of R over the blocks of each fold, where all columns are asked for.
-    fn known(&self, columns: &[usize]) -> Option<Arc<Vec<DMatrix<f64>>>> {
+    fn known(&self, columns: &[usize]) -> Option<Arc<Vec<Symmetric>>> {
         is_all(columns, self.width()).then(|| self.rest_by_fold().clone())
     }
 
-    fn rest_by_fold(&self) -> &Arc<Vec<DMatrix<f64>>> {
+    fn rest_by_fold(&self) -> &Arc<Vec<Symmetric>> {
         self.rest_by_fold.get_or_init(|| {
             let width = self.width();
             let folds = 0..self.fold_of_block.iter().map(|f| f + 1).max().unwrap_or(0);
             let of = |f| {
                 let own = self.blocks.iter().zip(&self.fold_of_block);
                 let own = own.filter(|(_, of)| **of == f);
-                let mut sum = DMatrix::zeros(width, width);
-                own.for_each(|(b, _)| b.rest.add_lower_to(1.0, &mut sum));
-                mirror_lower(&mut sum);
+                let mut sum = Symmetric::zeros(width);
+                own.for_each(|(b, _)| sum.add(1.0, &b.rest));
                 sum
             };
             Arc::new(folds.into_par_iter().map(of).collect())
@@ -313,11 +309,12 @@ impl StarMoments {
     }
 
     /// The sum over the blocks of R.
-    fn rest(&self) -> &DMatrix<f64> {
+    fn rest(&self) -> &Symmetric {
         self.rest.get_or_init(|| {
-            let width = self.width();
+            let mut sum = Symmetric::zeros(self.width());
             let parts = self.rest_by_fold().iter();
-            parts.fold(DMatrix::zeros(width, width), |sum, part| sum + part)
+            parts.for_each(|part| sum.add(1.0, part));
+            sum
         })
     }
 
@@ -372,14 +369,15 @@ impl StarMoments {
     pub(crate) fn under_in_all(&self, columns: &[usize], noise: &CommonNoise) -> BlockGrams {
         let weight = noise.centroid.powi(-2);
         let (log_scale, innovations) = self.innovations(columns, noise, None);
-        let mut gram = pick(self.rest(), columns) * weight;
+        let mut gram = Symmetric::zeros(columns.len());
+        gram.add(weight, &self.rest().picked(columns));
         for e in innovations {
-            gram.gemm(1.0, &e.transpose(), &e, 1.0);
+            gram.add_products(1.0, &e);
         }
         let scalars = self.blocks.iter().map(Block::solved_scalars).sum();
         BlockGrams {
             log_scale,
-            ..BlockGrams::whole(&gram, scalars)
+            ..BlockGrams::whole(gram, scalars)
         }
     }
 
@@ -425,7 +423,7 @@ impl StarMoments {
             columns.len(),
             beta.iter().map(|b| -b).chain(std::iter::once(1.0)),
         );
-        let sse = left.dot(&(pick(self.rest(), columns) * &left));
+        let sse = self.rest().picked(columns).quadratic(&left);
         let mut rest = 0.0;
         let mut rotations = Vec::with_capacity(3 * self.t_s.len());
         let mut inverse = Vec::with_capacity(self.t_s.len());
@@ -451,24 +449,11 @@ impl StarMoments {
     }
 }
 
-/// Rows and columns `columns` of a matrix.
-fn pick(matrix: &DMatrix<f64>, columns: &[usize]) -> DMatrix<f64> {
-    let n = columns.len();
-    let mut out = DMatrix::zeros(n, n);
-    for (mut out, &from) in out.column_iter_mut().zip(columns) {
-        let from = matrix.column(from);
-        out.iter_mut()
-            .zip(columns)
-            .for_each(|(out, &i)| *out = from[i]);
-    }
-    out
-}
-
 fn is_all(columns: &[usize], width: usize) -> bool {
     columns.len() == width && columns.iter().enumerate().all(|(i, &c)| i == c)
 }
 
-/// As [`pick`], without a copy where that is all.
+/// Rows and columns `columns` of a matrix, without a copy where that is all.
 fn shared(matrix: &Arc<Symmetric>, columns: &[usize]) -> Arc<Symmetric> {
     if is_all(columns, matrix.size()) {
         matrix.clone()

@@ -130,10 +130,12 @@ impl<'g, 'a> Ground<'g, 'a> {
         put_forward: &[Arc<dyn Candidate>],
     ) -> Result<bool, CloseError> {
         let (level, folds, searched) = (self.level, self.begun.folds, &named.searched);
-        match searched.wander {
-            None if named.keeps => Ok(false),
-            None => in_vain::without_slow(level, folds, searched, put_forward),
-            Some(_) => in_vain::beside_slow(level, folds, searched, put_forward),
+        let found = &searched.found;
+        match &searched.wander {
+            Some(wander) => in_vain::beside_slow(level, folds, found, wander, put_forward),
+            // one that the model declares, or that is too faint to be told, is in the evidence
+            None if named.keeps || searched.evidence.is_some() => Ok(false),
+            None => in_vain::without_slow(level, folds, found, put_forward),
         }
     }
 

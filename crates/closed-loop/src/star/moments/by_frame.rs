@@ -152,11 +152,12 @@ impl StarMoments {
             Some(by_frame.products(residuals, &by_frame.of_turns(turns), turns))
         });
         let products: Vec<DMatrix<f64>> = products.collect();
-        let mut sum = widened(self.white_sum(), first, added).insert_rows(first, added, 0.0);
-        let none = DMatrix::zeros(added, sum.ncols());
+        let mut sum = self.white_sum().widened(first, added);
+        let none = DMatrix::zeros(added, sum.size());
         let all = products.iter().fold(none, |all, part| all + part);
-        sum.columns_mut(first, added).tr_copy_from(&all);
-        sum.rows_mut(first, added).copy_from(&all);
+        for (k, products) in all.transpose().column_iter().enumerate() {
+            sum.put_column(first + k, products.as_slice());
+        }
         self.white_as_one(sum)
     }
 

@@ -17,8 +17,8 @@ use std::sync::Arc;
 use block_regression::{Part, Symmetric};
 use nalgebra::{DMatrix, DMatrixView, DMatrixViewMut, DVector, Dyn, Matrix3, Vector3};
 
+use super::Block;
 use super::by_frame::ByFrame;
-use super::{Block, pick};
 use crate::star::columns::StarColumns;
 use crate::star::frame_rotation::rotation_row;
 use crate::star::layout::{Filled, Layout, zeros_in};
@@ -516,7 +516,7 @@ impl Sums {
         }
         let mut rest = self.product(&places);
         let lost = self.lost.as_ref();
-        let lost = lost.map(|(lost, _)| Symmetric::of_lower(&pick(lost, &order)));
+        let lost = lost.map(|(lost, _)| Symmetric::of_lower(lost).picked(&order));
         let mut scalars = self.scalars;
         if let (Some((_, count)), Some(lost)) = (&self.lost, &lost) {
             rest.add(-1.0, lost);

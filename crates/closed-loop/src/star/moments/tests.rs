@@ -565,7 +565,7 @@ fn what_turns_the_camera_needs_no_other_pass() {
         let beside = before.narrowed(first, 1).beside_turns(1, &turned(turn));
         same(&beside, &pass(&[turn]));
         if std::ptr::eq(turn, &rest) {
-            let nothing = beside.rest().columns(first, 3).norm();
+            let nothing = DMatrix::from(beside.rest()).columns(first, 3).norm();
             assert!(nothing <= 0.0, "{nothing}");
         }
     }

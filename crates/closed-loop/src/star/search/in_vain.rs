@@ -12,7 +12,7 @@ use block_regression::Folds;
 use effects::Candidate;
 use rayon::prelude::*;
 
-use super::Searched;
+use super::Wander;
 use super::alone::Begun;
 use super::trial::{Trial, taken_out_in_turn};
 use crate::error::CloseError;
@@ -72,13 +72,12 @@ impl<'a> PutForward<'a> {
 pub(crate) fn without_slow(
     white: &StarEvidence<'_>,
     folds: &Folds,
-    searched: &Searched<'_>,
+    found: &Found,
     put_forward: &[Arc<dyn Candidate>],
 ) -> Result<bool, CloseError> {
-    let found = &searched.found;
     // frames that turn freely know an orbit by what it stretches, as other effects do
     let is_rival = |c: &dyn Candidate| c.turns_camera() || white.data.free_attitude;
-    if searched.evidence.is_some() || found.chosen().any(is_rival) {
+    if found.chosen().any(is_rival) {
         return Ok(false);
     }
     let behind = PutForward::behind(found, put_forward);
@@ -109,13 +108,11 @@ pub(crate) fn without_slow(
 pub(crate) fn beside_slow(
     white: &StarEvidence<'_>,
     folds: &Folds,
-    searched: &Searched<'_>,
+    found: &Found,
+    wander: &Wander,
     put_forward: &[Arc<dyn Candidate>],
 ) -> Result<bool, CloseError> {
-    let Some(wander) = &searched.wander else {
-        return Ok(false);
-    };
-    let behind = PutForward::behind(&searched.found, put_forward);
+    let behind = PutForward::behind(found, put_forward);
     let own = Begun::on(white, folds, behind.candidates.clone())?;
     let groups = &own.plain.groups;
     let every: Vec<usize> = (0..groups.len()).collect();
@@ -179,8 +176,8 @@ mod tests {
         };
         let folds = Folds::cut(data.frames.t_s.len());
         let all: Vec<usize> = (0..found.len()).collect();
-        let searched = Searched::plain(Found::of_chosen(&white, &folds, found, &all).unwrap());
-        without_slow(&white, &folds, &searched, &[put_forward.into()]).unwrap()
+        let found = Found::of_chosen(&white, &folds, found, &all).unwrap();
+        without_slow(&white, &folds, &found, &[put_forward.into()]).unwrap()
     }
 
     /// Six stars in 600 frames tell a line to sqrt(2/3600) = 0.024": one of 0.2" is 8.5 sigma, chance e^-33. Of none, which

@@ -16,7 +16,7 @@
 
 use std::ops::Range;
 
-use block_regression::{add_products, mirror_lower};
+use block_regression::Symmetric;
 use nalgebra::{DMatrix, MatrixXx2, RowDVector};
 use pulp::Arch;
 use rayon::prelude::*;
@@ -118,19 +118,17 @@ impl Field {
                 columns.column_mut(n + axis).copy_from_slice(own);
             }
             columns.column_mut(n + 2).fill(1.0);
-            let mut sum = DMatrix::zeros(n + 3, n + 3);
-            add_products(1.0, &columns, &mut sum);
-            sum
+            Symmetric::of_products(&columns)
         };
-        let each: Vec<DMatrix<f64>> = pieces.par_iter().map(products).collect();
-        let mut sums = vec![DMatrix::zeros(n + 3, n + 3); self.stars.len()];
+        let each: Vec<Symmetric> = pieces.par_iter().map(products).collect();
+        let mut sums = vec![Symmetric::zeros(n + 3); self.stars.len()];
         for ((star, _), own) in pieces.iter().zip(&each) {
-            sums[*star] += own;
+            sums[*star].add(1.0, own);
         }
         let stars = sums.into_iter().zip(&self.stars).zip(&self.weight);
         stars
-            .map(|((mut sum, rows), weight)| {
-                mirror_lower(&mut sum);
+            .map(|((sum, rows), weight)| {
+                let sum = DMatrix::from(&sum);
                 let mean = sum.row(n + 2).columns(0, n) / rows.len() as f64;
                 let normal = sum.view((0, 0), (n, n)) - mean.tr_mul(&mean) * rows.len() as f64;
                 let of_axes = sum.row(n + 2).columns(n, 2).into_owned();
