@@ -44,6 +44,7 @@ mod motion;
 mod noise_effects;
 mod noise_level;
 mod outcome;
+mod parabola;
 mod power;
 mod questions;
 mod residual_size;

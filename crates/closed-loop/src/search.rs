@@ -18,10 +18,12 @@ use nalgebra::DVector;
 
 use crate::error::CloseError;
 use crate::evidence::{Amplitudes, Evidence, Residuals};
+use crate::parabola::bottom;
 pub(crate) use fitted::{
     Fitted, fit, fit_beside, fit_design, fit_grams, fit_grams_beside, fit_whole, layout_of,
 };
 use group::Group;
+use instants::INSTANT;
 use selection::{Selection, columns_of, costs};
 
 pub(crate) mod catalogue;
@@ -31,6 +33,7 @@ pub(crate) mod forms;
 pub(crate) mod group;
 pub(crate) mod instants;
 pub(crate) mod misplaced;
+pub(crate) mod near;
 pub(crate) mod orbits;
 pub(crate) mod refusal;
 pub(crate) mod selection;
@@ -238,6 +241,7 @@ pub(crate) fn search(
     mut start: Option<Fitted>,
 ) -> Result<Found, CloseError> {
     let mut before: Vec<usize> = Vec::new();
+    let (mut last, mut compared) = (ROUNDS, false);
     for round in 1.. {
         let fitted = match start.take() {
             Some(fitted) => fitted,
@@ -245,8 +249,16 @@ pub(crate) fn search(
         };
         let (chosen, quieter) = fitted.chosen(folds, &candidates, may)?;
         let fitted = quieter.unwrap_or(fitted);
-        let settled = chosen.is_empty() || chosen == before || round == ROUNDS;
+        let settled = chosen.is_empty() || chosen == before || round == last;
         if settled || !polish(evidence, folds, &mut candidates, &fitted, &chosen)? {
+            if !compared && round < last {
+                compared = true;
+                if near::likelier(evidence, folds, &mut candidates, &fitted, &chosen, may)? {
+                    last = round + ROUNDS;
+                    before.clear();
+                    continue;
+                }
+            }
             return Ok(Found {
                 selection: fitted.selection(chosen, may),
                 candidates,
@@ -367,7 +379,7 @@ pub(crate) fn polish(
     Ok(changed)
 }
 
-/// Scans non-linear parameter `k` of candidate `g`, ever finer.
+/// Scans non-linear parameter `k` of candidate `g`, ever finer, and ends between values where the likelihood is a parabola.
 fn scan(
     evidence: &dyn Evidence,
     folds: &Folds,
@@ -376,25 +388,24 @@ fn scan(
     g: usize,
     k: usize,
 ) -> Result<(), CloseError> {
-    let mut step = candidates[g].nonlinear()[k].step;
+    let parameter = candidates[g].nonlinear().swap_remove(k);
+    let half = (SCAN / 2) as f64;
+    let mut step = parameter.step / half;
+    let moved = |form: &dyn Candidate, by: f64| -> Option<Arc<dyn Candidate>> {
+        let mut values: Vec<f64> = form.nonlinear().iter().map(|n| n.value).collect();
+        values[k] += by;
+        form.with_nonlinear(&values).map(Arc::from)
+    };
     for round in 1..=MOST_ROUNDS {
-        let now: Vec<f64> = candidates[g].nonlinear().iter().map(|n| n.value).collect();
-        let half = (SCAN / 2) as f64;
-        let mut trial: Vec<Arc<dyn Candidate>> = Vec::new();
-        for i in 0..SCAN {
-            let mut value = now.clone();
-            value[k] += step * (i as f64 - half) / half;
-            trial.extend(candidates[g].with_nonlinear(&value).map(Arc::from));
-        }
+        let now = candidates[g].as_ref();
+        let mut trial: Vec<Arc<dyn Candidate>> = (0..SCAN)
+            .filter_map(|i| moved(now, step * (i as f64 - half)))
+            .collect();
         let variants = trial.len();
         // The others stay in the fit beside each variant.
         let mut tried = borrowed(&trial);
-        tried.extend(
-            chosen
-                .iter()
-                .filter(|&&c| c != g)
-                .map(|&c| candidates[c].as_ref()),
-        );
+        let others = chosen.iter().filter(|&&c| c != g);
+        tried.extend(others.map(|&c| candidates[c].as_ref()));
         let fitted = fit_whole(evidence, folds, &tried)?;
         let with = |v: usize| {
             let set: Vec<usize> = std::iter::once(v)
@@ -402,26 +413,31 @@ fn scan(
                 .collect();
             fitted.fits.variance(&columns_of(&fitted.groups, &set))
         };
-        let each: Vec<Option<f64>> = (0..variants).map(with).collect();
+        // twice the log-likelihood that each loses
+        let lost: Vec<Option<f64>> = (0..variants)
+            .map(|v| with(v).map(|variance| fitted.scalars * variance.ln()))
+            .collect();
         let best = (0..variants)
-            .filter_map(|v| Some((v, each[v]?)))
+            .filter_map(|v| Some((v, lost[v]?)))
             .min_by(|a, b| a.1.total_cmp(&b.1));
         let Some((v, least)) = best else {
             return Ok(());
         };
-        // twice what a neighbour loses in log-likelihood: the nearer one decides
-        let lost = [v.checked_sub(1), Some(v + 1)]
-            .into_iter()
-            .flatten()
-            .filter_map(|n| *each.get(n)?)
-            .map(|variance| fitted.scalars * (variance / least).ln())
-            .filter(|lost| lost.is_finite())
-            .min_by(f64::total_cmp);
         candidates[g] = trial.swap_remove(v);
-        step *= 0.3;
-        if round >= SCAN_ROUNDS && lost.is_none_or(|lost| lost <= FINE) {
+        let at = |n: Option<usize>| (*lost.get(n?)?).filter(|lost| lost.is_finite());
+        let sides = [at(v.checked_sub(1)), at(Some(v + 1))];
+        // the nearer one decides
+        let nearer = sides.iter().flatten().copied().min_by(f64::total_cmp);
+        if round >= SCAN_ROUNDS && nearer.is_none_or(|lost| lost - least <= FINE) {
+            let smooth = parameter.name != INSTANT;
+            if let ([Some(before), Some(behind)], true) = (sides, smooth) {
+                let between = step * bottom([before, least, behind]);
+                candidates[g] = moved(candidates[g].as_ref(), between)
+                    .unwrap_or_else(|| Arc::clone(&candidates[g]));
+            }
             break;
         }
+        step *= 0.3;
     }
     Ok(())
 }

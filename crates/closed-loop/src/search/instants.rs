@@ -39,8 +39,8 @@ use crate::search::group::Group;
 use crate::search::selection::columns_of;
 use crate::search::{Found, first_column, fit, fit_whole};
 
-/// Parameters that are instants.
-const INSTANT: &str = "at_s";
+/// Parameters that are instants: the likelihood of one is no parabola.
+pub(crate) const INSTANT: &str = "at_s";
 /// Difference for a slope, in the step within which columns hardly change.
 const SHARE: f64 = 0.02;
 /// 95 % point of twice the drop at the true instant, under noise that is as wide as it is taken for.

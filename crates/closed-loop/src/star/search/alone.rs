@@ -23,6 +23,7 @@ use super::{Wander, first_sight};
 use crate::declared::OnCentroids;
 use crate::error::CloseError;
 use crate::evidence::Evidence;
+use crate::search::near;
 use crate::search::selection::{columns_of, costs};
 use crate::search::{Choice, Fitted, Found, borrowed, fit_grams, polish, without};
 use crate::star::evidence::StarEvidence;
@@ -136,7 +137,9 @@ pub(super) fn without_slow(
     let mut before: Vec<usize> = Vec::new();
     // what was chosen before, in the forms that it has now, by itself
     let mut known: Option<Scored> = None;
-    for _ in 0..ROUNDS {
+    let (mut rounds, mut compared) = (ROUNDS, false);
+    while rounds > 0 {
+        rounds -= 1;
         let (chosen, quieter) = begun.plain.chosen(folds, &begun.candidates, may)?;
         let fitted = quieter.as_ref().unwrap_or(&begun.plain);
         let turns = |g: &&usize| begun.candidates[**g].acts_on_attitude();
@@ -170,6 +173,17 @@ pub(super) fn without_slow(
             && let Some(to) = first_sight::of_forms(white, folds, &polished, &chosen, phase)?
         {
             return Ok(Outcome::Elsewhere(to));
+        }
+        if !changed && !compared {
+            compared = true;
+            let on_frames = OnFrames::of(white, &begun.moments);
+            if near::likelier(&on_frames, folds, &mut polished, fitted, &chosen, may)? {
+                (rounds, known) = (ROUNDS, None);
+                before.clear();
+                drop(quieter);
+                begun = begun.in_forms(white, folds, polished)?;
+                continue;
+            }
         }
         if !changed {
             let alone = Alone::new(white, folds, &begun, fitted, &chosen, cost);

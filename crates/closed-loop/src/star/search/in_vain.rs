@@ -23,7 +23,7 @@ use crate::search::{Found, borrowed, fit_beside, without};
 use crate::star::evidence::StarEvidence;
 
 /// Nats that another polish, and another noise for it, may bring.
-const POLISH: f64 = 3.0;
+const POLISH: f64 = 1.0;
 /// Nats that another polish may bring what is barely worth a search: a line lies within an eighth of a turn of its best,
 /// which is a twentieth of its square.
 const POLISH_FAINT: f64 = 1.0;

@@ -21,6 +21,7 @@ use spectra::robust::median_step;
 use spectra::{LombScargle, LombScargleSettings};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
+use crate::parabola::bottom;
 use crate::unexplained::around::Around;
 use crate::unexplained::grid::{Grid, coherent_s, top};
 
@@ -209,12 +210,14 @@ impl Series {
                 let sums: Vec<f64> = (0..bins).map(sum_at).collect();
                 let (best, sum) = least(&sums)?;
                 let law = ChiSquared::new(2.0 * axes as f64).ok()?;
-                Some((law.sf(-2.0 * sum), best))
+                let beside = |k: usize| sums.get(k..k + 3)?.try_into().ok();
+                let between = best.checked_sub(1).and_then(beside).map_or(0.0, bottom);
+                Some((law.sf(-2.0 * sum), best as f64 + between))
             })
             .min_by(|a, b| a.0.total_cmp(&b.0))?;
         let likely = 2.0 * chance * (bins as f64) < by_chance;
         likely.then_some(SharedLine {
-            frequency_hz: grid.at(best),
+            frequency_hz: grid.first_hz + best * grid.step_hz,
             tried: bins,
         })
     }
