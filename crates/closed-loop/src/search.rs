@@ -23,7 +23,6 @@ pub(crate) use fitted::{
     Fitted, fit, fit_beside, fit_design, fit_grams, fit_grams_beside, fit_whole, layout_of,
 };
 use group::Group;
-use instants::INSTANT;
 use selection::{Selection, columns_of, costs};
 
 pub(crate) mod catalogue;
@@ -429,7 +428,7 @@ fn scan(
         // the nearer one decides
         let nearer = sides.iter().flatten().copied().min_by(f64::total_cmp);
         if round >= SCAN_ROUNDS && nearer.is_none_or(|lost| lost - least <= FINE) {
-            let smooth = parameter.name != INSTANT;
+            let smooth = parameter.difference.is_some();
             if let ([Some(before), Some(behind)], true) = (sides, smooth) {
                 let between = step * bottom([before, least, behind]);
                 candidates[g] = moved(candidates[g].as_ref(), between)

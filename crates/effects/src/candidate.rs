@@ -188,7 +188,12 @@ pub struct Nonlinear {
     pub range: [f64; 2],
     /// Step within which the columns hardly change: the first step of a refinement.
     pub step: f64,
+    /// Difference to either side over which the slope of the columns is to be taken; `None`: an instant has no slope.
+    pub difference: Option<f64>,
 }
+
+/// Share of the step that makes a slope of columns that are smooth.
+pub(crate) const DIFFERENCE: f64 = 0.02;
 
 /// Another effect of the catalogue that looks like a candidate whatever the data.
 #[derive(Clone, Debug, PartialEq)]

@@ -17,6 +17,7 @@
 use focal_plane::{Camera, Pixel};
 use star_tracker::StarView;
 
+use crate::candidate::DIFFERENCE;
 use crate::lens::{Bend, TERMS};
 use crate::parameters::Reader;
 use crate::shift::{Shift, ShiftCandidate, Shifted, linear_px};
@@ -213,6 +214,7 @@ impl Shift for Brown {
             value,
             range: [-FARTHEST * half, FARTHEST * half],
             step: FARTHEST * half / 4.0,
+            difference: Some(DIFFERENCE * FARTHEST * half / 4.0),
         };
         vec![
             axis("cx_px", self.centre.x, half[0]),

@@ -17,6 +17,7 @@
 use core::f64::consts::{PI, TAU};
 
 use crate::bending::{Bending, BendingCandidate, Bent};
+use crate::candidate::DIFFERENCE;
 use crate::parameters::Reader;
 use crate::{
     ActsOn, Candidate, Coefficient, Effect, EffectError, EffectKind, Nonlinear, Parameter,
@@ -159,6 +160,7 @@ impl Bending for Line {
             value: self.frequency_hz,
             range: self.range,
             step: self.step,
+            difference: Some(DIFFERENCE * self.step),
         }]
     }
     fn stands_for(&self) -> f64 {

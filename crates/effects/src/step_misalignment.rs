@@ -114,6 +114,7 @@ impl Bending for Step {
             value: self.at_s,
             range: self.range,
             step,
+            difference: None,
         }]
     }
     fn stands_for(&self) -> f64 {

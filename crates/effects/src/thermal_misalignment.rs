@@ -47,6 +47,8 @@ const PLAUSIBLE_ARCSEC: f64 = 5.0;
 /// Lags that the catalogue proposes beside none, s, as far as they fit into the span: a factor 3
 /// apart, so that the nearest shifts a sinusoid by at most 15 deg against the best.
 const LAGS_S: [f64; 8] = [10.0, 30.0, 100.0, 300.0, 1e3, 3e3, 1e4, 3e4];
+/// Lags that differ by less are alike, s.
+const LEAST_STEP_S: f64 = 5.0;
 
 /// The kind.
 #[derive(Debug)]
@@ -182,13 +184,14 @@ impl Bending for Channel {
         BTreeMap::from([("channel".to_owned(), self.name.clone())])
     }
     fn nonlinear(&self) -> Vec<Nonlinear> {
-        let step = (0.5 * self.lag_s).max(LAGS_S[0] / 2.0);
         vec![Nonlinear {
             name: "lag_s",
             unit: "s",
             value: self.lag_s,
             range: self.range,
-            step,
+            step: (0.5 * self.lag_s).max(LEAST_STEP_S),
+            // no less: a lag as short as the time between samples takes the channel's noise along, and no longer one does
+            difference: Some(LEAST_STEP_S),
         }]
     }
     fn with_nonlinear(&self, values: &[f64]) -> Option<Self> {

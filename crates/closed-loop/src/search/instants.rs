@@ -39,10 +39,6 @@ use crate::search::group::Group;
 use crate::search::selection::columns_of;
 use crate::search::{Found, first_column, fit, fit_whole};
 
-/// Parameters that are instants: the likelihood of one is no parabola.
-pub(crate) const INSTANT: &str = "at_s";
-/// Difference for a slope, in the step within which columns hardly change.
-const SHARE: f64 = 0.02;
 /// 95 % point of twice the drop at the true instant, under noise that is as wide as it is taken for.
 const DROP: f64 = 7.35;
 /// Each distance tried is about this many times the last.
@@ -67,15 +63,15 @@ pub(crate) fn complete(
     for (k, &g) in chosen.iter().enumerate() {
         let candidate = found.candidates[g].as_ref();
         for (j, parameter) in candidate.nonlinear().into_iter().enumerate() {
-            if parameter.name == INSTANT {
-                let interval = instant(evidence, folds, found, g, surroundings, step_s)?;
-                if let Some(told) = effects[k].parameters.get_mut(INSTANT) {
+            let Some(difference) = parameter.difference else {
+                let interval = instant(evidence, folds, found, g, j, surroundings, step_s)?;
+                if let Some(told) = effects[k].parameters.get_mut(parameter.name) {
                     told.interval = interval;
                 }
                 continue;
-            }
+            };
             let (values, _) = crate::findings::amplitudes_of(found, g, &set, &estimate);
-            let slope = Slope::of(candidate, j, SHARE * parameter.step, values);
+            let slope = Slope::of(candidate, j, difference, values);
             slopes.extend(slope.map(|s| (k, parameter.name, s)));
         }
     }
@@ -140,20 +136,18 @@ fn widen(
     }
 }
 
-/// Bounds of the instant of candidate `g`, beside the others that were chosen.
+/// Bounds of the instant that is parameter `j` of candidate `g`, beside the others that were chosen.
 fn instant(
     evidence: &dyn Evidence,
     folds: &Folds,
     found: &Found,
     g: usize,
+    j: usize,
     surroundings: &Surroundings<'_>,
     step_s: f64,
 ) -> Result<Option<[f64; 2]>, CloseError> {
     let candidate = found.candidates[g].as_ref();
     let now: Vec<f64> = candidate.nonlinear().iter().map(|n| n.value).collect();
-    let Some(j) = candidate.nonlinear().iter().position(|n| n.name == INSTANT) else {
-        return Ok(None);
-    };
     let span = surroundings.span_s;
     let mut times = vec![now[j]];
     for sign in [-1.0, 1.0] {
