@@ -252,7 +252,10 @@ pub(crate) fn search(
         if settled || !polish(evidence, folds, &mut candidates, &fitted, &chosen)? {
             if !compared && round < last {
                 compared = true;
-                if near::likelier(evidence, folds, &mut candidates, &fitted, &chosen, may)? {
+                if let Some(likelier) =
+                    near::likelier(evidence, folds, &candidates, &fitted, &chosen, may)?
+                {
+                    candidates = likelier.candidates;
                     last = round + ROUNDS;
                     before.clear();
                     continue;

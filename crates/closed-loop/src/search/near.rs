@@ -24,57 +24,75 @@ use crate::evidence::Evidence;
 /// sinusoid 15 degrees off 0.93.
 const OFF_GRID: f64 = 0.2;
 /// How many sets are polished, the best first.
-const MOST: usize = 3;
+const MOST: usize = 4;
 
-/// Puts the forms of a set that is likelier than `chosen`, which is polished, among the `candidates`; returns whether there
-/// is one. `fitted`: the fits of these candidates.
+/// A set of effects that is likelier than the choice.
+pub(crate) struct Likelier {
+    pub(crate) set: Vec<usize>,
+    /// All candidates, those of the set in the forms that make it so.
+    pub(crate) candidates: Vec<Arc<dyn Candidate>>,
+    /// Log-likelihood less the price of its parameters.
+    fit: f64,
+}
+
+/// The likeliest set beside `chosen`, which is polished, if it is likelier. `fitted`: the fits of these candidates.
 pub(crate) fn likelier(
     evidence: &dyn Evidence,
     folds: &Folds,
-    candidates: &mut [Arc<dyn Candidate>],
+    candidates: &[Arc<dyn Candidate>],
     fitted: &Fitted,
     chosen: &[usize],
     may: &[bool],
-) -> Result<bool, CloseError> {
+) -> Result<Option<Likelier>, CloseError> {
     let cost = vec![1.0; fitted.groups.len()];
     let trials = fitted.trials(&cost);
     let Some(now) = trials.fit(chosen) else {
-        return Ok(false);
+        return Ok(None);
     };
     let mut near = sets(&trials, chosen, may);
-    near.retain(|(most, _)| *most > now);
-    near.sort_by(|a, b| b.0.total_cmp(&a.0));
+    near.retain(|near| near.fit + OFF_GRID * near.shaped > now);
+    near.sort_by(|a, b| b.fit.total_cmp(&a.fit));
     near.truncate(MOST);
-    let mut best: Option<(f64, Vec<Arc<dyn Candidate>>)> = None;
-    for (_, set) in near {
-        let mut forms = candidates.to_vec();
-        polish(evidence, folds, &mut forms, fitted, &set)?;
-        let own: Vec<_> = set.iter().map(|&g| Arc::clone(&forms[g])).collect();
+    let mut best: Option<Likelier> = None;
+    for Near { set, .. } in near {
+        let mut candidates = candidates.to_vec();
+        polish(evidence, folds, &mut candidates, fitted, &set)?;
+        let own: Vec<_> = set.iter().map(|&g| Arc::clone(&candidates[g])).collect();
         let alone = fit_whole(evidence, folds, &borrowed(&own))?;
         let all: Vec<usize> = (0..own.len()).collect();
-        let least = best.as_ref().map_or(now, |(fit, _)| *fit);
+        let least = best.as_ref().map_or(now, |best| best.fit);
         if let Some(fit) = alone.trials(&cost[..own.len()]).fit(&all)
             && fit > least
         {
-            best = Some((fit, forms));
+            best = Some(Likelier {
+                set,
+                candidates,
+                fit,
+            });
         }
     }
-    if let Some((_, forms)) = &best {
-        candidates.clone_from_slice(forms);
-    }
-    Ok(best.is_some())
+    Ok(best)
 }
 
-/// Other sets, and what a polish may make of their log-likelihood less the price of their parameters.
-fn sets(trials: &Trials<'_>, chosen: &[usize], may: &[bool]) -> Vec<(f64, Vec<usize>)> {
+/// A set beside the choice.
+struct Near {
+    set: Vec<usize>,
+    /// Log-likelihood less the price of its parameters.
+    fit: f64,
+    /// The most nats of an effect in it that has a shape.
+    shaped: f64,
+}
+
+/// The sets that could come near.
+fn sets(trials: &Trials<'_>, chosen: &[usize], may: &[bool]) -> Vec<Near> {
     let groups = trials.groups;
     let shaped = |g: usize| groups[g].shapes > 0;
-    let with_room = |set: Vec<usize>| {
+    let near = |set: Vec<usize>| {
         let fit = trials.fit(&set)?;
-        let shaped = set.iter().filter(|&&g| shaped(g));
-        let nats = shaped.filter_map(|&g| Some(fit - trials.fit(&without(&set, &[g]))?));
-        let room = nats.fold(0.0, f64::max);
-        (room > 0.0).then_some((fit + OFF_GRID * room, set))
+        let own = set.iter().filter(|&&g| shaped(g));
+        let nats = own.filter_map(|&g| Some(fit - trials.fit(&without(&set, &[g]))?));
+        let shaped = nats.fold(0.0, f64::max);
+        Some(Near { set, fit, shaped })
     };
     // the best of those that are open beside some others, family by family
     let best_beside = |others: &[usize], open: &dyn Fn(usize) -> bool| {
@@ -102,7 +120,7 @@ fn sets(trials: &Trials<'_>, chosen: &[usize], may: &[bool]) -> Vec<(f64, Vec<us
             let same = |g: usize| groups[g].family == groups[o].family;
             best_beside(&without(&others, &[o]), &same)
         });
-        out.extend(instead.into_iter().chain(fewer).filter_map(with_room));
+        out.extend(instead.into_iter().chain(fewer).filter_map(near));
     }
     out
 }

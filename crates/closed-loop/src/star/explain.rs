@@ -66,17 +66,16 @@ pub(super) struct Known<'a> {
     pub(super) landings: usize,
 }
 
-impl Known<'_> {
-    /// Puts polished forms in the place of the same candidates of `list`: another polish has little left to do.
-    fn polished(&self, list: &mut [Arc<dyn Candidate>]) {
-        let cause = |c: &dyn Candidate| (family(c), c.part(), c.nonlinear().len());
-        for (g, form) in &self.forms {
-            let candidate = list.get_mut(*g);
-            let same = candidate.filter(|c| cause(c.as_ref()) == cause(form.as_ref()));
-            if let Some(candidate) = same {
-                candidate.clone_from(form);
-                forms::along(list, *g);
-            }
+/// Puts polished `forms` in the place of the same candidates of `list`: another polish has little left to do, and beside a
+/// slow error a step shows at its instant alone.
+fn polished(list: &mut [Arc<dyn Candidate>], forms: &[(usize, Arc<dyn Candidate>)]) {
+    let cause = |c: &dyn Candidate| (family(c), c.part(), c.nonlinear().len());
+    for (g, form) in forms {
+        let candidate = list.get_mut(*g);
+        let same = candidate.filter(|c| cause(c.as_ref()) == cause(form.as_ref()));
+        if let Some(candidate) = same {
+            candidate.clone_from(form);
+            forms::along(list, *g);
         }
     }
 }

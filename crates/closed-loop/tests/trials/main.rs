@@ -11,6 +11,7 @@ mod kit;
 mod light;
 mod noise;
 mod nulls;
+mod off_grid;
 mod orbits;
 mod patterns;
 mod power;

@@ -21,7 +21,7 @@ use crate::search::catalogue;
 use crate::search::orbits::{self, Look};
 use crate::star::data::StarData;
 use crate::star::evidence::StarEvidence;
-use crate::star::explain::{Begun, Explained, LANDINGS};
+use crate::star::explain::{Begun, Explained, LANDINGS, polished};
 use crate::star::search::{Searched, Wander, in_vain};
 use crate::star::steadied::steadied;
 use crate::unexplained::leftover::{self, Series};
@@ -97,7 +97,8 @@ impl<'g, 'a> Ground<'g, 'a> {
             let count = put_forward.len();
             also.extend(put_forward);
             // what was put forward in vain changes nothing
-            match self.named(&also, lands)? {
+            let forms = outcome.searched.found.choice().forms();
+            match self.named(&also, &forms, lands)? {
                 Outcome::Named(mut again) => {
                     if again.searched.found.names_one_of_the_last(count) {
                         inside = self.left(&mut again);
@@ -143,7 +144,7 @@ impl<'g, 'a> Ground<'g, 'a> {
     fn first(&self, lands: bool) -> Result<(Outcome<'a>, Vec<Arc<dyn Candidate>>), CloseError> {
         let also = &self.begun.known.put_forward;
         if !also.is_empty() {
-            let outcome = self.named(also, lands)?;
+            let outcome = self.named(also, &[], lands)?;
             let again = match &outcome {
                 Outcome::Named(named) => named.searched.found.names_one_of_the_last(also.len()),
                 Outcome::Elsewhere(_) => true,
@@ -152,7 +153,7 @@ impl<'g, 'a> Ground<'g, 'a> {
                 return Ok((outcome, also.clone()));
             }
         }
-        Ok((self.named(&[], lands)?, Vec::new()))
+        Ok((self.named(&[], &[], lands)?, Vec::new()))
     }
 
     /// Terms of what nobody listed, for the question what the leftover follows most.
@@ -182,14 +183,16 @@ impl<'g, 'a> Ground<'g, 'a> {
         // With raw windows a warm pixel is the dark map's business.
         let formed = self.begun.situation.windows.is_some();
         list.retain(|c| c.acts_on_stars() && !(formed && c.id() == "hot_pixel"));
-        self.begun.known.polished(&mut list);
+        polished(&mut list, &self.begun.known.forms);
         list
     }
 
-    /// What may be named of the catalogue and of what was put forward; `lands`: whether the light is to be followed.
+    /// What may be named of the catalogue and of what was put forward, in the `forms` that a search before gave them;
+    /// `lands`: whether the light is to be followed.
     fn named(
         &self,
         put_forward: &[Arc<dyn Candidate>],
+        forms: &[(usize, Arc<dyn Candidate>)],
         lands: bool,
     ) -> Result<Outcome<'a>, CloseError> {
         let Begun {
@@ -202,6 +205,7 @@ impl<'g, 'a> Ground<'g, 'a> {
         let candidates = || {
             let mut list = self.listed();
             list.extend(put_forward.iter().cloned());
+            polished(&mut list, forms);
             list
         };
         let accelerates = OnceCell::new();

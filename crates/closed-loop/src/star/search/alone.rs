@@ -177,11 +177,12 @@ pub(super) fn without_slow(
         if !changed && !compared {
             compared = true;
             let on_frames = OnFrames::of(white, &begun.moments);
-            if near::likelier(&on_frames, folds, &mut polished, fitted, &chosen, may)? {
+            let likelier = near::likelier(&on_frames, folds, &polished, fitted, &chosen, may)?;
+            if let Some(likelier) = likelier {
                 (rounds, known) = (ROUNDS, None);
                 before.clear();
                 drop(quieter);
-                begun = begun.in_forms(white, folds, polished)?;
+                begun = begun.in_forms(white, folds, likelier.candidates)?;
                 continue;
             }
         }

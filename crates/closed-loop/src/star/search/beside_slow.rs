@@ -5,6 +5,7 @@
 //!
 //! Not physics: a search ([`super`] has what hypotheses are held against).
 
+use std::mem;
 use std::sync::Arc;
 
 use block_regression::Folds;
@@ -18,6 +19,7 @@ use super::trial::{Scored, Trial};
 use super::{Searched, Wander};
 use crate::error::CloseError;
 use crate::evidence::Evidence;
+use crate::search::near::{self, Likelier};
 use crate::search::selection::{Judgement, Selection, costs, price};
 use crate::search::{Fitted, Found, borrowed, fit_grams_beside, polish, without};
 use crate::star::evidence::StarEvidence;
@@ -81,6 +83,7 @@ pub(super) fn beside_slow<'a>(
     };
     // fits of the same columns, those under the noise of the last choice
     let (mut plain_fit, mut filtered_fit) = (Some(plain), None);
+    let mut compared = false;
     loop {
         let plain = match plain_fit.take() {
             Some(plain) => plain,
@@ -103,7 +106,18 @@ pub(super) fn beside_slow<'a>(
                 continue;
             }
         };
-        let Some((added, its_noise)) = search.best(&trial, &base, [&plain, &filtered]) else {
+        let best = search.best(&trial, &base, [&plain, &filtered]);
+        if best.is_none() && !compared {
+            compared = true;
+            if let Some(likelier) = search.likelier(&moments, &filtered)? {
+                search.chosen = likelier.set;
+                let before = mem::replace(&mut search.candidates, likelier.candidates);
+                drop((plain, filtered));
+                moments = in_forms(white, folds, moments, &before, &search.candidates);
+                continue;
+            }
+        }
+        let Some((added, its_noise)) = best else {
             let (worth, cost) = (trial.worth(&base), trial.cost);
             let found = search.noise;
             if search.turns_frames() {
@@ -205,9 +219,7 @@ impl<'s> Search<'s, '_> {
         if self.chosen.len() >= MOST {
             return Vec::new();
         }
-        let open: Vec<bool> = (0..self.candidates.len())
-            .map(|g| self.may[g] && !self.banned[g])
-            .collect();
+        let open = self.open();
         let mut shortlist: Vec<usize> = Vec::new();
         for fitted in fits {
             let tried = fitted.trials(&trial.cost).tried(&open, &self.chosen);
@@ -255,6 +267,31 @@ impl<'s> Search<'s, '_> {
         }
         let chosen = self.chosen.clone();
         Ok((fitted, Selection { chosen, judged }))
+    }
+
+    /// Effects that are likelier than the choice once they are polished, under the present noise.
+    fn likelier(
+        &self,
+        moments: &StarMoments,
+        fitted: &Fitted,
+    ) -> Result<Option<Likelier>, CloseError> {
+        let level = self.white.with_noise(&self.noise);
+        let evidence = OnFrames::of(&level, moments);
+        let (candidates, chosen) = (&self.candidates, &self.chosen);
+        near::likelier(
+            &evidence,
+            self.folds,
+            candidates,
+            fitted,
+            chosen,
+            &self.open(),
+        )
+    }
+
+    /// Candidates that may be added.
+    fn open(&self) -> Vec<bool> {
+        let may = self.may.iter().zip(&self.banned);
+        may.map(|(may, banned)| *may && !banned).collect()
     }
 
     /// Whether the choice has other forms now.
