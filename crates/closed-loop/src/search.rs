@@ -415,7 +415,7 @@ fn scan(
                 .collect();
             fitted.fits.variance(&columns_of(&fitted.groups, &set))
         };
-        // twice the log-likelihood that each loses
+        // twice what each loses in log-likelihood, up to a constant
         let lost: Vec<Option<f64>> = (0..variants)
             .map(|v| with(v).map(|variance| fitted.scalars * variance.ln()))
             .collect();
@@ -431,11 +431,12 @@ fn scan(
         // the nearer one decides
         let nearer = sides.iter().flatten().copied().min_by(f64::total_cmp);
         if round >= SCAN_ROUNDS && nearer.is_none_or(|lost| lost - least <= FINE) {
-            let smooth = parameter.difference.is_some();
-            if let ([Some(before), Some(behind)], true) = (sides, smooth) {
-                let between = step * bottom([before, least, behind]);
-                candidates[g] = moved(candidates[g].as_ref(), between)
-                    .unwrap_or_else(|| Arc::clone(&candidates[g]));
+            if parameter.difference.is_some()
+                && let [Some(before), Some(behind)] = sides
+                && let between = step * bottom([before, least, behind])
+                && let Some(best) = moved(candidates[g].as_ref(), between)
+            {
+                candidates[g] = best;
             }
             break;
         }

@@ -208,13 +208,16 @@ impl Shift for Brown {
             return Vec::new();
         }
         let half = self.camera.half_size_px();
-        let axis = |name, value: f64, half: f64| Nonlinear {
-            name,
-            unit: "px",
-            value,
-            range: [-FARTHEST * half, FARTHEST * half],
-            step: FARTHEST * half / 4.0,
-            difference: Some(DIFFERENCE * FARTHEST * half / 4.0),
+        let axis = |name, value: f64, half: f64| {
+            let step = FARTHEST * half / 4.0;
+            Nonlinear {
+                name,
+                unit: "px",
+                value,
+                range: [-FARTHEST * half, FARTHEST * half],
+                step,
+                difference: Some(DIFFERENCE * step),
+            }
         };
         vec![
             axis("cx_px", self.centre.x, half[0]),

@@ -251,7 +251,8 @@ mod tests {
 
     /// Of a temperature that rises and falls by 0.0075 a second, once a second with errors of 0.02 up and down, no lag and one
     /// of 5 s differ by 0.0075 times 5 and the errors, which the lag has taken out: by sqrt(1 + (0.02 / 0.0375)^2) = 1.13 times
-    /// what they do without errors, in the middle of a rise. Over 0.1 s by 5.4 times, of changes of 0.04 a second: each error would count as knowledge.
+    /// what they do without errors, in the middle of a rise. Over 0.1 s by 5.4 times, of changes of 0.04 a second: each error
+    /// would count as knowledge.
     #[test]
     fn a_slope_at_no_lag_is_hardly_that_of_errors() {
         let slope = |error: f64| {

@@ -8,13 +8,11 @@
 //!
 //! Not physics: a comparison of hypotheses.
 
-use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use block_regression::Folds;
 use effects::Candidate;
 
-use super::group::open_beside;
 use super::selection::Trials;
 use super::{Fitted, borrowed, fit_whole, polish, without};
 use crate::error::CloseError;
@@ -44,8 +42,8 @@ pub(crate) fn likelier(
     chosen: &[usize],
     may: &[bool],
 ) -> Result<Option<Likelier>, CloseError> {
-    let cost = vec![1.0; fitted.groups.len()];
-    let trials = fitted.trials(&cost);
+    // a fit pays by parameters, not for having been looked for
+    let trials = fitted.trials(&[]);
     let Some(now) = trials.fit(chosen) else {
         return Ok(None);
     };
@@ -61,7 +59,7 @@ pub(crate) fn likelier(
         let alone = fit_whole(evidence, folds, &borrowed(&own))?;
         let all: Vec<usize> = (0..own.len()).collect();
         let least = best.as_ref().map_or(now, |best| best.fit);
-        if let Some(fit) = alone.trials(&cost[..own.len()]).fit(&all)
+        if let Some(fit) = alone.trials(&[]).fit(&all)
             && fit > least
         {
             best = Some(Likelier {
@@ -87,40 +85,27 @@ struct Near {
 fn sets(trials: &Trials<'_>, chosen: &[usize], may: &[bool]) -> Vec<Near> {
     let groups = trials.groups;
     let shaped = |g: usize| groups[g].shapes > 0;
-    let near = |set: Vec<usize>| {
-        let fit = trials.fit(&set)?;
+    let all: Vec<usize> = (0..groups.len()).filter(|&g| may[g] && shaped(g)).collect();
+    let near = |others: &[usize], (fit, g): (f64, usize)| {
+        let set = [others, &[g]].concat();
         let own = set.iter().filter(|&&g| shaped(g));
         let nats = own.filter_map(|&g| Some(fit - trials.fit(&without(&set, &[g]))?));
         let shaped = nats.fold(0.0, f64::max);
-        Some(Near { set, fit, shaped })
-    };
-    // the best of those that are open beside some others, family by family
-    let best_beside = |others: &[usize], open: &dyn Fn(usize) -> bool| {
-        let mut best: BTreeMap<&str, (f64, Vec<usize>)> = BTreeMap::new();
-        let open = |&g: &usize| may[g] && shaped(g) && open(g) && open_beside(groups, others, g);
-        for g in (0..groups.len()).filter(open) {
-            let set = [others, &[g]].concat();
-            let fit = trials.fit(&set).unwrap_or(f64::NEG_INFINITY);
-            let known = best
-                .entry(&groups[g].family)
-                .or_insert_with(|| (fit, set.clone()));
-            if fit > known.0 {
-                *known = (fit, set);
-            }
-        }
-        best.into_values().map(|(_, set)| set).collect::<Vec<_>>()
+        Near { set, fit, shaped }
     };
     let mut out = Vec::new();
     for &c in chosen {
         let others = without(chosen, &[c]);
-        let other = |g: usize| groups[g].family != groups[c].family;
-        let instead = best_beside(&others, &|g| other(g) && !chosen.contains(&g));
+        let other = |g: usize| groups[g].family != groups[c].family && !chosen.contains(&g);
+        let instead = trials.best_of_families(&others, &all, other);
+        out.extend(instead.into_iter().map(|best| near(&others, best)));
         // without it, and the forms that others had before they were polished beside it
-        let fewer = others.iter().flat_map(|&o| {
+        for &o in &others {
+            let rest = without(&others, &[o]);
             let same = |g: usize| groups[g].family == groups[o].family;
-            best_beside(&without(&others, &[o]), &same)
-        });
-        out.extend(instead.into_iter().chain(fewer).filter_map(near));
+            let fewer = trials.best_of_families(&rest, &all, same);
+            out.extend(fewer.into_iter().map(|best| near(&rest, best)));
+        }
     }
     out
 }

@@ -317,24 +317,10 @@ impl Trials<'_> {
     /// Another, or two, of `all` in the place of one of `chosen`, each the form of its family that fits best there, where they
     /// fit better than `now`.
     fn others_for_one(&self, all: &[usize], chosen: &[usize], now: f64) -> Vec<(f64, Vec<usize>)> {
-        let family = |g: usize| self.groups[g].family.as_str();
         let mut out = Vec::new();
         for &g in chosen {
             let others = without(chosen, &[g]);
-            let open = |h: &&usize| **h != g && open_beside(self.groups, &others, **h);
-            let alone: Vec<(f64, usize)> = all
-                .par_iter()
-                .filter(open)
-                .filter_map(|&h| Some((self.fit(&[&others[..], &[h]].concat())?, h)))
-                .collect();
-            let mut best: BTreeMap<&str, (f64, usize)> = BTreeMap::new();
-            for (fit, h) in alone {
-                let known = best.entry(family(h)).or_insert((fit, h));
-                if fit > known.0 {
-                    *known = (fit, h);
-                }
-            }
-            let mut best: Vec<(f64, usize)> = best.into_values().collect();
+            let mut best = self.best_of_families(&others, all, |h| h != g);
             best.sort_by(|a, b| b.0.total_cmp(&a.0));
             best.truncate(IN_ITS_PLACE);
             // another alone, too: what was dropped for this one may have been a poor form of it
@@ -349,6 +335,28 @@ impl Trials<'_> {
             out.extend(fits.filter(|(fit, _)| *fit > now).collect::<Vec<_>>());
         }
         out
+    }
+
+    /// Of each family of `all` that `may` be chosen the group that fits best beside `others`, behind what it fits.
+    pub(crate) fn best_of_families(
+        &self,
+        others: &[usize],
+        all: &[usize],
+        may: impl Fn(usize) -> bool + Sync,
+    ) -> Vec<(f64, usize)> {
+        let each: Vec<(f64, usize)> = all
+            .par_iter()
+            .filter(|&&g| may(g) && open_beside(self.groups, others, g))
+            .filter_map(|&g| Some((self.fit(&[others, &[g]].concat())?, g)))
+            .collect();
+        let mut best: BTreeMap<&str, (f64, usize)> = BTreeMap::new();
+        for (fit, g) in each {
+            let known = best.entry(&self.groups[g].family).or_insert((fit, g));
+            if fit > known.0 {
+                *known = (fit, g);
+            }
+        }
+        best.into_values().collect()
     }
 
     /// Log-likelihood in sample less the price of all parameters and choices, up to a constant.

@@ -24,9 +24,6 @@ use crate::star::evidence::StarEvidence;
 
 /// Nats that another polish, and another noise for it, may bring.
 const POLISH: f64 = 1.0;
-/// Nats that another polish may bring what is barely worth a search: a line lies within an eighth of a turn of its best,
-/// which is a twentieth of its square.
-const POLISH_FAINT: f64 = 1.0;
 
 /// What was found, and behind it what is put forward.
 struct PutForward<'a> {
@@ -90,7 +87,7 @@ pub(crate) fn without_slow(
     let Some(before) = worth(&behind.known).filter(|w| w.iter().all(|w| w.is_finite())) else {
         return Ok(false);
     };
-    let least = FAMILY_ALPHA * POLISH_FAINT.exp();
+    let least = FAMILY_ALPHA * POLISH.exp();
     let stands = |&at: &usize| {
         let chance = trials.white_chance(&behind.known, at);
         chance.is_some_and(|p| p < least)
